@@ -1,0 +1,38 @@
+"""The fingertip's pulp over one cell: an exponential spring (equation 11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .quantity import Parameters, quantity
+
+__all__ = ["Contact"]
+
+Floats = NDArray[np.float64]
+
+#: Beyond this exponent the spring is stiffer than anything physical; the cut keeps it finite.
+LARGEST_EXPONENT = 500.0
+
+
+@dataclass(frozen=True)
+class Contact(Parameters):
+    """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
+
+    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
+    exponent: float = quantity(2000.0, "how fast the pulp stiffens", unit="1/m", symbol="m", above=0.0)
+    offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
+    share: float = quantity(0.34, "share of the flat-plate law a cell carries", symbol="f_d", source="D", above=0.0)
+
+    def tension(self, depth: Floats) -> Floats:
+        """Return the elastic force T, N, before the share f_d.
+
+        Parameters
+        ----------
+        depth : ndarray (n,)
+            Indentation x, m; negative where there is a gap.
+        """
+        exponent = np.minimum(np.maximum(depth - self.offset, 0.0) * self.exponent, LARGEST_EXPONENT)
+        return (self.stiffness / self.exponent) * np.expm1(exponent)

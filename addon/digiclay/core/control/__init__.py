@@ -1,0 +1,1 @@
+"""Controllers: strategies that turn measurements into valve commands."""

@@ -1,0 +1,49 @@
+"""The blister: the bump or dent under the finger, between the virtual master and the surface around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..quantity import Parameters, quantity
+
+__all__ = ["Blister"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Blister(Parameters):
+    """Radius and profile of the blister, and the ring around it that gives the edge height."""
+
+    radius: float = quantity(15e-3, "radius of the blister", unit="m", symbol="r_blister", source="P", above=0.0)
+    edge_radius: float = quantity(18.5e-3, "outer radius of the ring of edge cells", unit="m", symbol="r_edge", above=0.0)
+    flat_radius: float = quantity(6e-3, "radius of the flat top", unit="m", symbol="r_flat", at_least=0.0)
+    profile: str = quantity("cone", "how the blister falls off", source="P", choices=("cone", "gaussian"))
+    sigma: float = quantity(7e-3, "standard deviation of the Gaussian", unit="m", symbol="σ", above=0.0)
+
+    def check(self) -> None:
+        """The flat top lies inside the blister, the edge outside."""
+        if not self.flat_radius < self.radius:
+            rule = f"must be below the radius, {self.radius:g} m"
+            raise ParameterError("Blister", "flat_radius", rule, f"{self.flat_radius:g} m")
+        if not self.edge_radius > self.radius:
+            rule = f"must be above the radius, {self.radius:g} m"
+            raise ParameterError("Blister", "edge_radius", rule, f"{self.edge_radius:g} m")
+
+    def shape(self, distance: Floats) -> Floats:
+        """Return the profile p(r), 1 at the centre, for distances r inside the blister, m.
+
+        *cone*: 1 on the flat top, then falling linearly to 0 at the radius.
+        *gaussian*: ``exp(-r²/(2 σ²))``.
+        """
+        if self.profile == "gaussian":
+            return np.exp(distance * distance * (-0.5 / self.sigma**2))
+        return np.minimum((self.radius - distance) / (self.radius - self.flat_radius), 1.0)
+
+    def height(self, distance: Floats, edge: float, top: float) -> Floats:
+        """Return ``edge + p(r) (top - edge)``, m, at distances r from the virtual master."""
+        return edge + self.shape(distance) * (top - edge)

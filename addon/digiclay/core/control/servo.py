@@ -1,0 +1,43 @@
+"""Proportional control of a cell's height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..quantity import Parameters, quantity
+
+__all__ = ["Servo"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Servo(Parameters):
+    """``K_com = K_p (H_com - H)``, limited to [-1, 1], zero within a dead band.
+
+    The flow goes with the square of the opening, so a cell comes in like 1/t and would
+    never be at rest without the dead band.
+    """
+
+    gain: float = quantity(500.0, "proportional gain", unit="1/m", symbol="K_p", at_least=0.0)
+    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+
+    def command(self, target: Floats, height: Floats, overload: NDArray[np.bool_]) -> Floats:
+        """Return valve commands, shape (n,).
+
+        Parameters
+        ----------
+        target, height : ndarray (n,)
+            Commanded and measured height, m.
+        overload : ndarray (n,) of bool
+            Cells pressed harder than the high reservoir can lift. Opening to it would lower
+            them, and a proportional controller would open further: they are locked instead.
+        """
+        error = target - height
+        command = np.clip(self.gain * error, -1.0, 1.0)
+        command[np.abs(error) <= self.dead_band] = 0.0
+        command[overload & (command > 0.0)] = 0.0
+        return command

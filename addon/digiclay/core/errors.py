@@ -1,0 +1,62 @@
+"""What can go wrong, said in one line: owner, field, rule and value."""
+
+from __future__ import annotations
+
+__all__ = ["DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError"]
+
+
+class DigiclayError(Exception):
+    """Base of every error a user can cause; its text is one complete line."""
+
+
+class ParameterError(DigiclayError, ValueError):
+    """A parameter breaks its rule.
+
+    Parameters
+    ----------
+    owner : str
+        The part that owns the parameter, as users know it (``"Valve"``).
+    field : str
+        The parameter's name; empty when the rule joins several of them.
+    rule : str
+        What must hold, starting with ``must``.
+    value : str
+        The offending value, with its unit.
+    hint : str, optional
+        What is usually meant.
+    """
+
+    def __init__(self, owner: str, field: str, rule: str, value: str, hint: str = "") -> None:
+        self.owner, self.field, self.rule, self.value, self.hint = owner, field, rule, value, hint
+        name = f"{owner}.{field}" if field else owner
+        super().__init__(f"{name} {rule} (got {value})." + (f" {hint}" if hint else ""))
+
+
+class SceneError(DigiclayError):
+    """A scene file, or a ``--set`` value, cannot be used."""
+
+
+class OutputError(DigiclayError):
+    """A result cannot be written, or a run's folder cannot be read."""
+
+
+class DivergenceError(DigiclayError, ArithmeticError):
+    """The integration left the finite numbers.
+
+    Parameters
+    ----------
+    time : float
+        Simulated time at the start of the step that failed, s.
+    cell : int
+        Index of the first cell that failed.
+    quantity : str
+        What is no longer finite, or out of its range.
+    value : float
+        Its value.
+    remedy : str
+        What usually helps.
+    """
+
+    def __init__(self, time: float, cell: int, quantity: str, value: float, remedy: str) -> None:
+        self.time, self.cell, self.quantity, self.value, self.remedy = time, cell, quantity, value, remedy
+        super().__init__(f"At {time:.6g} s the {quantity} of cell {cell} became {value:g}. {remedy}")

@@ -1,0 +1,125 @@
+"""The fingertip as an ellipsoid, seen from below: its underside over each cell.
+
+Beyond nine tenths of the way to its rim the ellipsoid is continued by the paraboloid
+that meets it with equal slope. The ellipsoid itself ends there with infinite slope; the
+finger does not end there, and a tall pin that the finger runs into sideways must be met
+by a force that grows, not by one that jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .quantity import Parameters, quantity
+
+__all__ = ["LEVEL", "Fingertip", "reach", "underside"]
+
+Floats = NDArray[np.float64]
+
+#: Squared reduced radius at which the paraboloid takes over.
+JOIN = 0.96
+#: Orientation of a level finger (quaternion w, x, y, z).
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+_ROOT = (1.0 - JOIN) ** 0.5
+_SLOPE = 0.5 / _ROOT
+
+
+@dataclass(frozen=True)
+class Fingertip(Parameters):
+    """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
+
+    length: float = quantity(10e-3, "semi-axis along the finger", unit="m", symbol="a_x", source="S", above=0.0)
+    width: float = quantity(8e-3, "semi-axis across the finger", unit="m", symbol="a_y", source="S", above=0.0)
+    height: float = quantity(8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="S", above=0.0)
+
+    def outline(self, poses: Floats) -> Floats:
+        """Work out, for each pose, what its underside needs.
+
+        Parameters
+        ----------
+        poses : ndarray (k, 7)
+            Position of the lowest point, m, and unit quaternion w, x, y, z.
+
+        Returns
+        -------
+        ndarray (k, 10)
+            Centre x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²;
+            the tilt of the mid surface t_x, t_y; the half thickness over the centre, m; the
+            smaller eigenvalue of S, 1/m².
+        """
+        rotation = _matrices(poses[:, 3:])
+        axes = np.array([self.length, self.width, self.height])
+        inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
+        form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
+        lowest = inverse[:, :, 2] / np.sqrt(inverse[:, 2, 2])[:, None]
+        tilt = form[:, :2, 2] / form[:, 2, 2][:, None]
+        schur = form[:, :2, :2] - tilt[:, :, None] * form[:, 2, None, :2]
+        outline = np.empty((len(poses), 10))
+        outline[:, :3] = poses[:, :3] + lowest
+        outline[:, 3], outline[:, 4], outline[:, 5] = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
+        outline[:, 6:8] = tilt
+        outline[:, 8] = form[:, 2, 2] ** -0.5
+        outline[:, 9] = np.linalg.eigvalsh(schur)[:, 0]
+        return outline
+
+
+def reach(outline: list[float], peak: float) -> float:
+    """Return a radius about the centre beyond which the underside is above `peak`, m.
+
+    Parameters
+    ----------
+    outline : list of float (10,)
+        One row of `Fingertip.outline`.
+    peak : float
+        No pin top is higher than this, m.
+
+    Returns
+    -------
+    float
+        A bound for every tilt, from the paraboloid that nowhere lies above the underside;
+        negative when the finger is wholly above `peak`.
+    """
+    centre, tilt, half, narrow = outline[2], math.hypot(outline[6], outline[7]), outline[8], outline[9]
+    bend = 2.0 * _SLOPE * half * narrow
+    square = tilt * tilt + 2.0 * bend * (peak - centre + half * (_ROOT + _SLOPE * JOIN))
+    return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
+
+
+def underside(outline: Floats, x: Floats, y: Floats) -> Floats:
+    """Return the height of the finger's underside, shape (k, n), m.
+
+    Parameters
+    ----------
+    outline : ndarray (k, 10)
+        From `Fingertip.outline`.
+    x, y : ndarray (n,)
+        Where, m.
+    """
+    column = outline[:, :, None]
+    dx = x - column[:, 0]
+    dy = y - column[:, 1]
+    square = (column[:, 3] * dx + 2.0 * column[:, 4] * dy) * dx + column[:, 5] * dy * dy
+    root = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
+    root -= _SLOPE * np.maximum(square - JOIN, 0.0)
+    return np.asarray(column[:, 2] - column[:, 6] * dx - column[:, 7] * dy - column[:, 8] * root)
+
+
+def _matrices(quaternions: Floats) -> Floats:
+    """Return rotation matrices (k, 3, 3) of quaternions (k, 4), w first."""
+    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    return np.moveaxis(
+        np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        ),
+        2,
+        0,
+    )

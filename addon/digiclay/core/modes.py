@@ -1,0 +1,48 @@
+"""Control modes of a cell: one table of codes, names, meanings and colours.
+
+The codes are what ``history.npz`` stores and what the view maps to materials. The
+colours are Okabe and Ito's palette, told apart by people with any colour vision.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["COLOURS", "MEANINGS", "Mode"]
+
+
+class Mode(IntEnum):
+    """What a cell is doing; stored as ``int8``."""
+
+    REST = 0
+    HOLD = 1
+    EDGE = 2
+    BLISTER = 3
+    SPRING = 4
+    FORCE_FOLLOW = 5
+    CRITICAL = 6
+    FROZEN = 7
+
+
+MEANINGS: dict[Mode, str] = {
+    Mode.REST: "at rest, not formed yet",
+    Mode.HOLD: "keeps the height it was left at",
+    Mode.EDGE: "just outside the blister, gives the boundary height",
+    Mode.BLISTER: "part of the blister, follows its profile",
+    Mode.SPRING: "under the finger, virtual spring",
+    Mode.FORCE_FOLLOW: "under the finger, follows the force",
+    Mode.CRITICAL: "about to lose the finger",
+    Mode.FROZEN: "left behind by the finger, keeps its command",
+}
+
+#: sRGB in [0, 1], one per mode.
+COLOURS: dict[Mode, tuple[float, float, float]] = {
+    Mode.REST: (0.78, 0.79, 0.80),
+    Mode.HOLD: (0.00, 0.45, 0.70),
+    Mode.EDGE: (0.95, 0.90, 0.25),
+    Mode.BLISTER: (0.34, 0.71, 0.91),
+    Mode.SPRING: (0.90, 0.62, 0.00),
+    Mode.FORCE_FOLLOW: (0.84, 0.37, 0.00),
+    Mode.CRITICAL: (0.80, 0.47, 0.65),
+    Mode.FROZEN: (0.00, 0.62, 0.45),
+}

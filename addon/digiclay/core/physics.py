@@ -1,0 +1,114 @@
+"""One cell's continuous physics, in the order of the paper: from touch to flow to motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .actuator import Actuator
+from .places import Flow, Lag
+from .supply import Supply
+from .touch import Touch, force
+
+__all__ = ["Cell", "mean_mobility", "rates"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The parts every cell is made of.
+
+    A block of n cells has state rows ``y`` of shape (r, n): height, m; the lag's rows; the
+    pulp's rows (those of the first k cells, which the finger may touch, are in use).
+    """
+
+    actuator: Actuator
+    flow: Flow
+    supply: Supply
+    lag: Lag
+    touch: Touch | None
+
+    @property
+    def lag_rows(self) -> slice:
+        """The rows of ``y`` that the valve lag owns."""
+        return slice(1, 1 + self.lag.rows)
+
+    @property
+    def pulp_rows(self) -> slice:
+        """The rows of ``y`` that the relaxation owns."""
+        first = 1 + self.lag.rows
+        return slice(first, first + (self.touch.pulp.rows if self.touch else 0))
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        return self.pulp_rows.stop
+
+
+def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
+    """Return dy/dt of a block of cells.
+
+    Parameters
+    ----------
+    cell : Cell
+    y : ndarray (r, n)
+        State rows, see `Cell`.
+    under : ndarray (k,)
+        Underside of the finger over the first k cells, m.
+    command : ndarray (n,)
+        Held valve commands, in [-1, 1].
+    """
+    height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
+    pressure = np.zeros_like(height)
+    change = np.zeros_like(y)
+    if cell.touch and under.size:
+        pressed = force(cell.touch, height[: under.size], under, pulp)
+        pressure[: under.size] = cell.actuator.pressure(pressed)
+        tension = cell.touch.contact.tension(height[: under.size] - under)
+        change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
+    opening = cell.lag.opening(lag, command)
+    drop = cell.supply.pressure(opening) - pressure
+    change[0] = cell.actuator.rate(cell.flow.flow(opening, drop), height)
+    change[cell.lag_rows] = cell.lag.rate(lag, command)
+    return change
+
+
+def mean_mobility(
+    cell: Cell, lag: Floats, command: Floats, step: float, load: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
+    """Average the valve over a step of a held command.
+
+    Parameters
+    ----------
+    cell : Cell
+    lag : ndarray (rows, n)
+        State rows of the valve lag at the start of the step.
+    command : ndarray (n,)
+        Held valve commands.
+    step : float
+        Length of the step, s.
+    load : ndarray (n,) or float
+        Pressure in the cylinder about the middle of the step, Pa; it matters only where
+        the flow can turn turbulent.
+
+    Returns
+    -------
+    mobility : ndarray (n,)
+        Mean of (Q/ΔP)/A_a, m/(s Pa).
+    drive : ndarray (n,)
+        Mean of mobility times reservoir pressure, m/s: without load, the mean speed. A
+        valve that changes reservoir within the step needs no special care: both means are
+        taken at Gauss points of the exact opening.
+    """
+    openings = cell.lag.during(lag, command, step)
+    share = 1.0 / (cell.actuator.area * len(openings))
+    mobility = drive = np.zeros(command.size)
+    for opening in openings:
+        pressure = cell.supply.pressure(opening)
+        conductance = share * cell.flow.conductance(opening, pressure - load)
+        mobility = mobility + conductance
+        drive = drive + conductance * pressure
+    return mobility, drive

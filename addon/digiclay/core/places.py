@@ -1,0 +1,134 @@
+"""The places on the line from fingertip to pins, as protocols.
+
+A place holds either the real part or a stand-in from `absent` that owns no state and
+computes nothing. Parts hold parameters only: state is handed in and handed back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Sensors", "Stepper"]
+
+Floats = NDArray[np.float64]
+
+
+class Flow(Protocol):
+    """Valve, with or without a conduit: opening and pressure drop to flow."""
+
+    @property
+    def knee(self) -> float: ...
+
+    def laminar_conductance(self, opening: Floats) -> Floats: ...
+
+    def conductance(self, opening: Floats, drop: Floats) -> Floats: ...
+
+    def flow(self, opening: Floats, drop: Floats) -> Floats: ...
+
+
+class Lag(Protocol):
+    """How the valve's opening follows its command; `own` are the state rows it owns, shape (rows, n)."""
+
+    @property
+    def rows(self) -> int: ...
+
+    def opening(self, own: Floats, command: Floats) -> Floats: ...
+
+    def rate(self, own: Floats, command: Floats) -> Floats: ...
+
+    def during(self, own: Floats, command: Floats, step: float) -> tuple[Floats, ...]: ...
+
+    def advance(self, own: Floats, command: Floats, step: float) -> None: ...
+
+
+class Pulp(Protocol):
+    """How the pulp under the finger relaxes; `own` are its state rows, shape (rows, k)."""
+
+    @property
+    def rows(self) -> int: ...
+
+    def relaxed(self, own: Floats) -> Any: ...
+
+    def rate(self, own: Floats, tension: Floats) -> Floats: ...
+
+    def halfway(self, own: Floats, tension: Floats, step: float) -> Any: ...
+
+    def advance(self, own: Floats, mean: Floats, first: Floats, last: Floats, step: float) -> None: ...
+
+    def age(self, own: Floats, time: Floats) -> None: ...
+
+
+class Sensors(Protocol):
+    """What the controller gets to know of forces and heights."""
+
+    def measure(self, force: Floats, height: Floats) -> tuple[Floats, Floats]: ...
+
+
+class Stepper(Protocol):
+    """How a block of cells is moved on by one physics step."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def order(self) -> int: ...
+
+    @property
+    def nodes(self) -> tuple[float, ...]: ...
+
+    def advance(self, cell: Any, y: Floats, under: Floats, command: Floats, step: float) -> None: ...
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a controller sees of some cells.
+
+    Attributes
+    ----------
+    x, y : ndarray (m,)
+        Where they are, m.
+    height, force : ndarray (m,)
+        As measured, m and N.
+    target : ndarray (m,)
+        Height they are commanded to, m.
+    mode : ndarray (m,) of int8
+    """
+
+    x: Floats
+    y: Floats
+    height: Floats
+    force: Floats
+    target: Floats
+    mode: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What a controller makes of a measurement, shape (m,) each: targets, m; modes; valve commands."""
+
+    target: Floats
+    mode: NDArray[np.int8]
+    command: Floats
+
+
+class Controller(Protocol):
+    """A strategy: parameters only; its memory is handed in and handed back."""
+
+    @property
+    def name(self) -> str: ...
+
+    def begin(self) -> Any:
+        """Return the memory before a session."""
+        ...
+
+    def attend(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
+        """Take in the cells the finger presses; return memory and the disc (x, y, radius) to control, if any."""
+        ...
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+        """Return memory and orders for the cells of the disc and all that still move."""
+        ...

@@ -1,0 +1,169 @@
+"""Physical parameters: default, unit, symbol, bounds and meaning in one place.
+
+A part's parameters are a frozen dataclass that derives from `Parameters` and declares
+its fields with `quantity`. Validation, messages, scene files, the table in the docs and
+Blender's properties are all made from these declarations.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import ParameterError
+
+__all__ = ["UNITS", "Parameters", "Quantity", "nearest", "parse", "quantities", "quantity"]
+
+#: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
+UNITS: dict[str, tuple[float, str]] = {
+    "m": (1.0, "m"), "cm": (1e-2, "m"), "mm": (1e-3, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"),
+    "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "µs": (1e-6, "s"),
+    "Pa": (1.0, "Pa"), "kPa": (1e3, "Pa"), "bar": (1e5, "Pa"), "mbar": (1e2, "Pa"),
+    "N": (1.0, "N"), "mN": (1e-3, "N"),
+    "N/m": (1.0, "N/m"), "N/mm": (1e3, "N/m"), "1/m": (1.0, "1/m"), "1/mm": (1e3, "1/m"),
+    "1/N": (1.0, "1/N"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"),
+    "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is known of one parameter besides its value.
+
+    Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
+    ``at_least`` and ``at_most`` inclusive. `source` is one of P (paper), S (other
+    source), D (derived), C (chosen).
+    """
+
+    doc: str
+    unit: str = ""
+    symbol: str = ""
+    source: str = "C"
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    choices: tuple[str, ...] = ()
+
+    def show(self, value: object) -> str:
+        """Write `value` the way messages do, with the unit."""
+        if isinstance(value, str):
+            return repr(value)
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        return f"{text} {self.unit}".rstrip()
+
+    def broken_rule(self, value: Any) -> str:
+        """Return the first bound `value` breaks, worded as a rule, or ``""``."""
+        if self.choices and value not in self.choices:
+            return "must be one of " + ", ".join(self.choices)
+        if not isinstance(value, (int, float)):
+            return ""
+        if not math.isfinite(value):
+            return "must be a finite number"
+        if self.above is not None and not value > self.above:
+            return f"must be above {self.show(self.above)}"
+        if self.at_least is not None and not value >= self.at_least:
+            return f"must be at least {self.show(self.at_least)}"
+        if self.below is not None and not value < self.below:
+            return f"must be below {self.show(self.below)}"
+        if self.at_most is not None and not value <= self.at_most:
+            return f"must be at most {self.show(self.at_most)}"
+        return ""
+
+
+def quantity(default: Any, doc: str, **known: Any) -> Any:
+    """Declare a dataclass field together with its `Quantity`."""
+    return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **known)})
+
+
+def quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quantity]:
+    """Return the declared quantities of a part, by field name."""
+    return {f.name: f.metadata["quantity"] for f in dataclasses.fields(parameters)}
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Base of every part's parameters: frozen, and valid once built.
+
+    Raises
+    ------
+    ParameterError
+        On a wrong type, a number that is not finite, or a value out of bounds.
+    """
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            known: Quantity = field.metadata["quantity"]
+            value = _typed(self, field.name, known, getattr(self, field.name), field.default)
+            object.__setattr__(self, field.name, value)
+            for item in value if isinstance(value, tuple) else (value,):
+                rule = known.broken_rule(item)
+                if rule:
+                    raise ParameterError(type(self).__name__, field.name, rule, known.show(item))
+        self.check()
+
+    def check(self) -> None:
+        """Check the rules that join several fields; parts override this."""
+
+
+def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: Any) -> Any:
+    """Return `value` in the type of `default`; whole numbers pass for floats."""
+    kind = type(default)
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if kind is float and number:
+        return _finite(owner, name, known, value)
+    if kind is int and number and not isinstance(value, int) and math.isfinite(value) and value == int(value):
+        return int(value)
+    if kind is tuple and isinstance(value, (list, tuple)) and value:
+        return tuple(_typed(owner, name, known, item, default[0]) for item in value)
+    if isinstance(value, kind) and (number or kind not in (int, float)):
+        return value
+    wanted = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
+    rule = f"must be {wanted.get(kind, 'a list of numbers')}"
+    raise ParameterError(type(owner).__name__, name, rule, repr(value))
+
+
+def _finite(owner: Parameters, name: str, known: Quantity, value: float) -> float:
+    """Return `value` as a float; a whole number too large for one is refused as not finite."""
+    try:
+        return float(value)
+    except OverflowError:
+        rule = "must be a finite number"
+        raise ParameterError(type(owner).__name__, name, rule, f"a whole number of {value.bit_length()} bits") from None  # type: ignore[attr-defined]
+
+
+def parse(text: str, unit: str) -> float:
+    """Read a quantity written with a unit, such as ``"3 mm"``, into SI.
+
+    Parameters
+    ----------
+    text : str
+        A number, a blank, a unit from `UNITS`.
+    unit : str
+        The SI unit the parameter is declared in.
+
+    Raises
+    ------
+    ValueError
+        When the number or the unit cannot be read, or the unit measures something else.
+    """
+    number, _, name = text.strip().partition(" ")
+    try:
+        value = float(number)
+    except ValueError:
+        raise ValueError(f"must be a number, or a text such as '3 {unit}'") from None
+    name = name.strip()
+    factor, si = UNITS.get(name, (0.0, ""))
+    if not si:
+        raise ValueError(f"must have a unit known here: {', '.join(k for k, v in UNITS.items() if v[1] == unit)}")
+    if si != unit:
+        raise ValueError(f"must be in {unit or 'no unit'} or a multiple of it")
+    return value * factor
+
+
+def nearest(name: str, known: list[str]) -> str:
+    """Return the known name a misspelt one is nearest to, or ``""``."""
+    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.5)), "")

@@ -1,0 +1,96 @@
+"""The pulp relaxes: quasi-linear viscoelasticity by Prony filters (equations 10, 12 to 14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ParameterError
+from .quantity import Parameters, quantity
+
+__all__ = ["Relaxation"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Relaxation(Parameters):
+    """Reduced relaxation ``G(t) = (c0 + Σ c_i exp(-t/t_i)) / Σ c`` as filters ``dz_i/dt = (T - z_i)/t_i``.
+
+    The force is ``F = T - Σ ĉ_i z_i`` with ``ĉ_i = c_i / Σ c``: exactly the convolution of
+    equation 10, not an approximation to it.
+    """
+
+    times: tuple[float, ...] = quantity(
+        (4e-3, 70e-3, 1.4), "relaxation times", unit="s", symbol="1/ν_i", source="S", at_least=1e-9
+    )
+    weights: tuple[float, ...] = quantity(
+        (0.08, 0.62, 0.20, 0.10), "weights c0 (what stays) to c_k", symbol="c_i", at_least=0.0
+    )
+
+    def check(self) -> None:
+        """One weight more than times, and not all of them zero."""
+        if len(self.weights) != len(self.times) + 1:
+            rule = f"must have one value more than times, {len(self.times) + 1}"
+            raise ParameterError("Relaxation", "weights", rule, str(len(self.weights)))
+        if not sum(self.weights) > 0.0:
+            raise ParameterError("Relaxation", "weights", "must not all be 0", str(self.weights))
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: one a filter."""
+        return len(self.times)
+
+    @cached_property
+    def rates(self) -> Floats:
+        """Relaxation rates ν_i, shape (k, 1), 1/s."""
+        return 1.0 / np.array(self.times)[:, None]
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Shares ĉ_i of the filters, shape (k,)."""
+        weights = np.array(self.weights)
+        return np.asarray(weights[1:] / weights.sum())
+
+    def reduced(self, time: Floats) -> Floats:
+        """Return G(t) (equation 12); G(0) = 1."""
+        decay = np.exp(-np.asarray(time)[..., None] / np.array(self.times))
+        return np.asarray(1.0 - self.shares.sum() + decay @ self.shares)
+
+    def relaxed(self, own: Floats) -> Floats:
+        """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n,), of filters z (k, n)."""
+        return self.shares @ own
+
+    def rate(self, own: Floats, tension: Floats) -> Floats:
+        """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
+        return self.rates * (tension - own)
+
+    def halfway(self, own: Floats, tension: Floats, step: float) -> Floats:
+        """Return S half a step on, should the tension stay; shape (k,)."""
+        still = np.exp(self.rates * (-0.5 * step))[:, 0] * self.shares
+        return still @ own + (self.shares.sum() - still.sum()) * tension
+
+    def advance(self, own: Floats, mean: Floats, first: Floats, last: Floats, step: float) -> None:
+        """Move the filters on by a step, in place; exact for a tension linear in time.
+
+        Parameters
+        ----------
+        own : ndarray (k, n)
+            Filters z_i, N.
+        mean, first, last : ndarray (n,)
+            Tension T averaged over the step, at its start and at its end, N.
+        step : float
+            Length of the step, s.
+        """
+        turns = self.rates * step
+        fresh = -np.expm1(-turns)
+        own *= 1.0 - fresh
+        own += fresh * mean
+        own += (1.0 - fresh * (1.0 / turns + 0.5)) * (last - first)
+
+    def age(self, own: Floats, time: Floats) -> None:
+        """Let filters decay without contact for `time` seconds, shape (n,), in place; exact."""
+        own *= np.exp(-self.rates * time)

@@ -1,0 +1,1 @@
+"""Time steppers: one short file a method, all behind `places.Stepper`."""
