@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+
+from .delay import Queue
 
 __all__ = ["InstantValve", "PerfectSensors", "Unrelaxed"]
 
@@ -23,12 +27,14 @@ class InstantValve:
         """Return no rows."""
         return own
 
-    def during(self, own: Floats, command: Floats, step: float) -> tuple[Floats, ...]:
-        """Return the command, once: it does not change within a step."""
-        return (command,)
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the map that picks the command seen at each time, shape (t, queue.length)."""
+        response = np.zeros((len(times), queue.length))
+        response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
+        return response
 
-    def advance(self, own: Floats, command: Floats, step: float) -> None:
-        """Nothing to move on."""
+    def settle(self, own: Floats) -> None:
+        """Nothing to settle."""
 
 
 class Unrelaxed:
@@ -44,12 +50,13 @@ class Unrelaxed:
         """Return no rows."""
         return own
 
-    def halfway(self, own: Floats, tension: Floats, step: float) -> float:
-        """Return no loss of force."""
-        return 0.0
+    def halfway(self, step: float) -> Floats:
+        """Return the map to no loss of force, shape (1,)."""
+        return np.zeros(1)
 
-    def advance(self, own: Floats, mean: Floats, first: Floats, last: Floats, step: float) -> None:
-        """Nothing to move on."""
+    def transition(self, step: float) -> Floats:
+        """Return the map to no rows, shape (0, 3)."""
+        return np.empty((0, 3))
 
     def age(self, own: Floats, time: Floats) -> None:
         """Nothing to age."""

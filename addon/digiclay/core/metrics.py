@@ -37,7 +37,7 @@ METRICS: dict[str, tuple[str, str]] = {
     "duration": ("s", "simulated time from the first row to the last"),
     "set_point": ("N", "total force the finger should feel"),
     "rfd": ("N", "rms over time of (total force - set point) while the finger touches"),
-    "rfd_shaping": ("N", "the same, only while a blister stands as well: without touching down"),
+    "rfd_shaping": ("N", "the same, only while a cell follows the force: without touching down"),
     "rfd_session": ("N", "the same over the whole session; without contact the force is 0"),
     "contact_share": ("1", "share of the session's time in which the finger touches"),
     "contact_loss_share": ("1", "share of the time from first to last contact in which it does not touch"),
@@ -60,7 +60,7 @@ def in_contact(total_force: ArrayLike) -> Rows:
 
 
 def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
-    """Return which rows shape the clay: in contact, and a cell is part of a blister.
+    """Return which rows shape the clay: in contact, and a cell under the finger follows the force.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
     -------
     ndarray of bool, shape (t,)
     """
-    rows: Rows = in_contact(total_force) & np.any(np.asarray(mode) == Mode.BLISTER, axis=1)
+    rows: Rows = in_contact(total_force) & np.any(np.asarray(mode) == Mode.FORCE_FOLLOW, axis=1)
     return rows
 
 

@@ -12,7 +12,7 @@ from .places import Flow, Lag
 from .supply import Supply
 from .touch import Touch, force
 
-__all__ = ["Cell", "mean_mobility", "rates"]
+__all__ = ["Cell", "rates"]
 
 Floats = NDArray[np.float64]
 
@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 class Cell:
     """The parts every cell is made of.
 
-    A block of n cells has state rows ``y`` of shape (r, n): height, m; the lag's rows; the
-    pulp's rows (those of the first k cells, which the finger may touch, are in use).
+    A block of n cells has state rows ``y`` of shape (r, n): height, m; the pulp's rows (used
+    for the first k cells, which the finger may touch); the lag's rows.
     """
 
     actuator: Actuator
@@ -34,18 +34,18 @@ class Cell:
     @property
     def lag_rows(self) -> slice:
         """The rows of ``y`` that the valve lag owns."""
-        return slice(1, 1 + self.lag.rows)
+        first = self.pulp_rows.stop
+        return slice(first, first + self.lag.rows)
 
     @property
     def pulp_rows(self) -> slice:
         """The rows of ``y`` that the relaxation owns."""
-        first = 1 + self.lag.rows
-        return slice(first, first + (self.touch.pulp.rows if self.touch else 0))
+        return slice(1, 1 + (self.touch.pulp.rows if self.touch else 0))
 
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
-        return self.pulp_rows.stop
+        return self.lag_rows.stop
 
 
 def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
@@ -74,41 +74,3 @@ def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     change[0] = cell.actuator.rate(cell.flow.flow(opening, drop), height)
     change[cell.lag_rows] = cell.lag.rate(lag, command)
     return change
-
-
-def mean_mobility(
-    cell: Cell, lag: Floats, command: Floats, step: float, load: Floats | float = 0.0
-) -> tuple[Floats, Floats]:
-    """Average the valve over a step of a held command.
-
-    Parameters
-    ----------
-    cell : Cell
-    lag : ndarray (rows, n)
-        State rows of the valve lag at the start of the step.
-    command : ndarray (n,)
-        Held valve commands.
-    step : float
-        Length of the step, s.
-    load : ndarray (n,) or float
-        Pressure in the cylinder about the middle of the step, Pa; it matters only where
-        the flow can turn turbulent.
-
-    Returns
-    -------
-    mobility : ndarray (n,)
-        Mean of (Q/ΔP)/A_a, m/(s Pa).
-    drive : ndarray (n,)
-        Mean of mobility times reservoir pressure, m/s: without load, the mean speed. A
-        valve that changes reservoir within the step needs no special care: both means are
-        taken at Gauss points of the exact opening.
-    """
-    openings = cell.lag.during(lag, command, step)
-    share = 1.0 / (cell.actuator.area * len(openings))
-    mobility = drive = np.zeros(command.size)
-    for opening in openings:
-        pressure = cell.supply.pressure(opening)
-        conductance = share * cell.flow.conductance(opening, pressure - load)
-        mobility = mobility + conductance
-        drive = drive + conductance * pressure
-    return mobility, drive

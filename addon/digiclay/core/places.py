@@ -6,13 +6,16 @@ computes nothing. Parts hold parameters only: state is handed in and handed back
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Sensors", "Stepper"]
+from .delay import Queue
+
+__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Segment", "Sensors", "Stepper"]
 
 Floats = NDArray[np.float64]
 
@@ -40,9 +43,9 @@ class Lag(Protocol):
 
     def rate(self, own: Floats, command: Floats) -> Floats: ...
 
-    def during(self, own: Floats, command: Floats, step: float) -> tuple[Floats, ...]: ...
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats: ...
 
-    def advance(self, own: Floats, command: Floats, step: float) -> None: ...
+    def settle(self, own: Floats) -> None: ...
 
 
 class Pulp(Protocol):
@@ -55,9 +58,9 @@ class Pulp(Protocol):
 
     def rate(self, own: Floats, tension: Floats) -> Floats: ...
 
-    def halfway(self, own: Floats, tension: Floats, step: float) -> Any: ...
+    def halfway(self, step: float) -> Floats: ...
 
-    def advance(self, own: Floats, mean: Floats, first: Floats, last: Floats, step: float) -> None: ...
+    def transition(self, step: float) -> Floats: ...
 
     def age(self, own: Floats, time: Floats) -> None: ...
 
@@ -69,7 +72,7 @@ class Sensors(Protocol):
 
 
 class Stepper(Protocol):
-    """How a block of cells is moved on by one physics step."""
+    """How a block of cells is moved on by one control period."""
 
     @property
     def name(self) -> str: ...
@@ -78,9 +81,34 @@ class Stepper(Protocol):
     def order(self) -> int: ...
 
     @property
-    def nodes(self) -> tuple[float, ...]: ...
+    def nodes(self) -> tuple[float, ...]:
+        """When, in shares of a physics step, the finger's pose is needed."""
+        ...
 
-    def advance(self, cell: Any, y: Floats, under: Floats, command: Floats, step: float) -> None: ...
+    def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
+        """Work out once what all periods share."""
+        ...
+
+    def advance(self, plan: Any, y: Floats, commands: Floats, under: Floats) -> None:
+        """Move state rows y (r, n) on, given queued commands (q, n) and undersides (p, k), in place."""
+        ...
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One physics step of a control period.
+
+    Attributes
+    ----------
+    start, length : float
+        Time into the period, and length, s.
+    nodes : tuple of int
+        Which of the period's instants the stepper needs.
+    """
+
+    start: float
+    length: float
+    nodes: tuple[int, ...]
 
 
 @dataclass(frozen=True)

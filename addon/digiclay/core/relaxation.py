@@ -68,28 +68,24 @@ class Relaxation(Parameters):
         """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
         return self.rates * (tension - own)
 
-    def halfway(self, own: Floats, tension: Floats, step: float) -> Floats:
-        """Return S half a step on, should the tension stay; shape (k,)."""
-        still = np.exp(self.rates * (-0.5 * step))[:, 0] * self.shares
-        return still @ own + (self.shares.sum() - still.sum()) * tension
+    def halfway(self, step: float) -> Floats:
+        """Return the map from (z, T at the start) to S half a step on, should T stay; shape (k + 1,)."""
+        decay = np.exp(-0.5 * step * self.rates[:, 0])
+        return np.append(self.shares * decay, self.shares @ (1.0 - decay))
 
-    def advance(self, own: Floats, mean: Floats, first: Floats, last: Floats, step: float) -> None:
-        """Move the filters on by a step, in place; exact for a tension linear in time.
+    def transition(self, step: float) -> Floats:
+        """Return the map from (z; T at the start, on average, at the end of a step) to the new z.
 
-        Parameters
-        ----------
-        own : ndarray (k, n)
-            Filters z_i, N.
-        mean, first, last : ndarray (n,)
-            Tension T averaged over the step, at its start and at its end, N.
-        step : float
-            Length of the step, s.
+        Exact for a tension linear in time.
+
+        Returns
+        -------
+        ndarray (k, k + 3)
         """
         turns = self.rates * step
         fresh = -np.expm1(-turns)
-        own *= 1.0 - fresh
-        own += fresh * mean
-        own += (1.0 - fresh * (1.0 / turns + 0.5)) * (last - first)
+        bend = 1.0 - fresh * (1.0 / turns + 0.5)
+        return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
 
     def age(self, own: Floats, time: Floats) -> None:
         """Let filters decay without contact for `time` seconds, shape (n,), in place; exact."""

@@ -14,12 +14,12 @@ from .errors import DivergenceError
 from .layout import Grid
 from .modes import Mode
 from .physics import Cell
-from .places import Controller, Measurement, Sensors, Stepper
+from .places import Controller, Measurement, Segment, Sensors, Stepper
 from .state import Rows, State, at_rest
 from .touch import force, window
 from .trajectory import Trajectory
 
-__all__ = ["Segment", "System", "advance", "begin", "outlines", "periods", "segments", "step"]
+__all__ = ["System", "advance", "begin", "outlines", "periods", "segments", "step"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -30,26 +30,6 @@ CHUNK = 128
 OUTLINE = 10
 
 
-@dataclass(frozen=True)
-class Segment:
-    """One physics step of a control period.
-
-    Attributes
-    ----------
-    start, length : float
-        Time into the period, and length, s.
-    seen : int
-        Which command of the queue the valve sees meanwhile.
-    nodes : tuple of int
-        Which of the period's instants the stepper needs.
-    """
-
-    start: float
-    length: float
-    seen: int
-    nodes: tuple[int, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class System:
     """All that does not change in a session.
@@ -58,15 +38,14 @@ class System:
     ----------
     grid : Grid
     cell : Cell
-    queue : Queue
     sensors : Sensors
     controller : Controller or None
         None: every valve stays shut.
     stepper : Stepper
     period : float
         Control period, s.
-    segments : tuple of Segment
-        The physics steps of a period.
+    plan : object
+        What the stepper works out once for all periods.
     longest_rise : float
         No pin rises farther in a control period, m.
     instants : ndarray (p,)
@@ -76,12 +55,11 @@ class System:
 
     grid: Grid
     cell: Cell
-    queue: Queue
     sensors: Sensors
     controller: Controller | None
     stepper: Stepper
     period: float
-    segments: tuple[Segment, ...]
+    plan: Any
     longest_rise: float
     instants: Floats
     rows: Rows
@@ -104,7 +82,7 @@ def segments(stepper: Stepper, queue: Queue, period: float, step: float) -> tupl
     pairs = list(zip(edges[:-1], edges[1:], strict=True))
     instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
     cut = tuple(
-        Segment(a, b - a, queue.seen(a), tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
+        Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
         for a, b in pairs
     )
     return cut, np.array(instants)
@@ -227,9 +205,7 @@ def _integrate(system: System, state: State, near: Cells, under: Floats, block: 
             filters = y[system.cell.pulp_rows, : near.size]
             system.cell.touch.pulp.age(filters, waited)
         state.left[near] = now + system.period
-    commands = block[system.rows.commands]
-    for part in system.segments:
-        system.stepper.advance(system.cell, y, under.take(part.nodes, axis=0), commands[part.seen], part.length)
+    system.stepper.advance(system.plan, y, block[system.rows.commands], under)
 
 
 def _handed_back(
@@ -243,7 +219,7 @@ def _handed_back(
     if not np.isfinite(block.sum()):
         _diverged(system, state, cells, block)
     state.rows[:, cells] = block
-    busy = block[rows.force :].any(axis=0) | block[system.cell.lag_rows].any(axis=0)
+    busy = block[system.cell.lag_rows.start : rows.target].any(axis=0) | (block[rows.force] > 0.0)
     busy |= state.mode.take(cells) > Mode.HOLD
     peak = max(state.peak, float(block[0].max()))
     return replace(state, period=state.period + 1, moving=cells[busy], peak=peak, memory=memory)
@@ -256,7 +232,7 @@ def _diverged(system: System, state: State, cells: Cells, block: Floats) -> None
         return
     row, column = bad[0]
     names = {0: "height", system.rows.force: "force", system.rows.target: "commanded height"}
-    remedy = f"Use a shorter physics step than {system.segments[-1].length:g} s, or the stepper 'bernoulli'."
+    remedy = f"Use a shorter physics step than now, or the stepper 'bernoulli'."
     value = float(block[row, column])
     raise DivergenceError(state.period * system.period, int(cells[column]), names.get(row, "state"), value, remedy)
 

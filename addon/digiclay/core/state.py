@@ -25,8 +25,8 @@ class Rows:
     """Which row of `State.rows` holds what.
 
     The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
-    then come the height a cell is commanded to, m; the force on it at the end of the last
-    period, N; and the commands on their way to the valve, oldest first.
+    then come the commands on their way to the valve, oldest first; the height a cell is
+    commanded to, m; and the force on it at the end of the last period, N.
     """
 
     physics: int
@@ -35,22 +35,22 @@ class Rows:
     @property
     def target(self) -> int:
         """Row of the commanded height."""
-        return self.physics
+        return self.physics + self.queue
 
     @property
     def force(self) -> int:
         """Row of the force."""
-        return self.physics + 1
+        return self.physics + self.queue + 1
 
     @property
     def commands(self) -> slice:
         """Rows of the commands on their way."""
-        return slice(self.physics + 2, self.count)
+        return slice(self.physics, self.physics + self.queue)
 
     @property
     def command(self) -> int:
         """Row of the newest command."""
-        return self.count - 1
+        return self.physics + self.queue - 1
 
     @property
     def count(self) -> int:

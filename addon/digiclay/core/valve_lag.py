@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .delay import Queue
 from .quantity import Parameters, quantity
 
 __all__ = ["ValveLag"]
@@ -17,9 +19,6 @@ Floats = NDArray[np.float64]
 #: A valve on its way shut and this little open counts as shut: it can let through no more than
 #: 1e-18 of a cell's free speed, and a cell with a shut valve need not be integrated.
 SHUT = 1e-9
-
-#: Two-point Gauss-Legendre nodes on [0, 1]: averages over a step are exact to cubics.
-GAUSS_NODES = (0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0)
 
 
 @dataclass(frozen=True)
@@ -41,14 +40,30 @@ class ValveLag(Parameters):
         """Return dK/dt, 1/s (equation 9), shape (1, n), for held commands, shape (n,)."""
         return (command - own) / self.time_constant
 
-    def during(self, own: Floats, command: Floats, step: float) -> tuple[Floats, ...]:
-        """Return the openings at the two Gauss points of a step of a held command; exact."""
-        away = own[0] - command
-        return tuple(command + away * math.exp(-step * node / self.time_constant) for node in GAUSS_NODES)
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the opening at some times of a control period, as a linear map; exact.
 
-    def advance(self, own: Floats, command: Floats, step: float) -> None:
-        """Move the openings on by `step` seconds of a held command, in place; exact but for `SHUT`."""
-        own -= command
-        own *= math.exp(-step / self.time_constant)
-        own += command
+        Parameters
+        ----------
+        queue : Queue
+            Says when the valve goes over from one held command to the next.
+        times : sequence of float (t,)
+            Times into the period, s.
+
+        Returns
+        -------
+        ndarray (t, 1 + queue.length)
+            To be multiplied with the opening at the start and the commands of the queue.
+        """
+        response = np.zeros((len(times), 1 + queue.length))
+        for row, time in zip(response, times, strict=True):
+            row[0] = math.exp(-time / self.time_constant)
+            row[1] = math.exp(-max(time - queue.cut, 0.0) / self.time_constant) if queue.cut else 1.0
+            row[1] -= row[0]
+            if queue.cut:
+                row[2] = -math.expm1(-max(time - queue.cut, 0.0) / self.time_constant)
+        return response
+
+    def settle(self, own: Floats) -> None:
+        """Shut valves that are almost shut, in place."""
         own[np.abs(own) < SHUT] = 0.0

@@ -8,14 +8,15 @@ effort into the master's height; the cells around follow the blister's profile.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..actuator import Actuator
 from ..modes import Mode
-from ..physics import Cell, mean_mobility
 from ..places import Measurement, Orders
 from ..quantity import Parameters, quantity
 from .blister import Blister
@@ -108,19 +109,26 @@ class VirtualMasterControl:
     ----------
     parameters : VirtualMaster
     blister : Blister
-    cell : Cell
-        The real cells' physics: the master is one of them, without load.
+    actuator : Actuator
+        The cells' cylinders.
+    lift : float
+        Pressure of the high reservoir: no cell can lift more, Pa.
     period : float
         Control period, s.
-    rest_height : float
-        Height of cells that were never commanded, m.
+    model : callable
+        VM Model: moves the rows of an unloaded real cell, (r, 1), on by one period of a
+        held command, (1, 1), in place.
+    model_rows : int
+        Number r of those rows: height, m, and the valve's.
     """
 
     parameters: VirtualMaster
     blister: Blister
-    cell: Cell
+    actuator: Actuator
+    lift: float
     period: float
-    rest_height: float
+    model: Callable[[Floats, Floats], None]
+    model_rows: int
 
     name = "virtual_master"
 
@@ -131,7 +139,7 @@ class VirtualMasterControl:
 
     def begin(self) -> Master:
         """Return the memory before a session."""
-        return Master(lag=(0.0,) * self.cell.lag.rows)
+        return Master(lag=(0.0,) * (self.model_rows - 1))
 
     def attend(self, memory: Master, touched: Measurement) -> tuple[Master, tuple[float, float, float] | None]:
         """Locate the finger and move the master; see `places.Controller`."""
@@ -157,7 +165,7 @@ class VirtualMasterControl:
         weight = force / total
         at_x, at_y, surface = float(weight @ x), float(weight @ y), float(weight @ touched.height)
         return Master(
-            Phase.SPRING, at_x, at_y, surface, (0.0,) * self.cell.lag.rows, reference=surface, edge=surface,
+            Phase.SPRING, at_x, at_y, surface, (0.0,) * (self.model_rows - 1), reference=surface, edge=surface,
             anchor_x=at_x, anchor_y=at_y, losses=master.losses,
         )  # fmt: skip
 
@@ -190,24 +198,21 @@ class VirtualMasterControl:
             effort = known.position_gain * (master.reference - force / known.spring_stiffness - master.height)
         else:
             effort = known.force_gain * (known.force_setpoint - force)
-        command = np.array([min(max(effort, -1.0), 1.0)])
-        lag = np.array(master.lag).reshape(-1, 1)
-        speed = float(mean_mobility(self.cell, lag, command, self.period)[1][0])
-        self.cell.lag.advance(lag, command, self.period)
-        height = min(max(master.height + speed * self.period, 0.0), self.cell.actuator.stroke)
-        return replace(master, height=height, lag=tuple(lag.ravel().tolist()))
+        y = np.array([[master.height], *([opening] for opening in master.lag)])
+        self.model(y, np.array([[min(max(effort, -1.0), 1.0)]]))
+        return replace(master, height=float(y[0, 0]), lag=tuple(y[1:, 0].tolist()))
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
         """Create the blister, freeze what is left behind, and follow with every cell; see `places.Controller`."""
         target, mode = seen.target, self._left_alone(seen.target)
         if memory.phase is not Phase.IDLE:
             memory, target, mode = self._created(memory, seen, mode)
-        overload = self.cell.actuator.pressure(seen.force) >= self.cell.supply.high
+        overload = self.actuator.pressure(seen.force) >= self.lift
         return memory, Orders(target, mode, self.servo.command(target, seen.height, overload))
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        formed = np.abs(target - self.rest_height) > self.parameters.dead_band
+        formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
         return np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
 
     def _created(
@@ -227,7 +232,7 @@ class VirtualMasterControl:
         backward = (ahead < self.parameters.behind * distance) & (distance > self.blister.flat_radius)
         frozen = inside & ~touched & (backward | (seen.mode == Mode.FROZEN))
         profile = self.blister.height(distance, master.edge, master.height)
-        target = np.where(inside & ~frozen, np.clip(profile, 0.0, self.cell.actuator.stroke), seen.target)
+        target = np.where(inside & ~frozen, np.clip(profile, 0.0, self.actuator.stroke), seen.target)
         under = Mode.FORCE_FOLLOW if master.phase is Phase.SHAPING else Mode.SPRING
         mode = np.where(inside, np.where(touched, np.int8(under), np.int8(Mode.BLISTER)), mode)
         mode[ring] = Mode.EDGE

@@ -1,31 +1,74 @@
 """The closed-form step: exact for an exponential spring behind a linear flow resistance.
 
-With the valve's conductance, the relaxed force S and the finger's speed v frozen over a
-step, u = exp(-m (x - x0)) obeys the linear equation ``du/dt = β - κ u``: a Bernoulli
-equation for the indentation x. It is solved exactly, so the step is stable at any length;
-freezing at mid step makes it second order. Where no force acts the cell moves freely, and
-a cell that meets or leaves the finger within the step does so at the exact instant.
+The valve's opening is known in closed form all through a period. Over a physics step its
+conductance, the force lost to relaxation and the finger's speed are frozen at mid step, and
+what remains is solved exactly (`closed_form`). The step is therefore stable at any length and
+stiffness, without iteration, and second order. A valve that changes reservoir within a step
+needs no care (conductance and drive are averaged at Gauss points of the exact opening), and
+a cell that meets or leaves the finger does so at the exact instant.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..absent import Unrelaxed
+from ..closed_form import LARGE, TINY, careful, crossed, pressed
 from ..contact import LARGEST_EXPONENT, Contact
-from ..physics import Cell, mean_mobility
+from ..delay import Queue
+from ..physics import Cell
+from ..places import Segment
 from ..touch import Touch
 
-__all__ = ["BernoulliExponential"]
+__all__ = ["BernoulliExponential", "BernoulliPlan"]
 
 Floats = NDArray[np.float64]
 
-#: Above this exponent sums are done on logarithms.
-LARGE = 300.0
-TINY = 1e-300
-ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
+#: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
+GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
+
+
+@dataclass(frozen=True, eq=False)
+class BernoulliPlan:
+    """What all periods share.
+
+    Attributes
+    ----------
+    cell : Cell
+    segments : tuple of Segment
+        The s physics steps of a period.
+    response : ndarray (2 s + 1, r)
+        From opening and queued commands to the openings at all Gauss points, and at the end.
+    means : ndarray (s, 2 s)
+        From conductances at the Gauss points to step times mean mobility, m/Pa.
+    halfway, transition : tuple of ndarray
+        The relaxation's maps, one a step.
+    unloaded : callable
+        Conductance of a valve without load, m³/(s Pa), from opening and reservoir pressure.
+    exponent : float
+        The contact's m, 1/m.
+    to_load, to_decay : float
+        Pressure a unit (b/m) of tension makes, Pa; stiffness ``f_d b / A_a``, Pa/m.
+    easy : float
+        Below this exponent every flow is laminar and nothing overflows.
+    """
+
+    cell: Cell
+    segments: tuple[Segment, ...]
+    response: Floats
+    means: Floats
+    halfway: tuple[Floats, ...]
+    transition: tuple[Floats, ...]
+    unloaded: Callable[[Floats, Floats], Floats]
+    exponent: float
+    to_load: float
+    to_decay: float
+    easy: float
 
 
 @dataclass(frozen=True)
@@ -36,147 +79,141 @@ class BernoulliExponential:
     order = 2
     nodes = (0.0, 1.0)
 
-    def advance(self, cell: Cell, y: Floats, under: Floats, command: Floats, step: float) -> None:
-        """Move a block of cells on by one step, in place.
+    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
+        """Work out once what all periods share."""
+        times = [part.start + node * part.length for part in segments for node in GAUSS]
+        end = segments[-1].start + segments[-1].length
+        lengths = [part.length for part in segments]
+        pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
+        to_decay = contact.share * contact.stiffness / cell.actuator.area
+        to_load = to_decay / contact.exponent
+        # How far the load may drive up the drop before some flow could turn turbulent.
+        spare = cell.flow.knee - max(abs(cell.supply.high), abs(cell.supply.low))
+        return BernoulliPlan(
+            cell,
+            segments,
+            cell.lag.response(queue, [*times, end]),
+            np.kron(np.diag(lengths), [0.5, 0.5]) / cell.actuator.area,
+            tuple(pulp.halfway(h) for h in lengths),
+            tuple(pulp.transition(h) for h in lengths),
+            (lambda opening, _: cell.flow.laminar_conductance(opening)) if spare > 0.0 else cell.flow.conductance,
+            contact.exponent,
+            to_load,
+            to_decay,
+            min(LARGE, math.log1p(spare / to_load)) if spare > 0.0 else -math.inf,
+        )
+
+    def advance(self, plan: BernoulliPlan, y: Floats, commands: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place.
 
         Parameters
         ----------
-        cell : Cell
+        plan : BernoulliPlan
         y : ndarray (r, n)
             State rows, see `physics.Cell`.
-        under : ndarray (2, k)
-            Underside of the finger over the first k cells at the start and the end, m.
-        command : ndarray (n,)
-            Held valve commands.
-        step : float
-            Length of the step, s.
+        commands : ndarray (q, n)
+            Commands of the queue, oldest first.
+        under : ndarray (p, k)
+            Underside of the finger over the first k cells at the period's instants, m.
         """
+        cell, k = plan.cell, under.shape[1]
         lag = y[cell.lag_rows]
-        mobility, drive = mean_mobility(cell, lag, command, step)
-        rise = step * drive
-        k = under.shape[1]
+        openings = plan.response @ np.concatenate([lag, commands])
+        lag[:] = openings[-1:] if cell.lag.rows else lag
+        cell.lag.settle(lag)
+        openings = openings[:-1]
+        pressure = cell.supply.pressure(openings)
+        conductance = plan.unloaded(openings, pressure)
+        free = plan.means @ (conductance * pressure)
+        _freely(y[0, k:], free[:, k:], cell.actuator.stroke)
         if cell.touch and k:
-            rise[:k] = _pressed(cell, cell.touch, y[:, :k], under, mobility[:k], drive[:k], command[:k], step)
-        y[0] += rise
-        np.clip(y[0], 0.0, cell.actuator.stroke, out=y[0])
-        cell.lag.advance(lag, command, step)
+            _under_finger(plan, cell.touch, y[:, :k], under, openings[:, :k], conductance[:, :k], free[:, :k])
 
 
-def _pressed(
-    cell: Cell, touch: Touch, y: Floats, under: Floats, mobility: Floats, drive: Floats, command: Floats, step: float
-) -> Floats:
-    """Return how far cells under the finger rise in a step, m, and move their pulp on."""
-    contact, pulp, filters = touch.contact, touch.pulp, y[cell.pulp_rows]
-    depth, lift = y[0] - under[0], under[1] - under[0]
-    first = contact.tension(depth)
-    relaxed = pulp.halfway(filters, first, step)
-    to_load = contact.share / cell.actuator.area
-    # The largest pressure at which every flow in sight is still laminar.
-    laminar = cell.flow.knee - max(abs(cell.supply.high), abs(cell.supply.low))
-
-    def averaged(tension: Floats) -> tuple[Floats, Floats]:
-        load = to_load * np.maximum(tension - relaxed, 0.0)
-        return mean_mobility(cell, y[cell.lag_rows], command, step, load)
-
-    if to_load * first.max() > laminar:
-        mobility, drive = averaged(first)
-    rise, mean = _closed_form(contact, depth, lift, relaxed, to_load * mobility, drive, step)
-    last = contact.tension(depth + rise - lift)
-    if to_load * max(first.max(), last.max()) > laminar:
-        mobility, drive = averaged(0.5 * (first + last))
-        rise, mean = _closed_form(contact, depth, lift, relaxed, to_load * mobility, drive, step)
-    end = np.clip(y[0] + rise, 0.0, cell.actuator.stroke)
-    pulp.advance(filters, mean, first, contact.tension(end - under[1]), step)
-    return rise
+def _freely(height: Floats, rise: Floats, stroke: float) -> None:
+    """Move untouched pins by their rise (s, n) in each step, m, in place; end stops hold them."""
+    for part in rise if _near_a_stop(height, rise, stroke) else [rise.sum(axis=0)]:
+        height += part
+        np.minimum(np.maximum(height, 0.0, height), stroke, height)
 
 
-def _closed_form(
-    contact: Contact, depth: Floats, lift: Floats, relaxed: Floats, gain: Floats, drive: Floats, step: float
+def _near_a_stop(height: Floats, rise: Floats, stroke: float) -> bool:
+    """Tell whether some pin could meet an end stop within the period."""
+    if not height.size:
+        return False
+    way = float(np.abs(rise).max()) * len(rise)
+    return bool(height.min() < way or height.max() > stroke - way)
+
+
+def _under_finger(
+    plan: BernoulliPlan, touch: Touch, y: Floats, under: Floats, openings: Floats, conductance: Floats, free: Floats
+) -> None:
+    """Move the cells under the finger on, step by step, and their pulp with them."""
+    contact, height, pulp = touch.contact, y[0], touch.pulp.rows
+    m, unit = contact.exponent, contact.stiffness / contact.exponent
+    decay = plan.to_decay * (plan.means @ conductance) + TINY
+    slip = m * (free - np.diff(under, axis=0))
+    # Tensions in units of b/m: the filters, then T at the start, on average and at the end of a step.
+    work = np.empty((pulp + 3, height.size))
+    filters, first, mean, last = work[:pulp], work[pulp], work[pulp + 1], work[pulp + 2]
+    np.divide(y[plan.cell.pulp_rows], unit, filters)
+    exponent = m * (height - under[0] - contact.offset)
+    grown = _grown(exponent)
+    for s in range(len(plan.segments)):
+        np.subtract(grown, 1.0, first)
+        relaxed = plan.halfway[s] @ work[: pulp + 1] + 1.0
+        loaded = grown > relaxed
+        growth = slip[s] + decay[s] * relaxed + TINY
+        if max(exponent.max(), growth.max()) < plan.easy:
+            relief = pressed(grown, growth, decay[s])
+            rate = relief / decay[s]
+        else:
+            lift = under[s + 1] - under[s]
+            decay[s], free[s] = _loaded_valve(plan, s, openings, exponent, relaxed, lift)
+            slip[s] = m * (free[s] - lift)
+            growth = slip[s] + decay[s] * relaxed + TINY
+            relief, rate = careful(exponent, growth, decay[s])
+        way = np.where(loaded, growth - relief, slip[s])
+        end = exponent + way
+        crossing = (end > np.log(relaxed)) != loaded
+        if crossing.any():
+            way[crossing], rate[crossing] = crossed(
+                exponent[crossing], slip[s, crossing], decay[s, crossing], relaxed[crossing]
+            )
+        height += free[s] + (way - slip[s]) / m
+        np.minimum(np.maximum(height, 0.0, height), plan.cell.actuator.stroke, height)
+        exponent = m * (height - under[s + 1] - contact.offset)
+        grown = _grown(exponent)
+        np.subtract(grown, 1.0, last)
+        mean[:] = np.where(loaded | crossing, rate - 1.0, 0.5 * (first + last))
+        filters[:] = plan.transition[s] @ work
+    np.multiply(filters, unit, y[plan.cell.pulp_rows])
+
+
+def _grown(exponent: Floats) -> Floats:
+    """Return exp(e), 1 where there is a gap."""
+    return np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
+
+
+def _loaded_valve(
+    plan: BernoulliPlan, s: int, openings: Floats, exponent: Floats, relaxed: Floats, lift: Floats
 ) -> tuple[Floats, Floats]:
-    """Solve the frozen equation over a step.
+    """Return decay and free rise of step s where the load decides on the valve's branch.
 
-    Parameters
-    ----------
-    contact : Contact
-    depth : ndarray (k,)
-        Indentation at the start, m; negative where there is a gap.
-    lift : ndarray (k,)
-        How far the finger's underside rises in the step, m.
-    relaxed : ndarray (k,)
-        Frozen force S lost to relaxation, N.
-    gain : ndarray (k,)
-        Speed lost a newton of elastic force, m/(s N).
-    drive : ndarray (k,)
-        Speed without load, m/s.
-    step : float
-        s.
-
-    Returns
-    -------
-    rise : ndarray (k,)
-        m.
-    mean : ndarray (k,)
-        Elastic force T averaged over the step, N.
+    The secant conductance is taken at the load of mid step, predicted with the one at the
+    start: second order, like the rest.
     """
-    m, b = contact.exponent, contact.stiffness
-    pulp = m / b * relaxed
-    threshold = contact.offset + np.log1p(pulp) / m
-    free, decay = step * drive, (b * step) * gain
-    growth = m * (free - lift) + decay * (1.0 + pulp)
-    relief, spring = _relief(np.maximum(depth - contact.offset, 0.0) * m, growth, decay)
-    loaded = depth > threshold
-    rise = free + np.where(loaded, (decay * (1.0 + pulp) - relief) / m, 0.0)
-    end = depth + rise - lift
-    mean = np.where(loaded, (b / m) * (spring - 1.0), 0.5 * (contact.tension(depth) + contact.tension(end)))
-    crossing = np.flatnonzero(loaded != (end > threshold))
-    if crossing.size:
-        known = (np.broadcast_to(a, depth.shape)[crossing] for a in (depth, lift, pulp, free, decay, growth))
-        rise[crossing], mean[crossing] = _crossed(contact, *known)
-    return rise, mean
-
-
-def _crossed(
-    contact: Contact, depth: Floats, lift: Floats, pulp: Floats, free: Floats, decay: Floats, growth: Floats
-) -> tuple[Floats, Floats]:
-    """Solve for cells that meet or leave the finger within the step: part of it loaded, part of it free."""
-    m, b = contact.exponent, contact.stiffness
-    threshold = contact.offset + np.log1p(pulp) / m
-    way, slip = threshold - depth, free - lift
-    meets = way >= 0.0
-    # Leaving: u has grown from its start to 1/(1 + pulp); what is asked is when.
-    shrunk = np.expm1(np.minimum(m * way, 0.0)) / (m * np.where(slip == 0.0, TINY, slip))
-    leaving = np.log1p(np.maximum(growth * shrunk, ALL_BUT_GONE)) / np.where(growth == 0.0, TINY, growth)
-    share = np.where(meets, 1.0 - way / np.where(slip == 0.0, TINY, slip), np.where(growth == 0.0, shrunk, leaving))
-    share = np.clip(share, 0.0, 1.0)
-    start = np.maximum(depth, threshold)
-    relief, spring = _relief((start - contact.offset) * m, share * growth, share * decay)
-    rise = free + np.where(meets, (share * decay * (1.0 + pulp) - relief) / m, way - share * slip)
-    outside = contact.tension(np.where(meets, depth, depth + rise - lift))
-    mean = share * (b / m) * (spring - 1.0) + (1.0 - share) * 0.5 * (b / m * pulp + outside)
-    return rise, mean
-
-
-def _relief(exponent: Floats, growth: Floats, decay: Floats) -> tuple[Floats, Floats]:
-    """Solve ``du/ds = decay - growth u``, u = exp(-exponent) at s = 0, up to s = 1.
-
-    Returns
-    -------
-    relief : ndarray (k,)
-        ``log(1 + q)``, with which ``u(1) = exp(relief - growth - exponent)``;
-        ``q = decay exp(exponent) φ(growth)``, ``φ(y) = (exp(y) - 1)/y``.
-    mean : ndarray (k,)
-        Mean of 1/u over s, ``exp(exponent) φ log(1 + q)/q``.
-    """
-    growth = np.where(np.abs(growth) < TINY, TINY, growth)
-    if max(exponent.max(), growth.max()) < LARGE:
-        grown = np.exp(exponent) * (np.expm1(growth) / growth)
-        q = np.maximum(decay * grown, TINY)
-        relief = np.log1p(q)
-        return relief, grown * (relief / q)
-    size = np.abs(growth)
-    log_grown = exponent + np.maximum(growth, 0.0) + np.log(-np.expm1(-size) / size)
-    log_q = np.log(np.maximum(decay, TINY)) + log_grown
-    relief = np.logaddexp(0.0, log_q)
-    # Where q is below rounding, log(1 + q) is q.
-    log_mean = log_grown + np.where(log_q < -36.0, 0.0, np.log(np.maximum(relief, TINY)) - log_q)
-    return relief, np.exp(np.minimum(log_mean, LARGEST_EXPONENT))
+    part = slice(2 * s, 2 * s + 2)
+    pressure = plan.cell.supply.pressure(openings[part])
+    grown = middle = _grown(exponent)
+    for _ in range(2):
+        load = plan.to_load * np.maximum(middle - relaxed, 0.0)
+        conductance = plan.cell.flow.conductance(openings[part], pressure - load)
+        decay = plan.to_decay * (plan.means[s, part] @ conductance) + TINY
+        free = plan.means[s, part] @ (conductance * pressure)
+        slip = plan.exponent * (free - lift)
+        growth = slip + decay * relaxed + TINY
+        relief, _ = careful(exponent, growth, decay)
+        way = np.where(grown > relaxed, growth - relief, slip)
+        middle = 0.5 * (grown + _grown(exponent + way))
+    return decay, free

@@ -7,11 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..delay import Queue
 from ..physics import Cell, rates
+from ..places import Segment
 
-__all__ = ["RungeKutta4"]
+__all__ = ["RungeKutta4", "RungeKuttaPlan"]
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RungeKuttaPlan:
+    """What all periods share."""
+
+    cell: Cell
+    queue: Queue
+    segments: tuple[Segment, ...]
 
 
 @dataclass(frozen=True)
@@ -22,24 +33,31 @@ class RungeKutta4:
     order = 4
     nodes = (0.0, 0.5, 1.0)
 
-    def advance(self, cell: Cell, y: Floats, under: Floats, command: Floats, step: float) -> None:
-        """Move a block of cells on by one step, in place.
+    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> RungeKuttaPlan:
+        """Work out once what all periods share."""
+        return RungeKuttaPlan(cell, queue, segments)
+
+    def advance(self, plan: RungeKuttaPlan, y: Floats, commands: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place.
 
         Parameters
         ----------
-        cell : Cell
+        plan : RungeKuttaPlan
         y : ndarray (r, n)
             State rows, see `physics.Cell`.
-        under : ndarray (3, k)
-            Underside of the finger over the first k cells at the start, middle and end, m.
-        command : ndarray (n,)
-            Held valve commands.
-        step : float
-            Length of the step, s.
+        commands : ndarray (q, n)
+            Commands of the queue, oldest first.
+        under : ndarray (p, k)
+            Underside of the finger over the first k cells at the period's instants, m.
         """
-        first = rates(cell, y, under[0], command)
-        second = rates(cell, y + (0.5 * step) * first, under[1], command)
-        third = rates(cell, y + (0.5 * step) * second, under[1], command)
-        fourth = rates(cell, y + step * third, under[2], command)
-        y += (step / 6.0) * (first + 2.0 * (second + third) + fourth)
-        np.clip(y[0], 0.0, cell.actuator.stroke, out=y[0])
+        cell, height = plan.cell, y[0]
+        for part in plan.segments:
+            step, command = part.length, commands[plan.queue.seen(part.start)]
+            start, middle, end = (under[node] for node in part.nodes)
+            first = rates(cell, y, start, command)
+            second = rates(cell, y + (0.5 * step) * first, middle, command)
+            third = rates(cell, y + (0.5 * step) * second, middle, command)
+            fourth = rates(cell, y + step * third, end, command)
+            y += (step / 6.0) * (first + 2.0 * (second + third) + fourth)
+            np.clip(height, 0.0, cell.actuator.stroke, out=height)
+        cell.lag.settle(y[cell.lag_rows])

@@ -1,0 +1,106 @@
+"""The exact solution of a loaded cell's equation over a step with frozen coefficients.
+
+An exponential spring behind a linear flow resistance. All is dimensionless: the exponent
+``e = m (x - x0)`` of the indentation x, time s in steps (0 to 1). While the finger presses,
+
+    de/ds = slip + decay (pulp - exp(e)),
+
+where `slip` is m times the way the pin and the finger approach without load, `decay` the
+hydraulic stiffness, and ``pulp = 1 + S m/b`` the exponent at which the relaxed pulp begins
+to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` with
+``growth = slip + decay pulp``: a Bernoulli equation. Where no force acts, ``de/ds = slip``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["LARGE", "TINY", "careful", "crossed", "pressed"]
+
+Floats = NDArray[np.float64]
+
+#: Above this exponent sums have to be done on logarithms: `careful` instead of `pressed`.
+LARGE = 300.0
+#: Stands for zero where a ratio of two numbers that vanish together is wanted.
+TINY = 1e-200
+#: Below this logarithm log(1 + q) is q, to the last bit.
+_ROUNDED_AWAY = -36.8
+_ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
+
+
+def pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
+    """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
+
+    Parameters
+    ----------
+    grown : ndarray (k,)
+        ``exp(e(0))``.
+    growth, decay : ndarray (k,)
+        Neither may be zero (`TINY` will do); neither exponent may pass `LARGE`.
+
+    Returns
+    -------
+    ndarray (k,)
+        ``log(1 + q)``, ``q = decay exp(e) (exp(growth) - 1)/growth``. The mean of exp(e)
+        over the step is relief / decay.
+    """
+    q = np.expm1(growth)
+    q /= growth
+    q *= grown
+    q *= decay
+    return np.log1p(q, q)
+
+
+def careful(exponent: Floats, growth: Floats, decay: Floats) -> tuple[Floats, Floats]:
+    """Return relief and mean of exp(e), like `pressed`, at any size of the exponents.
+
+    Parameters
+    ----------
+    exponent : ndarray (k,)
+        e(0).
+    growth, decay : ndarray (k,)
+        As for `pressed`.
+    """
+    size = np.abs(growth)
+    log_grown = exponent + np.maximum(growth, 0.0) + np.log(-np.expm1(-size) / size)
+    log_q = np.log(decay) + log_grown
+    relief = np.logaddexp(0.0, log_q)
+    ratio = np.where(log_q < _ROUNDED_AWAY, 0.0, np.log(np.maximum(relief, TINY)) - log_q)
+    return relief, np.exp(np.minimum(log_grown + ratio, 2.0 * LARGE))
+
+
+def crossed(exponent: Floats, slip: Floats, decay: Floats, pulp: Floats) -> tuple[Floats, Floats]:
+    """Solve for cells that meet or leave the finger within the step.
+
+    Parameters
+    ----------
+    exponent, slip, decay, pulp : ndarray (k,)
+        See the module. Below ``log(pulp)`` at the start means meeting, above it leaving.
+
+    Returns
+    -------
+    way : ndarray (k,)
+        ``e(1) - e(0)``; the instant of meeting or leaving is found exactly.
+    mean : ndarray (k,)
+        Mean of ``max(exp(e), 1)``, the part without load by the trapezoidal rule.
+    """
+    growth = _not_zero(slip + decay * pulp)
+    slip = _not_zero(slip)
+    threshold = np.log(pulp)
+    gap = threshold - exponent
+    meets = gap >= 0.0
+    # Leaving: u grows from exp(-e(0)) to 1/pulp; the linear equation tells when.
+    shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
+    leaving = np.log1p(np.maximum(growth * shrunk, _ALL_BUT_GONE)) / growth
+    share = np.clip(np.where(meets, 1.0 - gap / slip, leaving), 0.0, 1.0)
+    start = np.maximum(exponent, threshold)
+    relief, mean = careful(start, _not_zero(share * growth), np.maximum(share * decay, TINY))
+    way = np.where(meets, gap + share * growth - relief, gap + (1.0 - share) * slip)
+    outside = np.exp(np.maximum(np.where(meets, exponent, exponent + way), 0.0))
+    return way, share * mean + (1.0 - share) * 0.5 * (pulp + outside)
+
+
+def _not_zero(values: Floats) -> Floats:
+    """Return `values` with `TINY` for zeros."""
+    return np.where(np.abs(values) < TINY, TINY, values)
