@@ -100,13 +100,22 @@ def underside(outline: Floats, x: Floats, y: Floats) -> Floats:
     x, y : ndarray (n,)
         Where, m.
     """
-    column = outline[:, :, None]
-    dx = x - column[:, 0]
-    dy = y - column[:, 1]
-    square = (column[:, 3] * dx + 2.0 * column[:, 4] * dy) * dx + column[:, 5] * dy * dy
+    centre_x, centre_y, centre_z, xx, xy, yy, tilt_x, tilt_y, half, _ = outline.T[:, :, None]
+    dx = x - centre_x
+    dy = y - centre_y
+    square = xx * dx
+    square += (2.0 * xy) * dy
+    square *= dx
+    square += (yy * dy) * dy
     root = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
-    root -= _SLOPE * np.maximum(square - JOIN, 0.0)
-    return np.asarray(column[:, 2] - column[:, 6] * dx - column[:, 7] * dy - column[:, 8] * root)
+    square -= JOIN
+    root -= _SLOPE * np.maximum(square, 0.0, square)
+    dx *= tilt_x
+    dy *= tilt_y
+    dx += dy
+    root *= half
+    root += dx
+    return np.asarray(centre_z - root)
 
 
 def _matrices(quaternions: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,8 @@ __all__ = ["Grid", "Layout", "grid"]
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
 
-#: Relative slack on a radius, so that cells exactly on it count the same on every side of the centre.
-ON_THE_CIRCLE = 1.0 + 1e-9
+#: Relative slack, so that cells exactly on a limit count the same on every side of the centre.
+ON_THE_SIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -72,44 +73,47 @@ class Grid:
         """Number of cells n."""
         return self.x.size
 
+    @cached_property
+    def corner(self) -> tuple[float, float]:
+        """Position of the first cell, m."""
+        return float(self.x[0]), float(self.y[0])
+
     @property
     def positions(self) -> Floats:
         """Positions of the cells, shape (n, 2), m."""
         return np.column_stack([self.x, self.y])
 
-    def disc(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells within `radius` of a point, in ascending order.
+    def box(self, x: float, y: float, radius: float) -> Cells:
+        """Return at least the cells within `radius` of a point, at most those of a box around it.
 
         Parameters
         ----------
         x, y : float
             Centre, m.
         radius : float
-            Radius, m; cells exactly on it belong to the disc.
+            Half the width of the box, m; cells exactly on its sides belong to it.
 
         Returns
         -------
         ndarray of int (k,)
-            The cost follows the disc, not the bed.
+            In ascending order. The cost follows the box, not the bed.
         """
         plan = self.layout
-        spacing, left, bottom = plan.row_spacing, float(self.x[0]), float(self.y[0])
-        low_row = max(0, math.ceil((y - radius - bottom) / spacing - 1e-9))
-        high_row = min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + 1e-9))
-        low = max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - 1e-9))
-        high = min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + 1e-9))
+        spacing, (left, bottom) = plan.row_spacing, self.corner
+        low_row = max(0, math.ceil((y - radius - bottom) / spacing - ON_THE_SIDE))
+        high_row = min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + ON_THE_SIDE))
+        low = max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - ON_THE_SIDE))
+        high = min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + ON_THE_SIDE))
         if low_row > high_row or low > high:
             return np.empty(0, np.intp)
-        rows = np.arange(low_row, high_row + 1) * plan.columns
-        cells = (rows[:, None] + np.arange(low, high + 1)).ravel()
-        dx = self.x.take(cells)
-        dx -= x
-        dx *= dx
-        dy = self.y.take(cells)
-        dy -= y
-        dy *= dy
-        dx += dy
-        return cells[dx <= radius * radius * ON_THE_CIRCLE]
+        rows = np.arange(low_row * plan.columns, high_row * plan.columns + 1, plan.columns)
+        return (rows[:, None] + np.arange(low, high + 1)).ravel()
+
+    def disc(self, x: float, y: float, radius: float) -> Cells:
+        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
+        cells = self.box(x, y, radius)
+        square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
+        return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
 
 
 def grid(layout: Layout) -> Grid:

@@ -159,7 +159,7 @@ def _attend(system: System, state: State) -> tuple[Any, Cells]:
     pressed = state.moving[state.rows[system.rows.force].take(state.moving) > 0.0]
     seen = _measured(system, state, pressed, state.rows.take(pressed, axis=1))
     memory, disc = system.controller.attend(state.memory, seen)
-    return memory, system.grid.disc(*disc) if disc else np.empty(0, np.intp)
+    return memory, system.grid.box(*disc) if disc else np.empty(0, np.intp)
 
 
 def _gathered(state: State, near: Cells, disc: Cells) -> Cells:
@@ -222,7 +222,7 @@ def _handed_back(
     busy = block[system.cell.lag_rows.start : rows.target].any(axis=0) | (block[rows.force] > 0.0)
     busy |= state.mode.take(cells) > Mode.HOLD
     peak = max(state.peak, float(block[0].max()))
-    return replace(state, period=state.period + 1, moving=cells[busy], peak=peak, memory=memory)
+    return State(state.period + 1, state.rows, state.mode, cells[busy], state.left, state.flags, peak, memory)
 
 
 def _diverged(system: System, state: State, cells: Cells, block: Floats) -> None:

@@ -70,5 +70,5 @@ def window(grid: Grid, outline: Floats, peak: float) -> tuple[Cells, Floats]:
     if radius < 0.0:
         return np.empty(0, np.intp), np.empty((len(outline), 0))
     radius += 0.5 * math.hypot(last[0] - first[0], last[1] - first[1])
-    cells = grid.disc(0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), radius)
+    cells = grid.box(0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), radius)
     return cells, underside(outline, grid.x.take(cells), grid.y.take(cells))

@@ -26,6 +26,9 @@ __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl"]
 
 Floats = NDArray[np.float64]
 
+#: Modes of cells outside the blister: not formed, formed.
+OUTSIDE = np.array([Mode.REST, Mode.HOLD], np.int8)
+
 
 class Phase(IntEnum):
     """What the master is doing."""
@@ -213,28 +216,32 @@ class VirtualMasterControl:
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
         formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
-        return np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        return OUTSIDE.take(formed.view(np.int8))
 
     def _created(
         self, master: Master, seen: Measurement, mode: NDArray[np.int8]
     ) -> tuple[Master, Floats, NDArray[np.int8]]:
         """Blister Creation: edge heights, profile, freezing."""
         dx, dy = seen.x - master.x, seen.y - master.y
-        distance = np.sqrt(dx * dx + dy * dy)
-        ahead = dx * master.toward_x + dy * master.toward_y
+        distance = np.hypot(dx, dy)
+        dx *= master.toward_x
+        dy *= master.toward_y
+        ahead = dx + dy
         inside = distance <= self.blister.radius
-        ring = ~inside & (distance <= self.blister.edge_radius)
+        ring = (distance <= self.blister.edge_radius) & ~inside
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
-        facing = ring & (ahead >= 0.0)
-        if facing.any():
-            master = replace(master, edge=float(seen.height[facing].mean()))
+        facing = seen.height[ring & (ahead >= 0.0)]
+        if facing.size:
+            master = replace(master, edge=float(facing.mean()))
         touched = seen.force > 0.0
         backward = (ahead < self.parameters.behind * distance) & (distance > self.blister.flat_radius)
         frozen = inside & ~touched & (backward | (seen.mode == Mode.FROZEN))
-        profile = self.blister.height(distance, master.edge, master.height)
-        target = np.where(inside & ~frozen, np.clip(profile, 0.0, self.actuator.stroke), seen.target)
-        under = Mode.FORCE_FOLLOW if master.phase is Phase.SHAPING else Mode.SPRING
-        mode = np.where(inside, np.where(touched, np.int8(under), np.int8(Mode.BLISTER)), mode)
+        shaped = inside & ~frozen
+        target = seen.target.copy()
+        profile = self.blister.height(distance[shaped], master.edge, master.height)
+        target[shaped] = np.minimum(np.maximum(profile, 0.0), self.actuator.stroke)
+        mode[inside] = Mode.BLISTER
+        mode[inside & touched] = Mode.FORCE_FOLLOW if master.phase is Phase.SHAPING else Mode.SPRING
         mode[ring] = Mode.EDGE
         mode[frozen] = Mode.FROZEN
         return master, target, mode

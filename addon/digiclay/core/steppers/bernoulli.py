@@ -29,6 +29,8 @@ __all__ = ["BernoulliExponential", "BernoulliPlan"]
 
 Floats = NDArray[np.float64]
 
+#: Constants as arrays: numpy takes twice as long over Python's numbers.
+ONE, HALF, NOT_ZERO = np.ones(1), np.full(1, 0.5), np.full(1, TINY)
 #: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
 GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
@@ -152,42 +154,60 @@ def _under_finger(
     contact, height, pulp = touch.contact, y[0], touch.pulp.rows
     m, unit = contact.exponent, contact.stiffness / contact.exponent
     decay = plan.to_decay * (plan.means @ conductance) + TINY
-    slip = m * (free - np.diff(under, axis=0))
+    slip = m * (free - (under[1:] - under[:-1]))
+    floor = m * (under + contact.offset)
     # Tensions in units of b/m: the filters, then T at the start, on average and at the end of a step.
     work = np.empty((pulp + 3, height.size))
     filters, first, mean, last = work[:pulp], work[pulp], work[pulp + 1], work[pulp + 2]
     np.divide(y[plan.cell.pulp_rows], unit, filters)
-    exponent = m * (height - under[0] - contact.offset)
+    exponent = m * height - floor[0]
     grown = _grown(exponent)
+    easy = _easy(plan, exponent, slip, decay, filters)
     for s in range(len(plan.segments)):
-        np.subtract(grown, 1.0, first)
-        relaxed = plan.halfway[s] @ work[: pulp + 1] + 1.0
+        np.subtract(grown, ONE, first)
+        relaxed = plan.halfway[s] @ work[: pulp + 1]
+        relaxed += ONE
         loaded = grown > relaxed
-        growth = slip[s] + decay[s] * relaxed + TINY
-        if max(exponent.max(), growth.max()) < plan.easy:
+        if not easy:
+            decay[s], free[s] = _loaded_valve(plan, s, openings, exponent, relaxed, under[s + 1] - under[s])
+            slip[s] = m * (free[s] - (under[s + 1] - under[s]))
+        growth = decay[s] * relaxed
+        growth += slip[s]
+        growth += NOT_ZERO
+        if easy:
             relief = pressed(grown, growth, decay[s])
             rate = relief / decay[s]
         else:
-            lift = under[s + 1] - under[s]
-            decay[s], free[s] = _loaded_valve(plan, s, openings, exponent, relaxed, lift)
-            slip[s] = m * (free[s] - lift)
-            growth = slip[s] + decay[s] * relaxed + TINY
             relief, rate = careful(exponent, growth, decay[s])
         way = np.where(loaded, growth - relief, slip[s])
-        end = exponent + way
-        crossing = (end > np.log(relaxed)) != loaded
+        crossing = (exponent + way > np.log(relaxed)) != loaded
         if crossing.any():
-            way[crossing], rate[crossing] = crossed(
-                exponent[crossing], slip[s, crossing], decay[s, crossing], relaxed[crossing]
-            )
-        height += free[s] + (way - slip[s]) / m
+            parts = (values[crossing] for values in (exponent, slip[s], decay[s], relaxed))
+            way[crossing], rate[crossing] = crossed(*parts)
+            loaded |= crossing
+        way -= slip[s]
+        way /= m
+        way += free[s]
+        height += way
         np.minimum(np.maximum(height, 0.0, height), plan.cell.actuator.stroke, height)
-        exponent = m * (height - under[s + 1] - contact.offset)
+        exponent = m * height
+        exponent -= floor[s + 1]
         grown = _grown(exponent)
-        np.subtract(grown, 1.0, last)
-        mean[:] = np.where(loaded | crossing, rate - 1.0, 0.5 * (first + last))
+        np.subtract(grown, ONE, last)
+        rate -= ONE
+        mean[:] = np.where(loaded, rate, (first + last) * HALF)
         filters[:] = plan.transition[s] @ work
     np.multiply(filters, unit, y[plan.cell.pulp_rows])
+
+
+def _easy(plan: BernoulliPlan, exponent: Floats, slip: Floats, decay: Floats, filters: Floats) -> bool:
+    """Tell whether all through the period every flow is laminar and no exponential overflows."""
+    steepest = max(float(slip.max()), 0.0)
+    highest = float(exponent.max()) + steepest * len(slip)
+    if highest >= plan.easy:
+        return False
+    pulp = max(math.exp(max(highest, 0.0)), 1.0 + float(filters.max(initial=0.0)))
+    return steepest + float(decay.max()) * pulp < LARGE
 
 
 def _grown(exponent: Floats) -> Floats:

@@ -1,0 +1,49 @@
+# Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint test-matrix test-window clean
+
+# An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
+PYTHON ?=
+# The same for Blender 5.2 in `make test-matrix`.
+PYTHON313 ?=
+# For the message that asks for one.
+export GOAL := $(firstword $(MAKECMDGOALS))
+
+ENVIRONMENT := tools/environment .venv
+IN_311 := 3.11 PYTHON "$(PYTHON)"
+PART := .venv/bin/python tools/run_part.py
+
+help: ## print this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: ## run the paper's session and leave its results and pictures in demo/
+	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
+	@.venv/bin/digiclay run ridge_mound_valley --out demo --overwrite --export stl,obj --plots --render
+
+test: ## run all tests but those of the matrix and of the window
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -f .reports/test.txt; status=0; \
+	$(PART) .reports/test.txt "tests" 280 -- tests --ignore=tests/blender --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests in Blender 4.5" 240 -- tests/blender || status=1; \
+	echo; cat .reports/test.txt; exit $$status
+
+lint: ## check style, format and types
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@status=0; \
+	.venv/bin/ruff check . || status=1; \
+	.venv/bin/ruff format --check . || status=1; \
+	.venv/bin/mypy || status=1; \
+	exit $$status
+
+test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
+	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix
+
+test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
+	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 600 -- tests/window
+
+clean: ## remove all that make made
+	rm -rf .venv .matrix .reports demo build dist addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find addon tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

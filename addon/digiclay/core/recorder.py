@@ -1,0 +1,151 @@
+"""What a session leaves behind: the arrays of ``history.npz``."""
+
+from __future__ import annotations
+
+import os
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ParameterError
+from .quantity import Parameters, quantity
+from .state import Rows, State
+
+__all__ = ["Recorder", "Recording", "available_memory", "bytes_needed", "refuse_what_cannot_fit", "write"]
+
+#: Bytes one row takes for one cell: height, force and command as float64, mode as int8.
+BYTES_A_CELL = 3 * 8 + 1
+#: Bytes of memory assumed where the system does not tell.
+ASSUMED_MEMORY = 8 * 2**30
+
+
+@dataclass(frozen=True)
+class Recorder(Parameters):
+    """Keeps the state of every cell, one row every so many control periods, and the last."""
+
+    every: int = quantity(1, "control periods a row", at_least=1)
+
+    def rows(self, periods: int) -> int:
+        """Return the number of rows of a session of so many control periods."""
+        return 1 + -(-periods // self.every)
+
+
+class Recording:
+    """The rows of one session, preallocated.
+
+    Row i is the state at ``time[i]``; ``command[i]`` and ``mode[i]`` are those given in the
+    control period that starts then. Nothing is commanded after the last row: its command is
+    0, and its mode that of the period before.
+
+    Parameters
+    ----------
+    recorder : Recorder
+    rows : Rows
+        Which row of the state holds what.
+    state : State
+        Before the session.
+    periods : int
+        Control periods the session may have.
+    """
+
+    def __init__(self, recorder: Recorder, rows: Rows, state: State, periods: int) -> None:
+        count, cells = recorder.rows(periods), state.rows.shape[1]
+        self._every, self._rows, self._done = recorder.every, rows, 0
+        self._period = np.zeros(count, np.int64)
+        self._height, self._force, self._command = np.zeros((3, count, cells))
+        self._mode = np.zeros((count, cells), np.int8)
+        self._keep(0, state)
+        self._mode[0] = state.mode
+        self._last = periods
+
+    def observe(self, state: State) -> None:
+        """Take in the state after a control period."""
+        started = state.period - 1
+        if started % self._every == 0:
+            self._command[self._done] = state.rows[self._rows.command]
+            self._mode[self._done] = state.mode
+        if state.period % self._every == 0 or state.period == self._last:
+            self._keep(self._done + 1, state)
+
+    def finish(self, state: State) -> None:
+        """Keep the state the session ended in; one that was cut short ends between two rows."""
+        if self._period[self._done] != state.period:
+            self._keep(self._done + 1, state)
+        self._mode[self._done] = state.mode
+        self._command[self._done] = 0.0
+
+    def _keep(self, row: int, state: State) -> None:
+        """Copy what belongs to an instant into a row."""
+        self._height[row] = state.rows[0]
+        self._force[row] = state.rows[self._rows.force]
+        self._period[row] = state.period
+        self._done = row
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the rows so far, without the finger: period (t,), height, force, command, mode (t, n)."""
+        rows = slice(0, self._done + 1)
+        names = ("period", "height", "force", "command", "mode")
+        return {name: getattr(self, f"_{name}")[rows] for name in names}
+
+
+def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int) -> int:
+    """Return about how much memory a session takes.
+
+    The state is kept once and gathered once more in the worst period; the positions, modes
+    and times of the cells come to some 50 bytes.
+    """
+    recorded = recorder.rows(periods) * BYTES_A_CELL if recorder else 0
+    return cells * (recorded + 2 * 8 * rows.count + 50)
+
+
+def available_memory() -> int:
+    """Return how many bytes this machine can still give."""
+    linux = Path("/proc/meminfo")
+    told = re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
+    if told:
+        return int(told[1]) * 1024
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return ASSUMED_MEMORY
+
+
+def refuse_what_cannot_fit(
+    recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int
+) -> None:
+    """Refuse, before it starts, a session that `available` bytes cannot hold.
+
+    Raises
+    ------
+    ParameterError
+        With the numbers, and what to change.
+    """
+    needed = bytes_needed(recorder, rows, cells, periods)
+    if needed <= available:
+        return
+    memory = f"{available / 1e9:.3g} GB of free memory"
+    alone = bytes_needed(None, rows, cells, periods)
+    spare = (available - alone) // (cells * BYTES_A_CELL)
+    if recorder is None or spare < 2:
+        rule = f"must be few enough for {memory}"
+        raise ParameterError("layout", "rows * columns", rule, f"{cells} cells, {alone / 1e9:.3g} GB")
+    rule = f"must be at least {-(-periods // (spare - 1))} for the history to fit into {memory}"
+    value = f"{recorder.every}: {recorder.rows(periods)} rows of {cells} cells are {needed / 1e9:.3g} GB"
+    raise ParameterError("recorder", "every", rule, value)
+
+
+def write(history: dict[str, NDArray[Any]], path: Path) -> None:
+    """Write a history as an npz file that ``numpy.load`` reads.
+
+    Deflated at the quickest level: most cells are at rest, and a row repeats most of the one
+    before, so a tenth of the size costs little more time than the plain file.
+    """
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in history.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.ascontiguousarray(array), allow_pickle=False)

@@ -1,0 +1,229 @@
+"""A scene: every part of a session with its parameters, as one value that is valid once built."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import ParameterError
+from .quantity import Parameters, quantity
+
+if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
+    from .actuator import Actuator
+    from .conduit import Conduit
+    from .contact import Contact
+    from .control.blister import Blister
+    from .control.virtual_master import VirtualMaster
+    from .delay import Delay
+    from .fingertip import Fingertip
+    from .fluid import Fluid
+    from .layout import Layout
+    from .recorder import Recorder
+    from .relaxation import Relaxation
+    from .supply import Supply
+    from .trajectory import Trajectory
+    from .valve import Valve
+    from .valve_lag import ValveLag
+
+__all__ = [
+    "METHODS",
+    "NEEDS",
+    "OPTIONAL",
+    "PARTS",
+    "SECTIONS",
+    "STEPPERS",
+    "Path",
+    "Scene",
+    "Simulation",
+    "Waypoint",
+    "parameters",
+    "part",
+]
+
+#: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`.
+PARTS: dict[str, tuple[str, str]] = {
+    "layout": ("layout", "Layout"),
+    "actuator": ("actuator", "Actuator"),
+    "supply": ("supply", "Supply"),
+    "fluid": ("fluid", "Fluid"),
+    "valve": ("valve", "Valve"),
+    "conduit": ("conduit", "Conduit"),
+    "valve_lag": ("valve_lag", "ValveLag"),
+    "delay": ("delay", "Delay"),
+    "fingertip": ("fingertip", "Fingertip"),
+    "contact": ("contact", "Contact"),
+    "relaxation": ("relaxation", "Relaxation"),
+    "blister": ("control.blister", "Blister"),
+    "simulation": ("scene", "Simulation"),
+    "recorder": ("recorder", "Recorder"),
+}
+#: The sections of a scene that are parts, in the order they are written.
+SECTIONS = (
+    "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
+    "relaxation", "control", "blister", "simulation", "recorder",
+)  # fmt: skip
+#: Parts a scene may leave out.
+OPTIONAL = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "control", "recorder")
+#: Parts that are left out together with another.
+NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
+#: Control methods: module and class of their parameters.
+METHODS: dict[str, tuple[str, str]] = {"virtual_master": ("control.virtual_master", "VirtualMaster")}
+#: Steppers: module and class.
+STEPPERS: dict[str, tuple[str, str]] = {
+    "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
+    "runge_kutta_4": ("steppers.runge_kutta", "RungeKutta4"),
+}
+#: Most physics steps in a control period, and most control periods on their way to a valve.
+MOST_STEPS = 1000
+
+
+def part(module: str, name: str) -> Any:
+    """Import a class of the core by name, now that a scene needs it."""
+    return getattr(importlib.import_module(f".{module}", __package__), name)
+
+
+def parameters(section: str, method: str) -> type[Parameters]:
+    """Import the class that holds the parameters of a section."""
+    module, name = METHODS[method] if section == "control" else PARTS[section]
+    kind: type[Parameters] = part(module, name)
+    return kind
+
+
+@dataclass(frozen=True)
+class Simulation(Parameters):
+    """How time is cut up, and how much of it there is."""
+
+    control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
+    physics_step: float = quantity(1e-3, "longest step of the physics", unit="s", symbol="h", above=0.0)
+    stepper: str = quantity("bernoulli", "how a step is integrated", choices=tuple(STEPPERS))
+    duration: float = quantity(
+        0.0, "simulated time; 0: as long as the trajectory lasts", unit="s", at_least=0.0, at_most=1e6
+    )
+
+    def check(self) -> None:
+        """A control period is a whole number of physics steps."""
+        ratio = self.control_period / self.physics_step
+        shown = f"{self.control_period:g} s"
+        if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+            rule = f"must be a whole multiple of simulation.physics_step, {self.physics_step:g} s"
+            raise ParameterError("simulation", "control_period", rule, shown)
+        if ratio > MOST_STEPS + 0.5:
+            rule = f"must be at least a {MOST_STEPS}th of simulation.control_period, {shown}"
+            raise ParameterError("simulation", "physics_step", rule, f"{self.physics_step:g} s")
+
+
+@dataclass(frozen=True)
+class Waypoint(Parameters):
+    """Where the fingertip is at one time."""
+
+    time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
+    position: tuple[float, ...] = quantity(
+        (0.0, 0.0, 46e-3), "lowest point of the fingertip: x, y, z", unit="m", at_least=-100.0, at_most=100.0
+    )
+    orientation: tuple[float, ...] = quantity(
+        (1.0, 0.0, 0.0, 0.0), "quaternion w, x, y, z", at_least=-1e6, at_most=1e6
+    )
+
+    def check(self) -> None:
+        """Three coordinates, four parts of a quaternion."""
+        for name, count in (("position", 3), ("orientation", 4)):
+            value = getattr(self, name)
+            if len(value) != count:
+                rule = f"must be a list of {count} numbers"
+                raise ParameterError("Waypoint", name, rule, f"{len(value)} of them")
+
+
+#: The finger's path when a scene names none: one press in the middle of the bed, m above the rest height.
+PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
+
+
+@dataclass(frozen=True)
+class Path:
+    """The finger's path, as a scene gives it."""
+
+    interpolation: str = "smooth"
+    waypoints: tuple[Waypoint, ...] = ()
+
+    @classmethod
+    def press(cls, rest_height: float) -> Path:
+        """Return the path of a scene that names none."""
+        points = (Waypoint(time=t, position=(0.0, 0.0, rest_height + z)) for t, z in PRESS)
+        return cls(waypoints=tuple(points))
+
+    def trajectory(self) -> Trajectory:
+        """Return the path as something that has poses."""
+        from .trajectory import Trajectory
+
+        times, positions, turns = (
+            np.array([getattr(point, name) for point in self.waypoints], dtype=np.float64)
+            for name in ("time", "position", "orientation")
+        )
+        return Trajectory(times, positions, turns, self.interpolation)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that decides a session; equal scenes give equal sessions, bit for bit.
+
+    A part that is None is left out: it costs nothing, and its module is not imported.
+
+    Raises
+    ------
+    ParameterError
+        When parts do not go together; its owner is the section's name.
+    """
+
+    layout: Layout
+    actuator: Actuator
+    supply: Supply
+    fluid: Fluid
+    valve: Valve
+    conduit: Conduit | None
+    valve_lag: ValveLag | None
+    delay: Delay | None
+    fingertip: Fingertip | None
+    contact: Contact | None
+    relaxation: Relaxation | None
+    control: VirtualMaster | None
+    blister: Blister | None
+    simulation: Simulation
+    recorder: Recorder | None
+    trajectory: Path
+    name: str = ""
+    description: str = ""
+    preset: str = "paper"
+    method: str = "virtual_master"
+
+    def __post_init__(self) -> None:
+        if self.layout.pitch < self.actuator.bore:
+            rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
+            raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
+        lasts = self.trajectory.trajectory().duration
+        if self.simulation.duration == 0.0:
+            if lasts == 0.0:
+                rule = "must be above 0 s where the trajectory has no duration of its own"
+                raise ParameterError("simulation", "duration", rule, "0 s")
+            object.__setattr__(self, "simulation", replace(self.simulation, duration=lasts))
+        longest = MOST_STEPS * self.simulation.control_period
+        if self.delay and self.delay.dead_time > longest:
+            rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
+            raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
+
+    @property
+    def periods(self) -> int:
+        """Control periods of the whole session; the last one may end after its duration."""
+        return max(1, math.ceil(self.simulation.duration / self.simulation.control_period - 1e-9))
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.layout.rows * self.layout.columns
+
+    @property
+    def set_point(self) -> float | None:
+        """Total force the finger should feel, N; None without control."""
+        return self.control.force_setpoint if self.control else None

@@ -1,0 +1,111 @@
+"""Scene files: found by path or by name, read, overridden, and told of in one line when they are wrong."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import ParameterError, SceneError
+from .quantity import nearest
+from .scene import Scene
+from .scene_table import resolve
+
+__all__ = ["SAMPLES", "find", "load", "sample_names"]
+
+#: Where the sample scenes are.
+SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "sessions"
+
+
+def sample_names() -> list[str]:
+    """Return the names of the sample scenes."""
+    return sorted(path.stem for path in SAMPLES.glob("*.toml"))
+
+
+def find(word: str) -> Path:
+    """Return the file of a scene: a sample's name, a file, or the folder of a run.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file, or sample.
+    """
+    if word in sample_names():
+        return SAMPLES / f"{word}.toml"
+    path = Path(word)
+    path = path / "scene.toml" if path.is_dir() else path
+    if path.is_file():
+        return path
+    if path.suffix == ".toml" or path.name != word:
+        raise SceneError(f"{path}: there is no such file.")
+    close = nearest(word, sample_names())
+    asked = f" Did you mean {close}?" if close else ""
+    raise SceneError(f"{word} is neither a file nor a sample ({', '.join(sample_names())}).{asked}")
+
+
+def load(path: Path, settings: Sequence[tuple[str, str]] = (), *, option: str = "--set") -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : Path
+    settings : sequence of (key path, value as text), optional
+        Override what the file says. A value is TOML; a text needs no quotes.
+    option : str, optional
+        What the settings are called in messages.
+
+    Raises
+    ------
+    SceneError
+        One line: file or option, key, rule, value.
+    """
+    table = _read(path)
+    try:
+        scene = resolve(_overridden(table, settings), path.stem)
+    except ParameterError as error:
+        if settings:
+            load(path)  # a file that is wrong by itself is told of first
+        raise SceneError(f"{option if settings else path}: {error}") from None
+    return scene
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(text)
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path} must be UTF-8 text (byte {error.start} is not).") from None
+    except RecursionError:
+        raise SceneError(f"{path}: lists or tables are nested too deeply.") from None
+    except ValueError as error:
+        said, _, place = str(error).partition(" (at ")
+        line = re.match(r"line (\d+)", place)
+        number = line[1] if line else str(max(1, len(text.splitlines())))
+        raise SceneError(f"{path}, line {number}: {said}.") from None
+
+
+def _overridden(table: dict[str, Any], settings: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """Put settings into the tables of a scene file."""
+    for key, text in settings:
+        *groups, last = key.strip().split(".")
+        inner = table
+        for group in groups:
+            if not isinstance(inner.get(group), dict):
+                inner[group] = {}
+            inner = inner[group]
+        inner[last] = _value(text)
+    return table
+
+
+def _value(text: str) -> Any:
+    """Read the value of a setting: TOML, or else a bare text."""
+    try:
+        read = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return read["value"] if len(read) == 1 else text.strip()

@@ -1,0 +1,31 @@
+"""What every test shares: one random source, no user settings, no window unless one is named."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
+os.environ.setdefault("MPLBACKEND", "Agg")
+SETTINGS = tempfile.TemporaryDirectory(prefix="digiclay-blender-")
+os.environ.setdefault("BLENDER_USER_RESOURCES", SETTINGS.name)
+
+# The same examples in every run, so that a failure can be seen again; no deadline, since machines are shared.
+settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=50)
+settings.load_profile("repeatable")
+
+WINDOW = Path(__file__).parent / "window"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip the window's tests where no Blender with a window is named."""
+    if os.environ.get("DIGICLAY_BLENDER_WINDOW"):
+        return
+    skip = pytest.mark.skip(reason="DIGICLAY_BLENDER_WINDOW does not name a Blender with a window")
+    for item in items:
+        if item.path.is_relative_to(WINDOW):
+            item.add_marker(skip)

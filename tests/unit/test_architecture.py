@@ -1,0 +1,237 @@
+"""The layout's rules: levels of the core, what it may import, file sizes, no hosts, no machine's paths."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "addon" / "digiclay"
+CORE = PACKAGE / "core"
+
+#: Modules of the core, level by level; a module imports from the levels above its own line only.
+LEVELS = (
+    "errors modes",
+    "quantity",
+    "closed_form delay fluid layout",
+    "places",
+    "absent valve valve_lag actuator contact relaxation fingertip supply state surface",
+    "conduit touch trajectory export metrics control.servo control.blister",
+    "physics",
+    "steppers.* sensors recorder control.virtual_master",
+    "simulation",
+    "scene",
+    "session",
+)
+#: Blender's own modules, which the core never imports, not even inside a function.
+BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}
+MAX_LINES = 300
+
+# Written in pieces, because this file is searched as well.
+HOSTS = tuple(
+    ".".join(parts)
+    for parts in (
+        ("pypi", "org"),
+        ("pythonhosted", "org"),
+        ("conda", "anaconda", "org"),
+        ("download", "blender", "org"),
+        ("debian", "org"),
+        ("ubuntu", "com"),
+        ("npmjs", "org"),
+        ("docker", "io"),
+        ("ghcr", "io"),
+    )
+)
+MACHINE_PATH = re.compile(
+    r"(?<![\w.~/}-])/(?:root|home|Users|work|mnt|tmp|var/tmp|private)/\w|\b[A-Z]:\\+Users\b"
+)
+
+
+def core_modules() -> dict[str, Path]:
+    """Return the core's modules by their name below it; a package has its folder's name."""
+    modules = {}
+    for path in sorted(CORE.rglob("*.py")):
+        parts = path.relative_to(CORE).with_suffix("").parts
+        modules[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return modules
+
+
+def level(module: str) -> int | None:
+    """Return the level of a module of the core, or None when the table lacks it."""
+    for number, names in enumerate(LEVELS):
+        if any(fnmatch(module, name) for name in names.split()):
+            return number
+    return None
+
+
+def imports(path: Path, *, inside_functions: bool = True) -> Iterator[tuple[int, str, list[str]]]:
+    """Yield (line, module, names) of each import in a file; relative ones keep their dots."""
+    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name, []) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.lineno, "." * node.level + (node.module or ""), [alias.name for alias in node.names]
+        function = isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+        type_checking = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        if inside_functions or not (function or type_checking):
+            waiting.extend(ast.iter_child_nodes(node))
+
+
+def core_imports(module: str, path: Path, known: set[str]) -> Iterator[tuple[int, str]]:
+    """Yield (line, module of the core) for what a module of the core imports from the package."""
+    package = ["core", *module.split(".")] if module else ["core"]
+    if path.name != "__init__.py":
+        package = package[:-1]
+    for line, target, names in imports(path):
+        dots = len(target) - len(target.lstrip("."))
+        if not dots:
+            continue
+        tail = target[dots:].split(".") if target[dots:] else []
+        base = [*package[: len(package) - dots + 1], *tail] if dots <= len(package) else ["outside"]
+        for name in names:
+            full = ".".join([*base, name])
+            inner = full.removeprefix("core.") if full.removeprefix("core.") in known else None
+            yield line, inner or ".".join(base[1:] if base[:1] == ["core"] else ["outside", *base])
+
+
+def tracked(*patterns: str) -> list[Path]:
+    """Return the files git tracks, and new ones it would not ignore."""
+    listed = subprocess.run(
+        ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "-z", "--", *patterns],
+        cwd=ROOT, capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    found = [ROOT / name for name in listed.stdout.split("\0") if name]
+    assert found, f"git lists no file for {patterns}"
+    return [path for path in found if path.is_file()]
+
+
+def lines_with(pattern: re.Pattern[str]) -> list[str]:
+    """Return ``file:line: text`` where a tracked text file matches."""
+    hits = []
+    for path in tracked():
+        data = path.read_bytes()
+        if b"\0" in data:
+            continue
+        for number, text in enumerate(data.decode("utf-8", errors="replace").splitlines(), 1):
+            if pattern.search(text):
+                hits.append(f"{path.relative_to(ROOT)}:{number}: {text.strip()[:100]}")
+    return hits
+
+
+def test_every_core_module_has_a_level() -> None:
+    modules = [name for name, path in core_modules().items() if path.name != "__init__.py"]
+    assert modules
+    assert [name for name in modules if level(name) is None] == []
+
+
+def test_core_imports_go_strictly_down_a_level() -> None:
+    modules, wrong = core_modules(), []
+    for module, path in modules.items():
+        own = level(module)
+        for line, target in core_imports(module, path, set(modules)):
+            other = level(target)
+            # The front door of a package may show what is inside it.
+            door = path.name == "__init__.py" and target.startswith(f"{module}.")
+            if not door and (own is None or other is None or other >= own):
+                wrong.append(f"{path.relative_to(ROOT)}:{line}: {module} ({own}) imports {target} ({other})")
+    assert wrong == []
+
+
+def test_core_needs_numpy_alone_at_import() -> None:
+    allowed = {*sys.stdlib_module_names, "numpy"}
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: {target}"
+        for path in core_modules().values()
+        for line, target, _ in imports(path, inside_functions=False)
+        if not target.startswith(".") and target.split(".")[0] not in allowed
+    ]
+    assert wrong == []
+
+
+def test_core_never_names_blender() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: {target}"
+        for path in core_modules().values()
+        for line, target, _ in imports(path)
+        if target.split(".")[0] in BLENDER
+    ]
+    assert wrong == []
+
+
+def test_package_imports_itself_relatively() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: {target}"
+        for path in PACKAGE.rglob("*.py")
+        for line, target, _ in imports(path)
+        if target.split(".")[0] == "digiclay"
+    ]
+    assert wrong == []
+
+
+BLOCKED_IMPORT = """
+import importlib, pkgutil, sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {refused!r}:
+            raise ImportError(name + " is blocked here")
+
+sys.meta_path.insert(0, Refuse())
+import digiclay.core
+names = [m.name for m in pkgutil.walk_packages(digiclay.core.__path__, "digiclay.core.")]
+for name in names:
+    importlib.import_module(name)
+print(len(names))
+"""
+
+
+def test_core_imports_with_blender_and_every_heavy_library_blocked() -> None:
+    script = BLOCKED_IMPORT.format(refused={*BLENDER, "trimesh", "matplotlib", "scipy"})
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT / "addon", capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) == len(core_modules()) - 1  # all but the core's own __init__
+
+
+@pytest.mark.parametrize(("module", "path"), list(core_modules().items()))
+def test_core_module_has_a_docstring(module: str, path: Path) -> None:
+    assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), f"core.{module} says nothing"
+
+
+def test_no_python_file_is_over_the_limit() -> None:
+    sizes = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in tracked("*.py")}
+    assert {str(path.relative_to(ROOT)): size for path, size in sizes.items() if size > MAX_LINES} == {}
+
+
+def test_no_package_registry_is_named() -> None:
+    assert lines_with(re.compile("|".join(map(re.escape, HOSTS)), re.IGNORECASE)) == []
+
+
+def test_requirements_are_exact_pins_without_a_place_to_get_them() -> None:
+    pin = re.compile(r"#.*|-r [\w.-]+\.txt|[\w.-]+==[\w.]+|")
+    files = tracked("requirements/*.txt")
+    lines = [(path.name, line) for path in files for line in path.read_text(encoding="utf-8").splitlines()]
+    assert [pair for pair in lines if not pin.fullmatch(pair[1])] == []
+
+
+def test_no_path_of_one_machine_is_named() -> None:
+    assert lines_with(MACHINE_PATH) == []
+
+
+def test_the_extension_and_the_package_have_one_version() -> None:
+    import digiclay
+
+    manifest = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert manifest["version"] == digiclay.__version__
