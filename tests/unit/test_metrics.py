@@ -1,0 +1,192 @@
+"""Metrics on signals whose answer is known without a computer."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from digiclay.core.errors import ParameterError
+from digiclay.core.layout import Layout, grid
+from digiclay.core.metrics import (
+    METRICS,
+    cell_area,
+    contact_loss_share,
+    lag,
+    rfd,
+    shaping,
+    summary,
+    weights,
+)
+from digiclay.core.modes import Mode
+
+TIME = np.linspace(0.0, 10.0, 2001)
+#: Rounding of sums over 2001 rows.
+ROUNDING = 1e-12
+
+
+def history(total: np.ndarray, time: np.ndarray = TIME) -> dict[str, np.ndarray]:
+    """A bed of 3 x 3 pins, all force on the middle one, the finger 2 mm beside it."""
+    force = np.zeros((len(time), 9))
+    force[:, 4] = total
+    fingertip = np.tile([0.002, 0.0, 0.04, 1.0, 0.0, 0.0, 0.0], (len(time), 1))
+    height = np.full((len(time), 9), 0.04)
+    height[-1, :3] = 0.043, 0.039, 0.041
+    mode = np.full((len(time), 9), Mode.FORCE_FOLLOW, dtype=np.int8)
+    position = grid(Layout(rows=3, columns=3)).positions
+    return {"time": time, "height": height, "force": force, "command": np.zeros_like(force), "mode": mode,
+            "fingertip": fingertip, "total_force": total, "position": position}  # fmt: skip
+
+
+def test_the_rfd_of_a_force_at_its_set_point_is_zero():
+    assert rfd(TIME, np.full(2001, 0.4), 0.4) == 0.0
+
+
+def test_the_rfd_of_a_constant_offset_is_the_offset():
+    assert rfd(TIME, np.full(2001, 0.43), 0.4) == pytest.approx(
+        0.03, rel=1e-10
+    )  # 0.43 - 0.4 loses two digits
+
+
+def test_the_rfd_of_a_sine_is_its_amplitude_over_root_two():
+    # The trapezium rule is exact for sin² over whole periods.
+    total = 0.4 + 0.1 * np.sin(2.0 * np.pi * TIME)
+    assert rfd(TIME, total, 0.4) == pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING)
+
+
+def test_the_rfd_leaves_out_the_time_without_contact():
+    total = np.where((TIME > 2.0) & (TIME < 6.0), 0.43, 0.0)
+    assert rfd(TIME, total, 0.4) == pytest.approx(0.03, rel=1e-10)
+
+
+def test_the_rfd_of_the_whole_session_counts_the_time_without_contact():
+    # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
+    total = np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)
+    found = summary(history(total), 0.4)
+    assert found["rfd_session"] == pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3)
+    assert found["rfd"] == 0.0
+
+
+def test_the_rfd_weighs_rows_by_their_time():
+    # A force of 0.5 for 1 s in 101 rows and of 0.4 for 9 s in 10: rows counted alike would give 0.095.
+    time = np.concatenate([np.linspace(0.0, 1.0, 101), np.arange(2.0, 11.0)])
+    total = np.where(time <= 1.0, 0.5, 0.4)
+    # The row at 1 s stands for half a second after it as well: 1.5 s in all.
+    assert rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
+
+
+def test_the_rfd_while_shaping_leaves_out_touching_down():
+    case = history(np.where(TIME < 5.0, 0.2, 0.4))
+    case["mode"][TIME < 5.0] = Mode.SPRING
+    assert summary(case, 0.4)["rfd_shaping"] == 0.0
+    assert summary(case, 0.4)["rfd"] > 0.1
+
+
+def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
+    mode = [[Mode.REST, Mode.FORCE_FOLLOW], [Mode.REST, Mode.SPRING], [Mode.REST, Mode.FORCE_FOLLOW]]
+    np.testing.assert_array_equal(shaping([0.4, 0.4, 0.0], mode), [True, False, False])
+
+
+def test_the_weights_add_up_to_the_duration():
+    uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
+    assert weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
+
+
+def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact():
+    touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
+    # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
+    assert contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
+
+
+def test_lifting_at_the_end_is_no_contact_loss():
+    assert contact_loss_share(TIME, np.where(TIME < 4.0, 0.4, 0.0)) == 0.0
+
+
+def test_the_contact_share_is_the_time_in_contact():
+    found = summary(history(np.where(TIME < 2.5, 0.4, 0.0)), 0.4)
+    assert found["contact_share"] == pytest.approx(0.25, abs=5e-4)  # one row of 2001
+
+
+def test_the_lag_is_the_distance_from_finger_to_force_centroid():
+    place = np.array([[0.0, 0.0], [0.004, 0.0]])
+    fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
+    # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
+    np.testing.assert_allclose(lag(place, force, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
+
+
+def test_the_summary_finds_the_lag_of_a_finger_beside_the_force():
+    found = summary(history(np.full(2001, 0.4)), 0.4)
+    assert found["lag_mean"] == pytest.approx(0.002, rel=ROUNDING)
+    assert found["lag_max"] == pytest.approx(0.002, rel=ROUNDING)
+
+
+def test_the_summary_tells_extremes_of_forces_and_heights():
+    found = summary(history(np.linspace(0.0, 0.5, 2001)), 0.4)
+    assert found["max_cell_force"] == found["max_total_force"] == 0.5
+    assert (found["lowest"], found["highest"]) == (0.039, 0.043)
+    assert found["height_range"] == pytest.approx(0.004, rel=ROUNDING)
+
+
+def test_volumes_above_and_below_the_initial_surface_are_told_apart():
+    # Pins raised by 3 and 1 mm and sunk by 1 mm, 9 mm² each.
+    found = summary(history(np.full(2001, 0.4)), 0.4)
+    assert found["raised_volume"] == pytest.approx(4e-3 * 9e-6, rel=1e-9)  # 0.043 - 0.04 loses three digits
+    assert found["sunk_volume"] == pytest.approx(1e-3 * 9e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("layout", "square_millimetres"),
+    [
+        (Layout(rows=4, columns=3), 9.0),
+        (Layout(rows=4, columns=3, arrangement="staggered"), 9.0),
+        (Layout(rows=4, columns=3, arrangement="hexagonal"), 9.0 * np.sqrt(0.75)),
+        (Layout(rows=1, columns=3), 9.0),
+        (Layout(rows=3, columns=1), 9.0),
+    ],
+)
+def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimetres):
+    assert cell_area(grid(layout).positions) == pytest.approx(square_millimetres * 1e-6, rel=1e-9)
+
+
+def test_a_session_without_contact_has_no_rfd_lag_or_loss():
+    found = summary(history(np.zeros(2001)), 0.4)
+    nothing = {name for name, value in found.items() if value is None}
+    assert nothing == {"rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max"}
+    assert found["contact_share"] == 0.0
+
+
+def test_a_single_pin_has_no_area_to_form_a_volume_over():
+    case = {
+        name: value[:, :1] if value.shape[1:] == (9,) else value
+        for name, value in history(np.full(2001, 0.4)).items()
+    }
+    case["position"] = np.zeros((1, 2))
+    assert summary(case, 0.4)["raised_volume"] is None
+
+
+def test_a_history_of_one_row_is_summed_up():
+    found = summary(history(np.array([0.5]), np.array([0.0])), 0.4)
+    assert found["rfd"] == pytest.approx(0.1, rel=1e-10)
+    assert found["duration"] == 0.0
+
+
+def test_numbers_that_are_not_finite_become_none():
+    case = history(np.full(2001, 0.4))
+    case["height"][-1, 0] = np.nan
+    assert summary(case, 0.4)["height_range"] is None
+
+
+def test_a_history_without_rows_is_refused():
+    case = {
+        name: value if name == "position" else value[:0] for name, value in history(np.zeros(2001)).items()
+    }
+    with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
+        summary(case, 0.4)
+
+
+def test_the_summary_is_json_and_every_key_has_a_unit_and_a_meaning():
+    found = summary(history(np.full(2001, 0.4)), 0.4)
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    assert list(found) == list(METRICS)
+    assert all(unit and meaning for unit, meaning in METRICS.values())
