@@ -46,8 +46,8 @@ class OrificeAndConduit(Orifice):
 
     def laminar_conductance(self, opening: Floats) -> Floats:
         """Return g / (1 + R g), m³/(s Pa)."""
-        g = Orifice.laminar_conductance(self, opening)
-        return g / (1.0 + self.resistance * g)
+        lift = Orifice.laminar_lift(self, opening)
+        return lift / (1.0 / self.laminar + self.resistance * lift)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""

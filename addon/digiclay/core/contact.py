@@ -34,5 +34,10 @@ class Contact(Parameters):
         depth : ndarray (n,)
             Indentation x, m; negative where there is a gap.
         """
-        exponent = np.minimum(np.maximum(depth - self.offset, 0.0) * self.exponent, LARGEST_EXPONENT)
-        return (self.stiffness / self.exponent) * np.expm1(exponent)
+        exponent = np.multiply(depth, self.exponent)
+        exponent -= self.offset * self.exponent
+        np.maximum(exponent, 0.0, exponent)
+        np.minimum(exponent, LARGEST_EXPONENT, exponent)
+        np.expm1(exponent, exponent)
+        exponent *= self.stiffness / self.exponent
+        return exponent

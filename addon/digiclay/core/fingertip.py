@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .quantity import Parameters, quantity
 
-__all__ = ["LEVEL", "Fingertip", "reach", "underside"]
+__all__ = ["LEVEL", "Fingertip", "forms", "reach", "reaches", "underside"]
 
 Floats = NDArray[np.float64]
 
@@ -68,54 +68,78 @@ class Fingertip(Parameters):
         return outline
 
 
-def reach(outline: list[float], peak: float) -> float:
+def reaches(outline: Floats) -> Floats:
+    """Return what `reach` needs of each outline (..., 10), shape (..., 3): base, m; tilt; bend, 1/m."""
+    half = outline[..., 8]
+    base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
+    return np.stack([base, np.hypot(outline[..., 6], outline[..., 7]), 2.0 * _SLOPE * half * outline[..., 9]], -1)
+
+
+def reach(base: float, tilt: float, bend: float, peak: float) -> float:
     """Return a radius about the centre beyond which the underside is above `peak`, m.
+
+    A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
+    stays one with the smallest base, the largest tilt and the smallest bend of several poses.
 
     Parameters
     ----------
-    outline : list of float (10,)
-        One row of `Fingertip.outline`.
+    base, tilt, bend : float
+        From `reaches`.
     peak : float
         No pin top is higher than this, m.
 
     Returns
     -------
     float
-        A bound for every tilt, from the paraboloid that nowhere lies above the underside;
-        negative when the finger is wholly above `peak`.
+        Negative when the finger is wholly above `peak`.
     """
-    centre, tilt, half, narrow = outline[2], math.hypot(outline[6], outline[7]), outline[8], outline[9]
-    bend = 2.0 * _SLOPE * half * narrow
-    square = tilt * tilt + 2.0 * bend * (peak - centre + half * (_ROOT + _SLOPE * JOIN))
+    square = tilt * tilt + 2.0 * bend * (peak - base)
     return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
 
 
-def underside(outline: Floats, x: Floats, y: Floats) -> Floats:
-    """Return the height of the finger's underside, shape (k, n), m.
+def forms(outline: Floats) -> tuple[Floats, Floats]:
+    """Return the ellipsoid's thickness and its mid surface as quadratic forms of the position.
 
     Parameters
     ----------
-    outline : ndarray (k, 10)
+    outline : ndarray (..., 10)
         From `Fingertip.outline`.
-    x, y : ndarray (n,)
-        Where, m.
+
+    Returns
+    -------
+    inward : ndarray (..., 6)
+        Coefficients of 1, x, y, x², x y, y² in 1 - r², r² the squared reduced radius.
+    middle : ndarray (..., 6)
+        Those of the height of the mid surface, m.
     """
-    centre_x, centre_y, centre_z, xx, xy, yy, tilt_x, tilt_y, half, _ = outline.T[:, :, None]
-    dx = x - centre_x
-    dy = y - centre_y
-    square = xx * dx
-    square += (2.0 * xy) * dy
-    square *= dx
-    square += (yy * dy) * dy
-    root = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
-    square -= JOIN
-    root -= _SLOPE * np.maximum(square, 0.0, square)
-    dx *= tilt_x
-    dy *= tilt_y
-    dx += dy
+    x, y, z, xx, xy, yy, tilt_x, tilt_y, _, _ = np.moveaxis(outline, -1, 0)
+    zero = np.zeros_like(x)
+    square = xx * x * x + 2.0 * xy * x * y + yy * y * y
+    inward = [1.0 - square, 2.0 * (xx * x + xy * y), 2.0 * (xy * x + yy * y), -xx, -2.0 * xy, -yy]
+    middle = [z + tilt_x * x + tilt_y * y, -tilt_x, -tilt_y, zero, zero, zero]
+    return np.stack(inward, -1), np.stack(middle, -1)
+
+
+def underside(inward: Floats, middle: Floats, half: Floats, place: Floats) -> Floats:
+    """Return the height of the finger's underside, shape (p, k), m.
+
+    Parameters
+    ----------
+    inward, middle : ndarray (p, 6)
+        From `forms`.
+    half : ndarray (p, 1)
+        Half thickness over the centre, m.
+    place : ndarray (6, k)
+        Rows 1, x, y, x², x y, y² of the places asked for.
+    """
+    root = np.dot(inward, place)
+    kept = np.maximum(root, 1.0 - JOIN)
+    # Beyond the join the tangent: sqrt(kept) + (root - kept) / (2 sqrt(1 - JOIN)).
+    root -= kept
+    root *= _SLOPE
+    root += np.sqrt(kept, kept)
     root *= half
-    root += dx
-    return np.asarray(centre_z - root)
+    return np.subtract(np.dot(middle, place), root, root)
 
 
 def _matrices(quaternions: Floats) -> Floats:

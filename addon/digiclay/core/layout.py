@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from .errors import ParameterError
 from .quantity import Parameters, quantity
 
-__all__ = ["Grid", "Layout", "grid"]
+__all__ = ["NOWHERE", "ON_THE_SIDE", "Bounds", "Grid", "Layout", "grid", "inside"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
+#: First row, last row, first column, last column.
+Bounds = tuple[int, int, int, int]
+#: No cells.
+NOWHERE: Bounds = (0, -1, 0, -1)
 
 #: Relative slack, so that cells exactly on a limit count the same on every side of the centre.
 ON_THE_SIDE = 1e-9
@@ -83,37 +87,56 @@ class Grid:
         """Positions of the cells, shape (n, 2), m."""
         return np.column_stack([self.x, self.y])
 
-    def box(self, x: float, y: float, radius: float) -> Cells:
-        """Return at least the cells within `radius` of a point, at most those of a box around it.
+    def bounds(self, x: float, y: float, radius: float) -> Bounds:
+        """Return the rows and columns that hold all cells within `radius` of a point.
 
         Parameters
         ----------
         x, y : float
             Centre, m.
         radius : float
-            Half the width of the box, m; cells exactly on its sides belong to it.
+            m; cells exactly on a side are inside. Negative: no cells.
 
         Returns
         -------
-        ndarray of int (k,)
-            In ascending order. The cost follows the box, not the bed.
+        Bounds
+            First row, last row, first column, last column; a last below a first means none.
         """
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
-        low_row = max(0, math.ceil((y - radius - bottom) / spacing - ON_THE_SIDE))
-        high_row = min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + ON_THE_SIDE))
-        low = max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - ON_THE_SIDE))
-        high = min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + ON_THE_SIDE))
+        return (
+            max(0, math.ceil((y - radius - bottom) / spacing - ON_THE_SIDE)),
+            min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + ON_THE_SIDE)),
+            max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - ON_THE_SIDE)),
+            min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + ON_THE_SIDE)),
+        )
+
+    def within(self, bounds: Bounds) -> Cells:
+        """Return the cells of some rows and columns, in ascending order."""
+        low_row, high_row, low, high = bounds
         if low_row > high_row or low > high:
             return np.empty(0, np.intp)
-        rows = np.arange(low_row * plan.columns, high_row * plan.columns + 1, plan.columns)
+        columns = self.layout.columns
+        rows = np.arange(low_row * columns, high_row * columns + 1, columns)
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
         """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
-        cells = self.box(x, y, radius)
+        cells = self.within(self.bounds(x, y, radius))
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
+
+    def place(self, cells: Cells) -> Floats:
+        """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
+        x, y = self.x.take(cells), self.y.take(cells)
+        return np.array([np.ones(cells.size), x, y, x * x, x * y, y * y])
+
+
+def inside(inner: Bounds, outer: Bounds) -> bool:
+    """Tell whether all cells of `inner` are among those of `outer`."""
+    if inner[0] > inner[1] or inner[2] > inner[3]:
+        return True
+    return inner[0] >= outer[0] and inner[1] <= outer[1] and inner[2] >= outer[2] and inner[3] <= outer[3]
 
 
 def grid(layout: Layout) -> Grid:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +32,18 @@ class Cell:
     lag: Lag
     touch: Touch | None
 
-    @property
+    @cached_property
     def lag_rows(self) -> slice:
         """The rows of ``y`` that the valve lag owns."""
         first = self.pulp_rows.stop
         return slice(first, first + self.lag.rows)
 
-    @property
+    @cached_property
     def pulp_rows(self) -> slice:
         """The rows of ``y`` that the relaxation owns."""
         return slice(1, 1 + (self.touch.pulp.rows if self.touch else 0))
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """State rows a cell needs."""
         return self.lag_rows.stop

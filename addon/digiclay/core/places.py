@@ -89,8 +89,18 @@ class Stepper(Protocol):
         """Work out once what all periods share."""
         ...
 
-    def advance(self, plan: Any, y: Floats, commands: Floats, under: Floats) -> None:
-        """Move state rows y (r, n) on, given queued commands (q, n) and undersides (p, k), in place."""
+    def advance(self, plan: Any, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place.
+
+        Parameters
+        ----------
+        plan : object
+            From `plan`.
+        driven : ndarray (r + q, n)
+            State rows, see `physics.Cell`, then the commands of the queue, oldest first.
+        under : ndarray (p, k)
+            Underside of the finger over the first k cells at the period's instants, m.
+        """
         ...
 
 
@@ -117,8 +127,8 @@ class Measurement:
 
     Attributes
     ----------
-    x, y : ndarray (m,)
-        Where they are, m.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of where they are, m.
     height, force : ndarray (m,)
         As measured, m and N.
     target : ndarray (m,)
@@ -126,8 +136,7 @@ class Measurement:
     mode : ndarray (m,) of int8
     """
 
-    x: Floats
-    y: Floats
+    place: Floats
     height: Floats
     force: Floats
     target: Floats

@@ -1,20 +1,23 @@
 """What a session is at one instant, as a value: handed in to a step and handed back.
 
-All that belongs to a cell is a row of one array, so that gathering the few cells that
-move in a period is one call, and a part that is left out owns no row.
+All that belongs to a cell is a row of one array, so that a part that is left out owns no
+row. The few cells that take part in a period are taken out of that array and kept out,
+side by side, for as long as the same cells take part.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .layout import NOWHERE, Bounds
 from .modes import Mode
 
-__all__ = ["Rows", "State", "at_rest"]
+__all__ = ["Gathered", "Rows", "State", "at_rest"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -22,7 +25,7 @@ Cells = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Rows:
-    """Which row of `State.rows` holds what.
+    """Which row of a cell's state holds what.
 
     The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
     then come the commands on their way to the valve, oldest first; the height a cell is
@@ -32,30 +35,70 @@ class Rows:
     physics: int
     queue: int
 
-    @property
-    def target(self) -> int:
-        """Row of the commanded height."""
-        return self.physics + self.queue
+    @cached_property
+    def driven(self) -> slice:
+        """Rows a stepper works on: the physics and the commands on their way."""
+        return slice(0, self.physics + self.queue)
 
-    @property
-    def force(self) -> int:
-        """Row of the force."""
-        return self.physics + self.queue + 1
-
-    @property
+    @cached_property
     def commands(self) -> slice:
         """Rows of the commands on their way."""
         return slice(self.physics, self.physics + self.queue)
 
-    @property
+    @cached_property
     def command(self) -> int:
         """Row of the newest command."""
         return self.physics + self.queue - 1
 
-    @property
+    @cached_property
+    def target(self) -> int:
+        """Row of the commanded height."""
+        return self.physics + self.queue
+
+    @cached_property
+    def force(self) -> int:
+        """Row of the force."""
+        return self.physics + self.queue + 1
+
+    @cached_property
     def count(self) -> int:
         """Number of rows."""
-        return self.physics + 2 + self.queue
+        return self.physics + self.queue + 2
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """The cells that take part, taken out of the bed; they alone change.
+
+    Attributes
+    ----------
+    cells : ndarray of int (m,)
+        First those the finger may touch, then the others that move or are controlled.
+    near : int
+        Number k of those the finger may touch.
+    block : ndarray (r, m)
+        Their rows, see `Rows`.
+    mode : ndarray (m,) of int8
+        Their control modes, `modes.Mode`.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
+    reach, control : Bounds
+        Cells of these parts of the bed are in: the finger's, and the controller's.
+    peak : float
+        No pin top in the finger's part is higher while this set is in use, m.
+    until : int
+        Control period by which the set is to be made anew.
+    """
+
+    cells: Cells
+    near: int
+    block: Floats
+    mode: NDArray[np.int8]
+    place: Floats
+    reach: Bounds
+    control: Bounds
+    peak: float
+    until: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,41 +110,53 @@ class State:
     period : int
         Number of control periods done.
     rows : ndarray (r, n)
-        See `Rows`.
-    mode : ndarray (n,) of int8
-        Control modes, `modes.Mode`.
-    moving : ndarray of int
-        The cells that may change in the coming period even if nobody touches or commands
-        them; all others have a shut valve, no command on its way and no force.
-    left : ndarray (n,)
+        See `Rows`; out of date for the cells in `gathered`: read it with `row`.
+    modes : ndarray (n,) of int8
+        Control modes; out of date for the cells in `gathered`: read them with `mode`.
+    aged : ndarray (n,)
         Time up to which a cell's relaxation has been worked out, s: the pulp over cells
-        at rest goes on relaxing, and is aged exactly when it is needed again.
+        out of reach goes on relaxing, and is aged exactly when it is needed again.
     peak : float
-        No pin top is higher than this, m.
-    flags : ndarray (n,) of bool
-        Working memory of a step; all False between steps.
+        No pin top outside `gathered` is higher than this, m.
+    gathered : Gathered
     memory : object
         The controller's memory.
     """
 
     period: int
     rows: Floats
-    mode: NDArray[np.int8]
-    moving: Cells
-    left: Floats
-    flags: NDArray[np.bool_]
+    modes: NDArray[np.int8]
+    aged: Floats
     peak: float
+    gathered: Gathered
     memory: Any
 
+    def row(self, index: int) -> Floats:
+        """Return one row of all cells, shape (n,), as a new array; `Rows` names them."""
+        values = self.rows[index].copy()
+        values[self.gathered.cells] = self.gathered.block[index]
+        return values
+
+    def mode(self) -> NDArray[np.int8]:
+        """Return the control modes of all cells, shape (n,), as a new array."""
+        values = self.modes.copy()
+        values[self.gathered.cells] = self.gathered.mode
+        return values
+
     def copy(self) -> State:
-        """Return a state that shares no array with this one."""
-        arrays = {name: getattr(self, name).copy() for name in ("rows", "mode", "moving", "left", "flags")}
-        return replace(self, **arrays)
+        """Return a state that shares no array with this one that a step would change."""
+        held = replace(self.gathered, block=self.gathered.block.copy(), mode=self.gathered.mode.copy())
+        return replace(
+            self, rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), gathered=held
+        )
 
 
 def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
     """Return the state before a session: every pin at `height`, every valve shut."""
     values = np.zeros((rows.count, count))
     values[0] = values[rows.target] = height
-    mode = np.full(count, Mode.REST, np.int8)
-    return State(0, values, mode, np.empty(0, np.intp), np.zeros(count), np.zeros(count, np.bool_), height, memory)
+    none = np.empty(0, np.intp)
+    nobody = Gathered(
+        none, 0, np.empty((rows.count, 0)), np.empty(0, np.int8), np.empty((6, 0)), NOWHERE, NOWHERE, height, 0
+    )
+    return State(0, values, np.full(count, Mode.REST, np.int8), np.zeros(count), height, nobody, memory)

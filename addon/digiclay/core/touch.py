@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .contact import Contact
-from .fingertip import Fingertip, reach, underside
-from .layout import Grid
+from .fingertip import Fingertip, forms, reach, reaches
+from .layout import NOWHERE, Bounds, Grid
 from .places import Pulp
 
-__all__ = ["Touch", "force", "window"]
+__all__ = ["Approach", "Touch", "Window", "approach", "bounds", "force"]
 
 Floats = NDArray[np.float64]
-Cells = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -26,6 +24,70 @@ class Touch:
     fingertip: Fingertip
     contact: Contact
     pulp: Pulp
+
+
+#: Which cells the finger may touch in a period: centre of its way x, y and half the length
+#: of it, m; then the arguments of `fingertip.reach`.
+Window = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """The finger in one control period, at p instants.
+
+    Attributes
+    ----------
+    inward, middle : ndarray (p, 6)
+        From `fingertip.forms`.
+    half : ndarray (p, 1)
+        Half thickness over the centre, m.
+    window : Window
+    """
+
+    inward: Floats
+    middle: Floats
+    half: Floats
+    window: Window
+
+
+def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
+    """Work out how the finger comes, for some control periods.
+
+    Parameters
+    ----------
+    fingertip : Fingertip
+    poses : ndarray (t, p, 7)
+        Its poses at the p instants of t periods: position of the lowest point, m, quaternion.
+    """
+    count, instants, _ = poses.shape
+    outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
+    low, high = outline[:, :, :2].min(axis=1), outline[:, :, :2].max(axis=1)
+    spread = np.hypot(*(0.5 * (high - low)).T)
+    shape = reaches(outline)
+    farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
+    windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
+    half = outline[:, :, 8]
+    return [
+        Approach(form, surface, thickness[:, None], tuple(window))
+        for form, surface, thickness, window in zip(*forms(outline), half, windows, strict=True)
+    ]
+
+
+def bounds(grid: Grid, window: Window, peak: float, margin: float) -> Bounds:
+    """Return rows and columns that hold every cell the finger may touch in a period.
+
+    Parameters
+    ----------
+    grid : Grid
+    window : Window
+    peak : float
+        No pin top is higher than this, m.
+    margin : float
+        How much farther to look, m.
+    """
+    x, y, spread, *shape = window
+    radius = reach(*shape, peak)
+    return grid.bounds(x, y, radius + spread + margin) if radius >= 0.0 else NOWHERE
 
 
 def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
@@ -44,31 +106,7 @@ def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Float
         The relaxation's state rows z_i, N.
     """
     tension = touch.contact.tension(height - under)
-    return touch.contact.share * np.maximum(tension - touch.pulp.relaxed(filters), 0.0)
-
-
-def window(grid: Grid, outline: Floats, peak: float) -> tuple[Cells, Floats]:
-    """Find the cells the finger may be over while it takes up some poses.
-
-    Parameters
-    ----------
-    grid : Grid
-    outline : ndarray (p, 10)
-        Poses of one control period, from `Fingertip.outline`, in the order of time.
-    peak : float
-        No pin top is higher than this, m.
-
-    Returns
-    -------
-    cells : ndarray of int (k,)
-        All cells whose top could be above the underside, and usually some more.
-    under : ndarray (p, k)
-        The underside over them, m.
-    """
-    first, last = outline[0].tolist(), outline[-1].tolist()
-    radius = max(reach(first, peak), reach(last, peak))
-    if radius < 0.0:
-        return np.empty(0, np.intp), np.empty((len(outline), 0))
-    radius += 0.5 * math.hypot(last[0] - first[0], last[1] - first[1])
-    cells = grid.box(0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), radius)
-    return cells, underside(outline, grid.x.take(cells), grid.y.take(cells))
+    tension -= touch.pulp.relaxed(filters)
+    np.maximum(tension, 0.0, tension)
+    tension *= touch.contact.share
+    return tension

@@ -63,7 +63,11 @@ class Orifice:
 
     def laminar_conductance(self, opening: Floats) -> Floats:
         """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K in [-1, 1], shape (n,)."""
-        return self.laminar * (opening * opening if self.power == 2 else np.abs(opening))
+        return self.laminar * self.laminar_lift(opening)
+
+    def laminar_lift(self, opening: Floats) -> Floats:
+        """Return \|K\|^power."""
+        return opening * opening if self.power == 2 else abs(opening)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return the secant conductance Q/ΔP, m³/(s Pa).

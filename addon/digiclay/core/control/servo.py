@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..quantity import Parameters, quantity
 
-__all__ = ["Servo"]
+__all__ = ["Servo", "locked_under_overload"]
 
 Floats = NDArray[np.float64]
 
@@ -25,19 +25,29 @@ class Servo(Parameters):
     gain: float = quantity(500.0, "proportional gain", unit="1/m", symbol="K_p", at_least=0.0)
     dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
 
-    def command(self, target: Floats, height: Floats, overload: NDArray[np.bool_]) -> Floats:
-        """Return valve commands, shape (n,).
-
-        Parameters
-        ----------
-        target, height : ndarray (n,)
-            Commanded and measured height, m.
-        overload : ndarray (n,) of bool
-            Cells pressed harder than the high reservoir can lift. Opening to it would lower
-            them, and a proportional controller would open further: they are locked instead.
-        """
+    def command(self, target: Floats, height: Floats) -> Floats:
+        """Return valve commands, shape (n,), for commanded and measured heights, m."""
         error = target - height
-        command = np.clip(self.gain * error, -1.0, 1.0)
-        command[np.abs(error) <= self.dead_band] = 0.0
-        command[overload & (command > 0.0)] = 0.0
+        command = self.gain * error
+        np.minimum(command, 1.0, command)
+        np.maximum(command, -1.0, command)
+        command *= np.abs(error) > self.dead_band
         return command
+
+
+def locked_under_overload(command: Floats, force: Floats, limit: float) -> Floats:
+    """Return commands with cells locked that are pressed harder than the high reservoir can lift.
+
+    Opening to it would lower them, and a proportional controller would open further.
+
+    Parameters
+    ----------
+    command : ndarray (n,)
+    force : ndarray (n,)
+        N.
+    limit : float
+        Force the high reservoir can lift, ``P_high A_a``, N.
+    """
+    if force.max(initial=0.0) < limit:
+        return command
+    return np.where((force >= limit) & (command > 0.0), 0.0, command)

@@ -8,19 +8,22 @@ effort into the master's height; the cells around follow the blister's profile.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..actuator import Actuator
+from ..layout import ON_THE_SIDE
 from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import Parameters, quantity
 from .blister import Blister
-from .servo import Servo
+from .master_cell import MasterCell
+from .servo import Servo, locked_under_overload
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl"]
 
@@ -28,6 +31,9 @@ Floats = NDArray[np.float64]
 
 #: Modes of cells outside the blister: not formed, formed.
 OUTSIDE = np.array([Mode.REST, Mode.HOLD], np.int8)
+EDGE, BLISTER, SPRING, FORCE_FOLLOW, FROZEN = (
+    np.int8(mode) for mode in (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
+)
 
 
 class Phase(IntEnum):
@@ -38,8 +44,7 @@ class Phase(IntEnum):
     SHAPING = 2
 
 
-@dataclass(frozen=True)
-class Master:
+class Master(NamedTuple):
     """The controller's memory.
 
     Attributes
@@ -47,8 +52,8 @@ class Master:
     phase : Phase
     x, y, height : float
         Where the master is, m.
-    lag : tuple of float
-        State rows of its own valve.
+    opening : float
+        Of its own valve.
     reference : float
         Surface height at first touch, from which the virtual spring is pressed down, m.
     edge : float
@@ -67,7 +72,7 @@ class Master:
     x: float = 0.0
     y: float = 0.0
     height: float = 0.0
-    lag: tuple[float, ...] = ()
+    opening: float = 0.0
     reference: float = 0.0
     edge: float = 0.0
     anchor_x: float = 0.0
@@ -115,14 +120,11 @@ class VirtualMasterControl:
     actuator : Actuator
         The cells' cylinders.
     lift : float
-        Pressure of the high reservoir: no cell can lift more, Pa.
+        Force the high reservoir can lift, N.
     period : float
         Control period, s.
-    model : callable
-        VM Model: moves the rows of an unloaded real cell, (r, 1), on by one period of a
-        held command, (1, 1), in place.
-    model_rows : int
-        Number r of those rows: height, m, and the valve's.
+    model : MasterCell
+        The master's own cylinder and valve.
     """
 
     parameters: VirtualMaster
@@ -130,47 +132,46 @@ class VirtualMasterControl:
     actuator: Actuator
     lift: float
     period: float
-    model: Callable[[Floats, Floats], None]
-    model_rows: int
+    model: MasterCell
 
     name = "virtual_master"
 
-    @property
+    @cached_property
     def servo(self) -> Servo:
         """The cells' height control."""
         return Servo(self.parameters.position_gain, self.parameters.dead_band)
 
     def begin(self) -> Master:
         """Return the memory before a session."""
-        return Master(lag=(0.0,) * (self.model_rows - 1))
+        return Master()
 
     def attend(self, memory: Master, touched: Measurement) -> tuple[Master, tuple[float, float, float] | None]:
         """Locate the finger and move the master; see `places.Controller`."""
-        master = self._lead(self._locate(memory, touched), float(touched.force.sum()))
+        force = float(touched.force.sum()) if touched.force.size else 0.0
+        master = self._locate(memory, touched, force)
         if master.phase is Phase.IDLE:
             return master, None
+        master = self._lead(master, force)
         return master, (master.x, master.y, self.blister.edge_radius)
 
-    def _locate(self, master: Master, touched: Measurement) -> Master:
+    def _locate(self, master: Master, touched: Measurement, total: float) -> Master:
         """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13)."""
-        force, x, y = touched.force, touched.x, touched.y
-        total = float(force.sum())
         if total < self.parameters.felt_force:
             return self._alone(master)
+        place, force = touched.place, touched.force
         if master.phase is not Phase.IDLE:
-            near = (x - master.x) ** 2 + (y - master.y) ** 2 <= self.parameters.radius**2
-            felt = float(force @ near)
+            square = np.dot([master.x**2 + master.y**2, -2 * master.x, -2 * master.y, 1.0, 0.0, 1.0], place)
+            near = force * (square <= self.parameters.radius**2 * (1.0 + ON_THE_SIDE))
+            felt, x, y = np.dot(place[:3], near).tolist()
             if felt >= self.parameters.felt_force:
-                weight = force * near / felt
-                return self._turned(replace(master, x=float(weight @ x), y=float(weight @ y), alone=0))
+                return self._turned(master, x / felt, y / felt)
             # The finger has jumped out of reach: this is a new touch elsewhere.
-            master = replace(master, losses=master.losses + 1)
-        weight = force / total
-        at_x, at_y, surface = float(weight @ x), float(weight @ y), float(weight @ touched.height)
+            master = master._replace(losses=master.losses + 1)
+        _, x, y = (np.dot(place[:3], force) / total).tolist()
+        surface = float(force @ touched.height) / total
         return Master(
-            Phase.SPRING, at_x, at_y, surface, (0.0,) * (self.model_rows - 1), reference=surface, edge=surface,
-            anchor_x=at_x, anchor_y=at_y, losses=master.losses,
-        )  # fmt: skip
+            Phase.SPRING, x, y, surface, 0.0, reference=surface, edge=surface, anchor_x=x, anchor_y=y, losses=master.losses
+        )
 
     def _alone(self, master: Master) -> Master:
         """Count the periods without a finger; give it up after the loss time."""
@@ -178,70 +179,74 @@ class VirtualMasterControl:
             return master
         alone = master.alone + 1
         if alone * self.period <= self.parameters.loss_time:
-            return replace(master, alone=alone)
+            return master._replace(alone=alone)
         lost = master.phase is Phase.SHAPING
-        return replace(master, phase=Phase.IDLE, alone=alone, losses=master.losses + lost)
+        return master._replace(phase=Phase.IDLE, alone=alone, losses=master.losses + lost)
 
-    def _turned(self, master: Master) -> Master:
-        """Settle the direction by distance travelled: a slow or resting finger keeps its direction."""
-        dx, dy = master.x - master.anchor_x, master.y - master.anchor_y
+    def _turned(self, master: Master, x: float, y: float) -> Master:
+        """Go to the finger; the direction is settled by distance travelled, so a resting finger keeps it."""
+        dx, dy = x - master.anchor_x, y - master.anchor_y
         way = math.hypot(dx, dy)
         if way < self.parameters.travel:
-            return master
-        return replace(master, anchor_x=master.x, anchor_y=master.y, toward_x=dx / way, toward_y=dy / way)
+            return master._replace(x=x, y=y, alone=0)
+        return master._replace(
+            x=x, y=y, alone=0, anchor_x=x, anchor_y=y, toward_x=dx / way, toward_y=dy / way
+        )
 
     def _lead(self, master: Master, force: float) -> Master:
         """VM Control and VM Model: the effort, and the height a real cell would make of it."""
-        if master.phase is Phase.IDLE:
-            return master
-        known = self.parameters
-        if master.phase is Phase.SPRING and force >= known.force_setpoint:
-            master = replace(master, phase=Phase.SHAPING)
-        if master.phase is Phase.SPRING:
+        known, phase = self.parameters, master.phase
+        if force >= known.force_setpoint:
+            phase = Phase.SHAPING
+        if phase is Phase.SPRING:
             effort = known.position_gain * (master.reference - force / known.spring_stiffness - master.height)
         else:
             effort = known.force_gain * (known.force_setpoint - force)
-        y = np.array([[master.height], *([opening] for opening in master.lag)])
-        self.model(y, np.array([[min(max(effort, -1.0), 1.0)]]))
-        return replace(master, height=float(y[0, 0]), lag=tuple(y[1:, 0].tolist()))
+        height, opening = self.model.after(master.height, master.opening, min(max(effort, -1.0), 1.0))
+        return master._replace(phase=phase, height=height, opening=opening)
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
         """Create the blister, freeze what is left behind, and follow with every cell; see `places.Controller`."""
         target, mode = seen.target, self._left_alone(seen.target)
         if memory.phase is not Phase.IDLE:
-            memory, target, mode = self._created(memory, seen, mode)
-        overload = self.actuator.pressure(seen.force) >= self.lift
-        return memory, Orders(target, mode, self.servo.command(target, seen.height, overload))
+            memory, target = self._created(memory, seen, mode)
+        command = locked_under_overload(self.servo.command(target, seen.height), seen.force, self.lift)
+        return memory, Orders(target, mode, command)
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
         formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
         return OUTSIDE.take(formed.view(np.int8))
 
-    def _created(
-        self, master: Master, seen: Measurement, mode: NDArray[np.int8]
-    ) -> tuple[Master, Floats, NDArray[np.int8]]:
-        """Blister Creation: edge heights, profile, freezing."""
-        dx, dy = seen.x - master.x, seen.y - master.y
-        distance = np.hypot(dx, dy)
-        dx *= master.toward_x
-        dy *= master.toward_y
-        ahead = dx + dy
-        inside = distance <= self.blister.radius
-        ring = (distance <= self.blister.edge_radius) & ~inside
+    def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
+        """Blister Creation: edge heights, profile, freezing; modes are set in place."""
+        blister, x, y = self.blister, master.x, master.y
+        toward_x, toward_y = master.toward_x, master.toward_y
+        square, ahead = np.dot(
+            [[x * x + y * y, -2 * x, -2 * y, 1, 0, 1], [-x * toward_x - y * toward_y, toward_x, toward_y, 0, 0, 0]],
+            seen.place,
+        )
+        distance = np.sqrt(np.abs(square, square), square)
+        inside = distance <= blister.radius * (1.0 + ON_THE_SIDE)
+        ring = distance <= blister.edge_radius * (1.0 + ON_THE_SIDE)
+        ring ^= inside
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
         facing = seen.height[ring & (ahead >= 0.0)]
         if facing.size:
-            master = replace(master, edge=float(facing.mean()))
+            master = master._replace(edge=float(facing.sum()) / facing.size)
         touched = seen.force > 0.0
-        backward = (ahead < self.parameters.behind * distance) & (distance > self.blister.flat_radius)
-        frozen = inside & ~touched & (backward | (seen.mode == Mode.FROZEN))
-        shaped = inside & ~frozen
+        backward = ahead < self.parameters.behind * distance
+        backward &= distance > blister.flat_radius
+        backward |= seen.mode == FROZEN
+        backward &= inside
+        frozen = backward > touched
+        profile = blister.height(distance, master.edge, master.height)
+        np.maximum(profile, 0.0, profile)
+        np.minimum(profile, self.actuator.stroke, profile)
         target = seen.target.copy()
-        profile = self.blister.height(distance[shaped], master.edge, master.height)
-        target[shaped] = np.minimum(np.maximum(profile, 0.0), self.actuator.stroke)
-        mode[inside] = Mode.BLISTER
-        mode[inside & touched] = Mode.FORCE_FOLLOW if master.phase is Phase.SHAPING else Mode.SPRING
-        mode[ring] = Mode.EDGE
-        mode[frozen] = Mode.FROZEN
-        return master, target, mode
+        np.putmask(target, inside > frozen, profile)
+        np.putmask(mode, inside, BLISTER)
+        np.putmask(mode, inside & touched, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING)
+        np.putmask(mode, ring, EDGE)
+        np.putmask(mode, frozen, FROZEN)
+        return master, target

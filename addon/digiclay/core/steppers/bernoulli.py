@@ -23,14 +23,11 @@ from ..contact import LARGEST_EXPONENT, Contact
 from ..delay import Queue
 from ..physics import Cell
 from ..places import Segment
-from ..touch import Touch
 
 __all__ = ["BernoulliExponential", "BernoulliPlan"]
 
 Floats = NDArray[np.float64]
 
-#: Constants as arrays: numpy takes twice as long over Python's numbers.
-ONE, HALF, NOT_ZERO = np.ones(1), np.full(1, 0.5), np.full(1, TINY)
 #: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
 GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
@@ -46,16 +43,18 @@ class BernoulliPlan:
         The s physics steps of a period.
     response : ndarray (2 s + 1, r)
         From opening and queued commands to the openings at all Gauss points, and at the end.
-    means : ndarray (s, 2 s)
-        From conductances at the Gauss points to step times mean mobility, m/Pa.
+    means, stiffness : ndarray (s, 2 s)
+        From conductances at the Gauss points to step times mean mobility, m/Pa; and to the
+        decay of `closed_form`.
     halfway, transition : tuple of ndarray
         The relaxation's maps, one a step.
     unloaded : callable
         Conductance of a valve without load, m³/(s Pa), from opening and reservoir pressure.
-    exponent : float
-        The contact's m, 1/m.
-    to_load, to_decay : float
-        Pressure a unit (b/m) of tension makes, Pa; stiffness ``f_d b / A_a``, Pa/m.
+    constants : ndarray (9,)
+        The contact's m, 1/m, and x0, m; b/m, N, in which tensions are counted; the stroke, m;
+        the largest exponent; 1, 1/2, 0; and what stands for zero in a ratio.
+    to_load : float
+        Pressure a unit (b/m) of tension makes, Pa.
     easy : float
         Below this exponent every flow is laminar and nothing overflows.
     """
@@ -64,12 +63,12 @@ class BernoulliPlan:
     segments: tuple[Segment, ...]
     response: Floats
     means: Floats
+    stiffness: Floats
     halfway: tuple[Floats, ...]
     transition: tuple[Floats, ...]
     unloaded: Callable[[Floats, Floats], Floats]
-    exponent: float
+    constants: Floats
     to_load: float
-    to_decay: float
     easy: float
 
 
@@ -88,115 +87,106 @@ class BernoulliExponential:
         lengths = [part.length for part in segments]
         pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
         to_decay = contact.share * contact.stiffness / cell.actuator.area
-        to_load = to_decay / contact.exponent
+        m, stroke = contact.exponent, cell.actuator.stroke
+        to_load = to_decay / m
         # How far the load may drive up the drop before some flow could turn turbulent.
         spare = cell.flow.knee - max(abs(cell.supply.high), abs(cell.supply.low))
+        means = np.kron(np.diag(lengths), [0.5, 0.5]) / cell.actuator.area
         return BernoulliPlan(
             cell,
             segments,
             cell.lag.response(queue, [*times, end]),
-            np.kron(np.diag(lengths), [0.5, 0.5]) / cell.actuator.area,
+            means,
+            to_decay * means,
             tuple(pulp.halfway(h) for h in lengths),
             tuple(pulp.transition(h) for h in lengths),
             (lambda opening, _: cell.flow.laminar_conductance(opening)) if spare > 0.0 else cell.flow.conductance,
-            contact.exponent,
+            np.array([m, contact.offset, contact.stiffness / m, stroke, LARGEST_EXPONENT, 1.0, 0.5, 0.0, TINY]),
             to_load,
-            to_decay,
             min(LARGE, math.log1p(spare / to_load)) if spare > 0.0 else -math.inf,
         )
 
-    def advance(self, plan: BernoulliPlan, y: Floats, commands: Floats, under: Floats) -> None:
-        """Move a block of cells on by one control period, in place.
-
-        Parameters
-        ----------
-        plan : BernoulliPlan
-        y : ndarray (r, n)
-            State rows, see `physics.Cell`.
-        commands : ndarray (q, n)
-            Commands of the queue, oldest first.
-        under : ndarray (p, k)
-            Underside of the finger over the first k cells at the period's instants, m.
-        """
-        cell, k = plan.cell, under.shape[1]
-        lag = y[cell.lag_rows]
-        openings = plan.response @ np.concatenate([lag, commands])
-        lag[:] = openings[-1:] if cell.lag.rows else lag
+    def advance(self, plan: BernoulliPlan, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+        cell, k, height, stroke = plan.cell, under.shape[1], driven[0], plan.cell.actuator.stroke
+        openings = np.dot(plan.response, driven[cell.lag_rows.start :])
+        lag = driven[cell.lag_rows]
+        lag[:] = openings[len(openings) - len(lag) :]
         cell.lag.settle(lag)
         openings = openings[:-1]
         pressure = cell.supply.pressure(openings)
         conductance = plan.unloaded(openings, pressure)
-        free = plan.means @ (conductance * pressure)
-        _freely(y[0, k:], free[:, k:], cell.actuator.stroke)
-        if cell.touch and k:
-            _under_finger(plan, cell.touch, y[:, :k], under, openings[:, :k], conductance[:, :k], free[:, :k])
-
-
-def _freely(height: Floats, rise: Floats, stroke: float) -> None:
-    """Move untouched pins by their rise (s, n) in each step, m, in place; end stops hold them."""
-    for part in rise if _near_a_stop(height, rise, stroke) else [rise.sum(axis=0)]:
-        height += part
-        np.minimum(np.maximum(height, 0.0, height), stroke, height)
-
-
-def _near_a_stop(height: Floats, rise: Floats, stroke: float) -> bool:
-    """Tell whether some pin could meet an end stop within the period."""
-    if not height.size:
-        return False
-    way = float(np.abs(rise).max()) * len(rise)
-    return bool(height.min() < way or height.max() > stroke - way)
+        pressure *= conductance
+        free = np.dot(plan.means, pressure)
+        if k:
+            _under_finger(plan, driven[:, :k], under, openings[:, :k], conductance[:, :k], free[:, :k])
+        untouched = height[k:]
+        for rise in free[:, k:]:
+            untouched += rise
+            np.maximum(untouched, 0.0, untouched)
+            np.minimum(untouched, stroke, untouched)
 
 
 def _under_finger(
-    plan: BernoulliPlan, touch: Touch, y: Floats, under: Floats, openings: Floats, conductance: Floats, free: Floats
+    plan: BernoulliPlan, y: Floats, under: Floats, openings: Floats, conductance: Floats, free: Floats
 ) -> None:
     """Move the cells under the finger on, step by step, and their pulp with them."""
-    contact, height, pulp = touch.contact, y[0], touch.pulp.rows
-    m, unit = contact.exponent, contact.stiffness / contact.exponent
-    decay = plan.to_decay * (plan.means @ conductance) + TINY
-    slip = m * (free - (under[1:] - under[:-1]))
-    floor = m * (under + contact.offset)
+    height, k, pulp = y[0], y.shape[1], plan.cell.pulp_rows.stop - 1
+    # Numpy takes two operands of one shape three times as fast as an array and a number.
+    m, offset, unit, stroke, most, one, half, zero, tiny = plan.constants.repeat(k).reshape(-1, k)
+    decay = np.dot(plan.stiffness, conductance)
+    decay += tiny
+    lift = under[1:] - under[:-1]
+    slip = free - lift
+    slip *= m
+    floor = under + offset
+    floor *= m
     # Tensions in units of b/m: the filters, then T at the start, on average and at the end of a step.
-    work = np.empty((pulp + 3, height.size))
+    work = np.empty((pulp + 3, k))
     filters, first, mean, last = work[:pulp], work[pulp], work[pulp + 1], work[pulp + 2]
     np.divide(y[plan.cell.pulp_rows], unit, filters)
-    exponent = m * height - floor[0]
-    grown = _grown(exponent)
+    exponent = m * height
+    exponent -= floor[0]
+    grown = _grown(exponent, zero, most)
     easy = _easy(plan, exponent, slip, decay, filters)
     for s in range(len(plan.segments)):
-        np.subtract(grown, ONE, first)
-        relaxed = plan.halfway[s] @ work[: pulp + 1]
-        relaxed += ONE
-        loaded = grown > relaxed
+        np.subtract(grown, one, first)
+        relaxed = np.dot(plan.halfway[s], work[: pulp + 1])
+        relaxed += one
+        idle = grown <= relaxed
         if not easy:
-            decay[s], free[s] = _loaded_valve(plan, s, openings, exponent, relaxed, under[s + 1] - under[s])
-            slip[s] = m * (free[s] - (under[s + 1] - under[s]))
+            decay[s], free[s] = _loaded_valve(plan, s, openings, exponent, relaxed, lift[s])
+            slip[s] = m * (free[s] - lift[s])
         growth = decay[s] * relaxed
         growth += slip[s]
-        growth += NOT_ZERO
+        growth += tiny
         if easy:
             relief = pressed(grown, growth, decay[s])
             rate = relief / decay[s]
         else:
             relief, rate = careful(exponent, growth, decay[s])
-        way = np.where(loaded, growth - relief, slip[s])
-        crossing = (exponent + way > np.log(relaxed)) != loaded
-        if crossing.any():
+        way = growth - relief
+        np.putmask(way, idle, slip[s])
+        crossing = (exponent + way <= np.log(relaxed)) != idle
+        if np.count_nonzero(crossing):
             parts = (values[crossing] for values in (exponent, slip[s], decay[s], relaxed))
             way[crossing], rate[crossing] = crossed(*parts)
-            loaded |= crossing
+            idle[crossing] = False
         way -= slip[s]
         way /= m
         way += free[s]
         height += way
-        np.minimum(np.maximum(height, 0.0, height), plan.cell.actuator.stroke, height)
-        exponent = m * height
+        np.maximum(height, zero, height)
+        np.minimum(height, stroke, height)
+        np.multiply(m, height, exponent)
         exponent -= floor[s + 1]
-        grown = _grown(exponent)
-        np.subtract(grown, ONE, last)
-        rate -= ONE
-        mean[:] = np.where(loaded, rate, (first + last) * HALF)
-        filters[:] = plan.transition[s] @ work
+        grown = _grown(exponent, zero, most)
+        np.subtract(grown, one, last)
+        np.add(first, last, mean)
+        mean *= half
+        rate -= one
+        np.putmask(mean, ~idle, rate)
+        filters[:] = np.dot(plan.transition[s], work)
     np.multiply(filters, unit, y[plan.cell.pulp_rows])
 
 
@@ -210,9 +200,11 @@ def _easy(plan: BernoulliPlan, exponent: Floats, slip: Floats, decay: Floats, fi
     return steepest + float(decay.max()) * pulp < LARGE
 
 
-def _grown(exponent: Floats) -> Floats:
+def _grown(exponent: Floats, zero: Floats | float = 0.0, most: Floats | float = LARGEST_EXPONENT) -> Floats:
     """Return exp(e), 1 where there is a gap."""
-    return np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
+    grown = np.maximum(exponent, zero)
+    np.minimum(grown, most, grown)
+    return np.exp(grown, grown)
 
 
 def _loaded_valve(
@@ -229,9 +221,9 @@ def _loaded_valve(
     for _ in range(2):
         load = plan.to_load * np.maximum(middle - relaxed, 0.0)
         conductance = plan.cell.flow.conductance(openings[part], pressure - load)
-        decay = plan.to_decay * (plan.means[s, part] @ conductance) + TINY
+        decay = plan.stiffness[s, part] @ conductance + TINY
         free = plan.means[s, part] @ (conductance * pressure)
-        slip = plan.exponent * (free - lift)
+        slip = plan.constants[0] * (free - lift)
         growth = slip + decay * relaxed + TINY
         relief, _ = careful(exponent, growth, decay)
         way = np.where(grown > relaxed, growth - relief, slip)

@@ -37,20 +37,10 @@ class RungeKutta4:
         """Work out once what all periods share."""
         return RungeKuttaPlan(cell, queue, segments)
 
-    def advance(self, plan: RungeKuttaPlan, y: Floats, commands: Floats, under: Floats) -> None:
-        """Move a block of cells on by one control period, in place.
-
-        Parameters
-        ----------
-        plan : RungeKuttaPlan
-        y : ndarray (r, n)
-            State rows, see `physics.Cell`.
-        commands : ndarray (q, n)
-            Commands of the queue, oldest first.
-        under : ndarray (p, k)
-            Underside of the finger over the first k cells at the period's instants, m.
-        """
-        cell, height = plan.cell, y[0]
+    def advance(self, plan: RungeKuttaPlan, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+        cell, height = plan.cell, driven[0]
+        y, commands = driven[: cell.rows], driven[cell.rows :]
         for part in plan.segments:
             step, command = part.length, commands[plan.queue.seen(part.start)]
             start, middle, end = (under[node] for node in part.nodes)

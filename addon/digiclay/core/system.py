@@ -1,0 +1,77 @@
+"""All that does not change in a session, put together for a bed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .delay import Queue
+from .layout import Grid
+from .physics import Cell
+from .places import Controller, Segment, Sensors, Stepper
+from .state import Rows
+
+__all__ = ["System", "segments"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """All that does not change in a session.
+
+    Attributes
+    ----------
+    grid : Grid
+    cell : Cell
+    sensors : Sensors
+    controller : Controller or None
+        None: every valve stays shut.
+    stepper : Stepper
+    plan : object
+        What the stepper works out once for all periods.
+    period : float
+        Control period, s.
+    fastest : float
+        No pin rises faster, m/s.
+    instants : ndarray (p,)
+        Times into the period at which the finger's pose is needed, first 0, last `period`, s.
+    rows : Rows
+    """
+
+    grid: Grid
+    cell: Cell
+    sensors: Sensors
+    controller: Controller | None
+    stepper: Stepper
+    plan: Any
+    period: float
+    fastest: float
+    instants: Floats
+    rows: Rows
+
+
+def segments(stepper: Stepper, queue: Queue, period: float, step: float) -> tuple[tuple[Segment, ...], Floats]:
+    """Cut a control period into physics steps, also where the valve goes over to the next command.
+
+    Returns
+    -------
+    segments : tuple of Segment
+    instants : ndarray (p,)
+        When the stepper needs the finger's pose, s.
+    """
+    count = max(1, round(period / step))
+    times = {round(i * period / count, 15) for i in range(count + 1)}
+    if queue.cut:
+        times = {t for t in times if abs(t - queue.cut) > 1e-9 * period} | {queue.cut}
+    edges = sorted(times)
+    pairs = list(zip(edges[:-1], edges[1:], strict=True))
+    instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
+    cut = tuple(
+        Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
+        for a, b in pairs
+    )
+    return cut, np.array(instants)
