@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .delay import Queue
+from .places import Truth
 
 __all__ = ["InstantValve", "PerfectSensors", "Unrelaxed"]
 
@@ -65,6 +66,11 @@ class Unrelaxed:
 class PerfectSensors:
     """No sensor model: the controller knows the true forces and heights."""
 
-    def measure(self, force: Floats, height: Floats) -> tuple[Floats, Floats]:
+    rows = 0
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return what is there."""
-        return force, height
+        return truth.force, truth.height
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Nothing to remember."""

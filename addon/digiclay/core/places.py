@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .delay import Queue
 
-__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Segment", "Sensors", "Stepper"]
+__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Segment", "Sensors", "Stepper", "Truth"]
 
 Floats = NDArray[np.float64]
 
@@ -66,9 +66,40 @@ class Pulp(Protocol):
 
 
 class Sensors(Protocol):
-    """What the controller gets to know of forces and heights."""
+    """What the controller gets to know of forces and heights; `own` are the state rows it owns."""
 
-    def measure(self, force: Floats, height: Floats) -> tuple[Floats, Floats]: ...
+    @property
+    def rows(self) -> int: ...
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
+        ...
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Bring `own` up to date, in place, with what there is at the end of a period."""
+        ...
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What there is to be measured, of some cells, between two control periods.
+
+    Attributes
+    ----------
+    cells : ndarray of int (m,)
+    period : int
+        Number of control periods done.
+    force, height : ndarray (m,)
+        N, m.
+    command : ndarray (m,)
+        Valve command of the period before.
+    """
+
+    cells: NDArray[np.intp]
+    period: int
+    force: Floats
+    height: Floats
+    command: Floats
 
 
 class Stepper(Protocol):
@@ -134,6 +165,8 @@ class Measurement:
     target : ndarray (m,)
         Height they are commanded to, m.
     mode : ndarray (m,) of int8
+    own : ndarray (rows, m)
+        What the controller remembers of each cell; brought up to date in place.
     """
 
     place: Floats
@@ -141,6 +174,7 @@ class Measurement:
     force: Floats
     target: Floats
     mode: NDArray[np.int8]
+    own: Floats
 
 
 @dataclass(frozen=True)
@@ -157,6 +191,11 @@ class Controller(Protocol):
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        ...
 
     def begin(self) -> Any:
         """Return the memory before a session."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import DivergenceError
 from .fingertip import underside
 from .gathering import taking_part
-from .places import Measurement
+from .places import Measurement, Truth
 from .state import Gathered, State, at_rest
 from .system import System
 from .touch import Approach, approach, force
@@ -75,9 +75,12 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
     if not held.cells.size:
         return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
     under = _underside(system, finger, held)
-    memory = _command(system, memory, held)
+    memory = _command(system, state, memory)
     system.stepper.advance(system.plan, held.block[system.rows.driven], under)
     _feel(system, held, under)
+    system.sensors.update(
+        held.block[system.rows.sensed], _truth(system, held, state.period + 1, held.cells.size)
+    )
     _check_finite(system, state)
     return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
 
@@ -86,14 +89,25 @@ def _attend(system: System, state: State) -> tuple[Any, tuple[float, float, floa
     """Let the controller take in the cells under the finger; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
-    return system.controller.attend(state.memory, _measured(system, state.gathered, state.gathered.near))
+    return system.controller.attend(state.memory, _measured(system, state, state.gathered.near))
 
 
-def _measured(system: System, held: Gathered, count: int) -> Measurement:
+def _truth(system: System, held: Gathered, period: int, count: int) -> Truth:
+    """Return what there is to be measured of the first `count` gathered cells."""
+    rows, block = system.rows, held.block
+    return Truth(
+        held.cells[:count], period, block[rows.force, :count], block[0, :count], block[rows.command, :count]
+    )
+
+
+def _measured(system: System, state: State, count: int) -> Measurement:
     """Measure the first `count` of the gathered cells."""
-    rows, block = system.rows, held.block[:, :count]
-    felt, height = system.sensors.measure(block[rows.force], block[0])
-    return Measurement(held.place[:, :count], height, felt, block[rows.target], held.mode[:count])
+    rows, held = system.rows, state.gathered
+    block = held.block[:, :count]
+    force, height = system.sensors.measure(block[rows.sensed], _truth(system, held, state.period, count))
+    return Measurement(
+        held.place[:, :count], height, force, block[rows.target], held.mode[:count], block[rows.controlled]
+    )
 
 
 def _underside(system: System, finger: Approach | None, held: Gathered) -> Floats:
@@ -103,12 +117,12 @@ def _underside(system: System, finger: Approach | None, held: Gathered) -> Float
     return underside(finger.inward, finger.middle, finger.half, held.place[:, : held.near])
 
 
-def _command(system: System, memory: Any, held: Gathered) -> Any:
+def _command(system: System, state: State, memory: Any) -> Any:
     """Let the controller command the gathered cells, and queue the commands; return its memory."""
     if system.controller is None:
         return memory
-    rows = system.rows
-    memory, orders = system.controller.command(memory, _measured(system, held, held.cells.size))
+    rows, held = system.rows, state.gathered
+    memory, orders = system.controller.command(memory, _measured(system, state, held.cells.size))
     held.block[rows.target] = orders.target
     held.mode[:] = orders.mode
     commands = held.block[rows.commands]

@@ -29,11 +29,14 @@ class Rows:
 
     The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
     then come the commands on their way to the valve, oldest first; the height a cell is
-    commanded to, m; and the force on it at the end of the last period, N.
+    commanded to, m; the force on it at the end of the last period, N; and what the
+    controller and the sensors remember of each cell.
     """
 
     physics: int
     queue: int
+    control: int = 0
+    sensors: int = 0
 
     @cached_property
     def driven(self) -> slice:
@@ -63,7 +66,17 @@ class Rows:
     @cached_property
     def count(self) -> int:
         """Number of rows."""
-        return self.physics + self.queue + 2
+        return self.force + 1 + self.control + self.sensors
+
+    @cached_property
+    def controlled(self) -> slice:
+        """Rows the controller owns."""
+        return slice(self.force + 1, self.force + 1 + self.control)
+
+    @cached_property
+    def sensed(self) -> slice:
+        """Rows the sensors own."""
+        return slice(self.force + 1 + self.control, self.count)
 
 
 @dataclass(frozen=True, eq=False)

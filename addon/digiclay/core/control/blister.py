@@ -44,6 +44,6 @@ class Blister(Parameters):
             return np.exp(distance * distance * (-0.5 / self.sigma**2))
         return np.minimum((self.radius - distance) / (self.radius - self.flat_radius), 1.0)
 
-    def height(self, distance: Floats, edge: float, top: float) -> Floats:
+    def height(self, distance: Floats, edge: float, top: Floats | float) -> Floats:
         """Return ``edge + p(r) (top - edge)``, m, at distances r from the virtual master."""
         return edge + self.shape(distance) * (top - edge)

@@ -7,7 +7,6 @@ effort into the master's height; the cells around follow the blister's profile.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -24,6 +23,7 @@ from ..quantity import Parameters, quantity
 from .blister import Blister
 from .master_cell import MasterCell
 from .servo import Servo, locked_under_overload
+from .travel import Heading, ahead_of, square_distance, turned
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl"]
 
@@ -58,10 +58,8 @@ class Master(NamedTuple):
         Surface height at first touch, from which the virtual spring is pressed down, m.
     edge : float
         Height of the surface around the blister, m.
-    anchor_x, anchor_y : float
-        Where the direction of travel was last worked out, m.
-    toward_x, toward_y : float
-        Direction of travel, a unit vector; 0, 0 before the master has travelled.
+    heading : Heading
+        Which way it travels.
     alone : int
         Control periods since the finger was last felt.
     losses : int
@@ -75,10 +73,7 @@ class Master(NamedTuple):
     opening: float = 0.0
     reference: float = 0.0
     edge: float = 0.0
-    anchor_x: float = 0.0
-    anchor_y: float = 0.0
-    toward_x: float = 0.0
-    toward_y: float = 0.0
+    heading: Heading = Heading()
     alone: int = 0
     losses: int = 0
 
@@ -135,6 +130,7 @@ class VirtualMasterControl:
     model: MasterCell
 
     name = "virtual_master"
+    rows = 0
 
     @cached_property
     def servo(self) -> Servo:
@@ -160,17 +156,20 @@ class VirtualMasterControl:
             return self._alone(master)
         place, force = touched.place, touched.force
         if master.phase is not Phase.IDLE:
-            square = np.dot([master.x**2 + master.y**2, -2 * master.x, -2 * master.y, 1.0, 0.0, 1.0], place)
+            square = square_distance(master.x, master.y, place)
             near = force * (square <= self.parameters.radius**2 * (1.0 + ON_THE_SIDE))
             felt, x, y = np.dot(place[:3], near).tolist()
             if felt >= self.parameters.felt_force:
-                return self._turned(master, x / felt, y / felt)
+                x, y = x / felt, y / felt
+                return master._replace(
+                    x=x, y=y, alone=0, heading=turned(master.heading, x, y, self.parameters.travel)
+                )
             # The finger has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
         _, x, y = (np.dot(place[:3], force) / total).tolist()
         surface = float(force @ touched.height) / total
         return Master(
-            Phase.SPRING, x, y, surface, 0.0, reference=surface, edge=surface, anchor_x=x, anchor_y=y, losses=master.losses
+            Phase.SPRING, x, y, surface, 0.0, reference=surface, edge=surface, heading=Heading(x, y), losses=master.losses
         )
 
     def _alone(self, master: Master) -> Master:
@@ -182,16 +181,6 @@ class VirtualMasterControl:
             return master._replace(alone=alone)
         lost = master.phase is Phase.SHAPING
         return master._replace(phase=Phase.IDLE, alone=alone, losses=master.losses + lost)
-
-    def _turned(self, master: Master, x: float, y: float) -> Master:
-        """Go to the finger; the direction is settled by distance travelled, so a resting finger keeps it."""
-        dx, dy = x - master.anchor_x, y - master.anchor_y
-        way = math.hypot(dx, dy)
-        if way < self.parameters.travel:
-            return master._replace(x=x, y=y, alone=0)
-        return master._replace(
-            x=x, y=y, alone=0, anchor_x=x, anchor_y=y, toward_x=dx / way, toward_y=dy / way
-        )
 
     def _lead(self, master: Master, force: float) -> Master:
         """VM Control and VM Model: the effort, and the height a real cell would make of it."""
@@ -220,13 +209,10 @@ class VirtualMasterControl:
 
     def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        blister, x, y = self.blister, master.x, master.y
-        toward_x, toward_y = master.toward_x, master.toward_y
-        square, ahead = np.dot(
-            [[x * x + y * y, -2 * x, -2 * y, 1, 0, 1], [-x * toward_x - y * toward_y, toward_x, toward_y, 0, 0, 0]],
-            seen.place,
-        )
-        distance = np.sqrt(np.abs(square, square), square)
+        blister = self.blister
+        distance = square_distance(master.x, master.y, seen.place)
+        np.sqrt(distance, distance)
+        ahead = ahead_of(master.heading, master.x, master.y, seen.place)
         inside = distance <= blister.radius * (1.0 + ON_THE_SIDE)
         ring = distance <= blister.edge_radius * (1.0 + ON_THE_SIDE)
         ring ^= inside

@@ -1,0 +1,228 @@
+"""Method II: every cell decides by its own force what it is (Fig. 5 of the paper).
+
+No coordinator: a cell pressed hard enough follows the force, its neighbours become a blister
+around it, those of them that feel the finger follow the force in turn, and so the contact
+set spreads and moves with the finger.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..errors import ParameterError
+from ..layout import ON_THE_SIDE
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import Parameters, quantity
+from .blister import Blister
+from .servo import Servo, locked_under_overload
+from .transitions import BY_FORCE, BY_PLACE, changed
+from .travel import Heading, ahead_of, square_distance, turned
+
+__all__ = ["CellStates", "CellStatesControl", "Patch"]
+
+Floats = NDArray[np.float64]
+Modes = NDArray[np.int8]
+
+
+class Patch(NamedTuple):
+    """The controller's memory: where the finger presses, and which way it travels.
+
+    Attributes
+    ----------
+    x, y : float
+        Centroid of the forces when last felt, m.
+    heading : Heading
+        Which way it travels.
+    edge : float
+        Height of the surface around the blister, m.
+    felt : bool
+        Whether some cell is under the finger.
+    losses : int
+        How often the finger was lost.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: Heading = Heading()
+    edge: float = 0.0
+    felt: bool = False
+    losses: int = 0
+
+
+@dataclass(frozen=True)
+class CellStates(Parameters):
+    """Gains and thresholds of Method II, all of them per cell."""
+
+    force_setpoint: float = quantity(0.04, "force held under the finger", unit="N", symbol="F_ref", above=0.0)
+    spring_trigger: float = quantity(
+        0.06, "force at which a cell at rest starts to follow", unit="N", symbol="F_trig^VS", above=0.0
+    )
+    blister_trigger: float = quantity(
+        0.015, "force at which a cell of the blister starts to follow", unit="N", symbol="F_trig^blister", above=0.0
+    )
+    critical_trigger: float = quantity(
+        0.005, "force below which a following cell is critical", unit="N", symbol="F_trig^crit", above=0.0
+    )
+    critical_time: float = quantity(
+        50e-3, "time after which a critical cell is given up", unit="s", symbol="t_crit", at_least=0.0
+    )
+    spring_stiffness: float = quantity(20.0, "virtual spring", unit="N/m", symbol="k_VS", above=0.0)
+    position_gain: float = quantity(500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0)
+    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+    force_gain: float = quantity(15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0)
+    rise: float = quantity(
+        1e-3, "how much higher the blister stands, so as to feel the finger", unit="m", symbol="h_rise", at_least=0.0
+    )
+    jump: float = quantity(
+        8e-3, "way in a control period beyond which the finger was lost", unit="m", symbol="r_VM", source="P", above=0.0
+    )
+    travel: float = quantity(
+        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
+    )
+    behind: float = quantity(-0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0)
+
+    def check(self) -> None:
+        """A blister cell starts to follow before one at rest does, and is critical below that."""
+        if not self.blister_trigger < self.spring_trigger:
+            rule = f"must be below spring_trigger, {self.spring_trigger:g} N"
+            raise ParameterError("CellStates", "blister_trigger", rule, f"{self.blister_trigger:g} N")
+        if not self.critical_trigger < self.blister_trigger:
+            rule = f"must be below blister_trigger, {self.blister_trigger:g} N"
+            raise ParameterError("CellStates", "critical_trigger", rule, f"{self.critical_trigger:g} N")
+
+
+@dataclass(frozen=True)
+class CellStatesControl:
+    """Method II, put together for a bed.
+
+    Attributes
+    ----------
+    parameters : CellStates
+    blister : Blister
+        Its radii count from the nearest cell under the finger.
+    actuator : Actuator
+        The cells' cylinders.
+    lift : float
+        Force the high reservoir can lift, N.
+    period : float
+        Control period, s.
+    """
+
+    parameters: CellStates
+    blister: Blister
+    actuator: Actuator
+    lift: float
+    period: float
+
+    name = "cell_states"
+    #: A cell remembers how many periods it has been critical.
+    rows = 1
+
+    @cached_property
+    def servo(self) -> Servo:
+        """The cells' height control."""
+        return Servo(self.parameters.position_gain, self.parameters.dead_band)
+
+    def begin(self) -> Patch:
+        """Return the memory before a session."""
+        return Patch()
+
+    def attend(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
+        """Find where the finger presses, and how far its blister can reach; see `places.Controller`."""
+        pressed = touched.force > 0.0
+        if not np.count_nonzero(pressed):
+            return memory, None
+        force, place = touched.force[pressed], touched.place[:, pressed]
+        total, x, y = np.dot(place[:3], force).tolist()
+        x, y = x / total, y / total
+        radius = math.sqrt(float(square_distance(x, y, place).max()))
+        if not memory.felt:
+            edge = float(np.dot(force, touched.height[pressed])) / total
+            memory = memory._replace(heading=Heading(x, y), edge=edge)
+        elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
+            memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
+        heading = turned(memory.heading, x, y, self.parameters.travel)
+        return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
+
+    def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
+        """Let every cell follow its arrows, then act as its mode says; see `places.Controller`."""
+        mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
+        under = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
+        target = seen.target.copy()
+        np.putmask(target, under, seen.height)
+        if np.count_nonzero(under):
+            memory, mode, target = self._around(memory, seen, mode, under, target)
+            memory = memory._replace(felt=True)
+        else:
+            gone = {"in_blister": under, "left_behind": under, "at_edge": under, "outside": ~under}
+            mode = changed(mode, BY_PLACE, gone)
+            memory = memory._replace(felt=False, losses=memory.losses + memory.felt)
+        mode = self._resting(mode, target, seen.force)
+        seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
+        return memory, Orders(target, mode, self._commands(seen, mode, target, under))
+
+    def _by_force(self, seen: Measurement) -> dict[str, NDArray[np.bool_]]:
+        """Return the conditions of `BY_FORCE`."""
+        known, force = self.parameters, seen.force
+        return {
+            "above_spring_trigger": force >= known.spring_trigger,
+            "above_blister_trigger": force >= known.blister_trigger,
+            "below_critical_trigger": force < known.critical_trigger,
+            "above_critical_trigger": force >= known.critical_trigger,
+            "timed_out": (force < known.critical_trigger) & (seen.own[0] * self.period >= known.critical_time),
+        }
+
+    def _around(
+        self, memory: Patch, seen: Measurement, mode: Modes, under: NDArray[np.bool_], target: Floats
+    ) -> tuple[Patch, Modes, Floats]:
+        """Form the blister around the cells under the finger: their neighbourhoods superposed."""
+        blister, place = self.blister, seen.place
+        distance = np.sqrt(square_distance(place[1, under], place[2, under], place))
+        nearest = distance.min(axis=0)
+        in_blister = nearest < blister.radius * (1.0 - ON_THE_SIDE)
+        at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - ON_THE_SIDE))
+        ahead = ahead_of(memory.heading, memory.x, memory.y, place)
+        facing = seen.height[at_edge & (ahead >= 0.0)]
+        if facing.size:
+            memory = memory._replace(edge=float(facing.mean()))
+        from_patch = np.sqrt(square_distance(memory.x, memory.y, place))
+        left_behind = (ahead < self.parameters.behind * from_patch) & (nearest > blister.flat_radius)
+        left_behind &= in_blister
+        conditions = {
+            "in_blister": in_blister,
+            "left_behind": left_behind,
+            "at_edge": at_edge,
+            "outside": ~(in_blister | at_edge),
+        }
+        mode = changed(mode, BY_PLACE, conditions)
+        weight = np.maximum(blister.shape(distance), 0.0)
+        top = np.dot(seen.height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
+        shape = blister.height(nearest, memory.edge, top + self.parameters.rise)
+        shape = np.minimum(np.maximum(shape, 0.0), self.actuator.stroke)
+        np.putmask(target, mode == Mode.BLISTER, shape)
+        return memory, mode, target
+
+    def _resting(self, mode: Modes, target: Floats, force: Floats) -> Modes:
+        """Tell apart the cells on a virtual spring: pressed, holding a formed height, or at rest."""
+        spring = mode <= Mode.HOLD
+        spring |= mode == Mode.SPRING
+        formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
+        kind = np.where(force > 0.0, np.int8(Mode.SPRING), np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST)))
+        return np.where(spring, kind, mode)
+
+    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: NDArray[np.bool_]) -> Floats:
+        """Return valve commands: force control under the finger, springs and profile elsewhere."""
+        known = self.parameters
+        springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
+        command = self.servo.command(target - springs * seen.force / known.spring_stiffness, seen.height)
+        follow = known.force_gain * (known.force_setpoint - seen.force)
+        np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
+        return locked_under_overload(command, seen.force, self.lift)

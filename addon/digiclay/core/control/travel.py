@@ -1,0 +1,64 @@
+"""Which way the finger travels, and which cells it leaves behind (Fig. 6 of the paper).
+
+The direction is settled by distance travelled, not by speed: a finger that slows down or
+rests keeps its direction, and what it has formed is not called back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Heading", "ahead_of", "square_distance", "turned"]
+
+Floats = NDArray[np.float64]
+
+
+class Heading(NamedTuple):
+    """Where the direction was last settled, m, and the direction: a unit vector, 0, 0 before any travel."""
+
+    x: float = 0.0
+    y: float = 0.0
+    toward_x: float = 0.0
+    toward_y: float = 0.0
+
+
+def turned(heading: Heading, x: float, y: float, travel: float) -> Heading:
+    """Return the heading of a finger that is now at x, y, m; new once it has travelled `travel`, m."""
+    dx, dy = x - heading.x, y - heading.y
+    way = math.hypot(dx, dy)
+    return heading if way < travel else Heading(x, y, dx / way, dy / way)
+
+
+def ahead_of(heading: Heading, x: float, y: float, place: Floats) -> Floats:
+    """Return how far cells lie ahead of a point, m; negative behind it, 0 before any travel.
+
+    Parameters
+    ----------
+    heading : Heading
+    x, y : float
+        The point, m.
+    place : ndarray (6, m)
+        Rows 1, x, y, ... of the cells.
+    """
+    _, _, toward_x, toward_y = heading
+    return np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], place[:3])
+
+
+def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
+    """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
+
+    Parameters
+    ----------
+    x, y : float or ndarray (s,)
+        m.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of the cells.
+    """
+    one = x * 0.0 + 1.0
+    form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
+    square = np.dot(form, place)
+    return np.maximum(square, 0.0, square)
