@@ -1,37 +1,115 @@
-"""From a scene to the system that simulates it: each place gets its part, or a stand-in that does nothing."""
+"""From a scene to the system that simulates it: each place gets its part, or a stand-in that does nothing.
+
+Modules of parts that a scene may leave out are imported where the part is put in.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from .delay import Queue, queue
 from .layout import grid
 from .physics import Cell
-from .places import Controller, Flow, Stepper
+from .places import Controller, Flow, Lag, Pulp, Segment, Sensors, Stepper
 from .scene import STEPPERS, Scene, part
 from .simulation import System, segments
 from .state import Rows
 from .touch import Touch
+from .valve import orifice
 
 __all__ = ["assemble"]
 
+Floats = NDArray[np.float64]
+
 
 def assemble(scene: Scene) -> System:
-    """Build the system of a scene, importing only the parts it has."""
+    """Build the system of a scene."""
     stepper: Stepper = part(*STEPPERS[scene.simulation.stepper])()
     period = scene.simulation.control_period
-    cell = _cell(scene)
-    line = _line(scene)
-    cut, instants = segments(stepper, line, period, scene.simulation.physics_step)
+    cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
+    line = queue(scene.delay, period) if scene.delay else Queue()
+    steps, instants = segments(stepper, line, period, scene.simulation.physics_step)
     return System(
         grid=grid(scene.layout),
         cell=cell,
-        queue=line,
-        sensors=part("absent", "PerfectSensors")(),
+        sensors=_sensors(),
         controller=_controller(scene, cell),
         stepper=stepper,
         period=period,
-        segments=cut,
+        plan=stepper.plan(cell, line, steps),
         longest_rise=period * _fastest(cell),
         instants=instants,
         rows=Rows(cell.rows, line.length),
     )
+
+
+def _flow(scene: Scene) -> Flow:
+    """Return the valve, behind it the conduit if there is one."""
+    valve = orifice(scene.valve, scene.fluid)
+    if scene.conduit is None:
+        return valve
+    from .conduit import in_series
+
+    return in_series(valve, scene.conduit, scene.fluid)
+
+
+def _lag(scene: Scene) -> Lag:
+    """Return how the valve follows its command."""
+    if scene.valve_lag:
+        return scene.valve_lag
+    from .absent import InstantValve
+
+    return InstantValve()
+
+
+def _touch(scene: Scene) -> Touch | None:
+    """Return the finger, or None."""
+    if scene.fingertip is None or scene.contact is None:
+        return None
+    return Touch(scene.fingertip, scene.contact, _pulp(scene))
+
+
+def _pulp(scene: Scene) -> Pulp:
+    """Return how the finger's pulp relaxes."""
+    if scene.relaxation:
+        return scene.relaxation
+    from .absent import Unrelaxed
+
+    return Unrelaxed()
+
+
+def _sensors() -> Sensors:
+    """Return what the controller gets to know: all there is."""
+    from .absent import PerfectSensors
+
+    return PerfectSensors()
+
+
+def _controller(scene: Scene, cell: Cell) -> Controller | None:
+    """Return the control method, or None: every valve stays shut."""
+    if scene.control is None or scene.blister is None:
+        return None
+    from .control.virtual_master import VirtualMasterControl
+    from .steppers.bernoulli import BernoulliExponential
+
+    # The master is a real cell without load. Its model belongs to the control, so it does not
+    # change with the stepper of the scene: one closed-form step a control period.
+    period, stepper = scene.simulation.control_period, BernoulliExponential()
+    bare = replace(cell, touch=None)
+    plan = stepper.plan(bare, Queue(), (Segment(0.0, period, (0, 1)),))
+    untouched = np.empty((len(stepper.nodes), 0))
+
+    def model(y: Floats, command: Floats) -> None:
+        stepper.advance(plan, y, command, untouched)
+
+    lift = scene.supply.high
+    return VirtualMasterControl(scene.control, scene.blister, scene.actuator, lift, period, model, bare.rows)
+
+
+def _fastest(cell: Cell) -> float:
+    """Return the speed at which a pin without load rises through an open valve, m/s."""
+    highest = max(cell.supply.high, cell.supply.low, 0.0)
+    return float(cell.flow.flow(np.ones(1), np.array([highest]))[0]) / cell.actuator.area

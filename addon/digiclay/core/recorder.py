@@ -77,7 +77,6 @@ class Recording:
         if self._period[self._done] != state.period:
             self._keep(self._done + 1, state)
         self._mode[self._done] = state.mode
-        self._command[self._done] = 0.0
 
     def _keep(self, row: int, state: State) -> None:
         """Copy what belongs to an instant into a row."""
@@ -106,7 +105,9 @@ def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int
 def available_memory() -> int:
     """Return how many bytes this machine can still give."""
     linux = Path("/proc/meminfo")
-    told = re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
+    told = (
+        re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
+    )
     if told:
         return int(told[1]) * 1024
     try:
@@ -142,10 +143,11 @@ def refuse_what_cannot_fit(
 def write(history: dict[str, NDArray[Any]], path: Path) -> None:
     """Write a history as an npz file that ``numpy.load`` reads.
 
-    Deflated at the quickest level: most cells are at rest, and a row repeats most of the one
-    before, so a tenth of the size costs little more time than the plain file.
+    Deflated at the quickest level, because a row repeats most of the one before. The paper's
+    session, 83 MB: 0.08 s and 83 MB plain, 0.26 s and 10 MB so, 0.48 s and 9.6 MB at the
+    default level.
     """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, array in history.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, np.ascontiguousarray(array), allow_pickle=False)
+                np.lib.format.write_array(file, np.ascontiguousarray(array), allow_pickle=False)  # type: ignore[no-untyped-call]

@@ -6,14 +6,14 @@ import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .errors import ParameterError, SceneError
 from .quantity import nearest
 from .scene import Scene
 from .scene_table import resolve
 
-__all__ = ["SAMPLES", "find", "load", "sample_names"]
+__all__ = ["SAMPLES", "Setting", "find", "load", "sample_names"]
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "sessions"
@@ -45,16 +45,26 @@ def find(word: str) -> Path:
     raise SceneError(f"{word} is neither a file nor a sample ({', '.join(sample_names())}).{asked}")
 
 
-def load(path: Path, settings: Sequence[tuple[str, str]] = (), *, option: str = "--set") -> Scene:
-    """Read a scene file.
+class Setting(NamedTuple):
+    """What an option of the command line changes of a scene file.
 
-    Parameters
+    Attributes
     ----------
-    path : Path
-    settings : sequence of (key path, value as text), optional
-        Override what the file says. A value is TOML; a text needs no quotes.
-    option : str, optional
-        What the settings are called in messages.
+    key : str
+        Section and key, ``valve.stroke``.
+    value : str
+        TOML; a text needs no quotes.
+    option : str
+        What messages call it.
+    """
+
+    key: str
+    value: str
+    option: str = "--set"
+
+
+def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
+    """Read a scene file, and let settings override what it says.
 
     Raises
     ------
@@ -63,12 +73,14 @@ def load(path: Path, settings: Sequence[tuple[str, str]] = (), *, option: str = 
     """
     table = _read(path)
     try:
-        scene = resolve(_overridden(table, settings), path.stem)
+        return resolve(_overridden(table, settings), path.stem)
     except ParameterError as error:
         if settings:
             load(path)  # a file that is wrong by itself is told of first
-        raise SceneError(f"{option if settings else path}: {error}") from None
-    return scene
+        blamed = [one.option for one in settings if one.key == f"{error.owner}.{error.field}"]
+        own = path.name if path.parent == SAMPLES else str(path)
+        origin = (blamed or [one.option for one in settings] or [own])[-1]
+        raise SceneError(f"{origin}: {error}") from None
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -89,16 +101,16 @@ def _read(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path}, line {number}: {said}.") from None
 
 
-def _overridden(table: dict[str, Any], settings: Sequence[tuple[str, str]]) -> dict[str, Any]:
+def _overridden(table: dict[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
     """Put settings into the tables of a scene file."""
-    for key, text in settings:
-        *groups, last = key.strip().split(".")
+    for key, value, _ in settings:
+        *groups, last = key.split(".")
         inner = table
         for group in groups:
             if not isinstance(inner.get(group), dict):
                 inner[group] = {}
             inner = inner[group]
-        inner[last] = _value(text)
+        inner[last] = _value(value)
     return table
 
 

@@ -46,7 +46,10 @@ def resolve(table: Table, name: str = "") -> Scene:
         Its owner is the section.
     """
     _known("", table, TOP_LEVEL)
-    texts = {key: _text(key, table.get(key, default)) for key, default in zip(TEXTS, (name, "", "paper"), strict=True)}
+    texts: dict[str, Any] = {
+        key: _text(key, table.get(key, default))
+        for key, default in zip(TEXTS, (name, "", "paper"), strict=True)
+    }
     if texts["preset"] not in PRESETS:
         raise ParameterError("preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"]))
     given = {section: _section(section, table.get(section, {})) for section in SECTIONS}
@@ -143,7 +146,9 @@ def _path(table: Any, rest_height: float) -> Path:
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
             raise ParameterError("trajectory", "waypoints", rule, _shown(rows))
-        path = Path(kind, tuple(_waypoint(f"trajectory.waypoints #{i}", row) for i, row in enumerate(rows, 1)))
+        path = Path(
+            kind, tuple(_waypoint(f"trajectory.waypoints #{i}", row) for i, row in enumerate(rows, 1))
+        )
     try:
         path.trajectory()
     except ParameterError as error:
@@ -153,6 +158,7 @@ def _path(table: Any, rest_height: float) -> Path:
 
 def _waypoint(owner: str, row: Table) -> Waypoint:
     """Read one waypoint; where it is and when has no sensible default."""
+    _known(owner, row, tuple(quantities(Waypoint)))
     for key in ("time", "position"):
         if key not in row:
             raise ParameterError(owner, key, "must be given", "none")

@@ -1,0 +1,25 @@
+"""Digital Clay: shape-design sessions on a simulated bed of fluidic pins.
+
+As a package this is the simulation (`digiclay.core`) and its command line; as a Blender
+extension it registers what shows in Blender. Importing it does no work and needs no Blender.
+"""
+
+from __future__ import annotations
+
+__all__ = ["__version__", "register", "unregister"]
+
+__version__ = "0.1.0"
+
+
+def register() -> None:
+    """Add the extension's operators and menu entries; Blender calls this when it is enabled."""
+    from . import operators
+
+    operators.register()
+
+
+def unregister() -> None:
+    """Take back all that `register` added."""
+    from . import operators
+
+    operators.unregister()

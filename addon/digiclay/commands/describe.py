@@ -1,0 +1,108 @@
+"""``digiclay describe``: what stands at each place of a scene, and what it costs."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+from ..core.assembly import assemble
+from ..core.quantity import Parameters, quantities
+from ..core.recorder import available_memory, bytes_needed
+from ..core.scene import Scene
+from ..core.simulation import System
+from .arguments import add_scene, scene_of
+
+__all__ = ["add", "description", "human"]
+
+EXAMPLES = """\
+examples:
+  digiclay describe ridge_mound_valley
+  digiclay describe my.toml --set relaxation=absent
+"""
+#: The places on the line from finger to pins, and the sections of the scene that fill them.
+PLACES = (
+    ("finger", "fingertip"), ("contact", "contact"), ("relaxation", "relaxation"), ("actuator", "actuator"),
+    ("supply", "supply"), ("fluid", "fluid"), ("valve", "valve"), ("conduit", "conduit"),
+    ("valve lag", "valve_lag"), ("dead time", "delay"), ("controller", "control"), ("blister", "blister"),
+    ("recorder", "recorder"),
+)  # fmt: skip
+#: Units people read: factor and name.
+READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s")}
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "describe", help="tell what a scene consists of", description="Tell what a scene consists of.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    add_scene(parser)
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Describe."""
+    scene, _ = scene_of(arguments)
+    print("\n".join(description(scene, assemble(scene))))
+    return 0
+
+
+def description(scene: Scene, system: System) -> Iterator[str]:
+    """Give the lines that describe a scene."""
+    yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
+    yield f"\nThe line from finger to pins (preset {scene.preset})"
+    for place, section in PLACES:
+        part = getattr(scene, section)
+        method = f"{scene.method}: " if section == "control" else ""
+        yield _filled(place, "left out" if part is None else method + _parameters(part))
+    simulation = scene.simulation
+    yield _filled("stepper", f"{system.stepper.name}, order {system.stepper.order}")
+    yield "\nThe bed"
+    layout = scene.layout
+    pitch = human(layout.pitch, "m")
+    yield f"  {layout.rows} x {layout.columns} = {scene.cells} cells, {pitch} apart, {layout.arrangement}"
+    yield "\nThe state of a cell"
+    rows = ", ".join(f"{name} ({count})" if count > 1 else name for name, count in _rows(system) if count)
+    yield f"  {system.rows.count} rows: {rows}; {8 * system.rows.count} bytes"
+    yield "\nThe session"
+    period, step = human(simulation.control_period, "s"), human(simulation.physics_step, "s")
+    yield f"  {simulation.duration:g} s, {scene.periods} control periods of {period}, physics steps of {step}"
+    points = scene.trajectory.waypoints
+    yield f"  {len(points)} waypoints, {scene.trajectory.interpolation}, the last at {points[-1].time:g} s"
+    needed, free = bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods), available_memory()
+    kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
+    yield f"  {kept}; {needed / 1e9:.2g} GB of memory needed, {free / 1e9:.3g} GB free"
+
+
+def _rows(system: System) -> Iterator[tuple[str, int]]:
+    """Give the groups of a cell's state rows, and how many each has."""
+    cell = system.cell
+    yield "height", 1
+    yield "relaxation", cell.touch.pulp.rows if cell.touch else 0
+    yield "valve", cell.lag.rows
+    yield "commands on their way", system.rows.queue
+    yield "commanded height", 1
+    yield "force", 1
+
+
+def _filled(place: str, text: str) -> str:
+    """Write what stands at a place, on as many lines as it takes."""
+    return textwrap.fill(text, 110, initial_indent=f"  {place:<11} ", subsequent_indent=" " * 14)
+
+
+def _parameters(part: Parameters) -> str:
+    """Write a part's parameters on one line."""
+    shown = []
+    for name, known in quantities(part).items():
+        value = getattr(part, name)
+        values = value if isinstance(value, tuple) else (value,)
+        shown.append(f"{name.replace('_', ' ')} {' '.join(human(one, known.unit) for one in values)}")
+    return ", ".join(shown)
+
+
+def human(value: object, unit: str) -> str:
+    """Write a value in the unit people read."""
+    factor, name = READ.get(unit, (1.0, unit))
+    return f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)

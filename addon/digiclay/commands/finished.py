@@ -1,0 +1,75 @@
+"""A finished run, read back from its folder."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import OutputError
+from ..core.scene import Scene
+from ..core.scene_file import load
+
+__all__ = ["Run", "last_touch", "read", "row_at"]
+
+#: Shape of each array of a history, t rows of n cells.
+SHAPES: dict[str, tuple[str | int, ...]] = {
+    "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
+    "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Scene and history of a run."""
+
+    folder: Path
+    scene: Scene
+    history: dict[str, NDArray[Any]]
+
+
+def read(folder: Path, *names: str) -> Run:
+    """Read a run, and of its history the arrays named.
+
+    Raises
+    ------
+    OutputError
+        When there is no run, or its files do not belong together.
+    """
+    path = folder / "history.npz"
+    if not (folder / "scene.toml").is_file():
+        raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
+    if not path.is_file():
+        raise OutputError(f"{folder} has no history.npz: its scene kept no record.")
+    scene = load(folder / "scene.toml")
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            history = {name: stored[name] for name in ("time", *names)}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
+    known = {"n": scene.cells, "t": len(history["time"])}
+    for name, array in history.items():
+        shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
+        if array.shape != shape:
+            raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {array.shape}).")
+    return Run(folder, scene, history)
+
+
+def row_at(history: Mapping[str, NDArray[Any]], time: float) -> int:
+    """Return the row nearest to a time, s, within the session."""
+    moments = history["time"]
+    if not moments[0] <= time <= moments[-1]:
+        raise OutputError(f"--time must be between {moments[0]:g} s and {moments[-1]:g} s (got {time:g} s).")
+    return int(np.argmin(np.abs(moments - time)))
+
+
+def last_touch(history: Mapping[str, NDArray[Any]]) -> int:
+    """Return the last row in which the finger touches, or the last one: there is most to be seen."""
+    touching = np.flatnonzero(history["total_force"] > 0.0)
+    return int(touching[-1]) if touching.size else len(history["time"]) - 1

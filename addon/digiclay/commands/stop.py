@@ -1,0 +1,38 @@
+"""Ctrl-C and SIGTERM ask a session to stop; what was computed is kept."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType
+from typing import Any
+
+__all__ = ["Stop"]
+
+
+class Stop:
+    """Within its block a first signal is only noted; a second one interrupts for good."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._former: dict[int, Any] = {}
+
+    def __call__(self) -> bool:
+        """Tell whether somebody asked to stop."""
+        return self.requested
+
+    def __enter__(self) -> Stop:
+        # Python takes signals in its main thread only; elsewhere nobody can ask.
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._former[number] = signal.signal(number, self._note)
+        return self
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
+
+    def __exit__(self, *raised: object) -> None:
+        for number, former in self._former.items():
+            signal.signal(number, former)

@@ -1,0 +1,75 @@
+"""Blender's module and the differences between its versions 4.2 to 5.2, in one place."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from .core.errors import DigiclayError
+
+try:
+    import bpy
+except ModuleNotFoundError as error:
+    if error.name != "bpy":
+        raise
+    raise DigiclayError(
+        "This needs Blender's Python module, bpy: install digiclay[blender] with pip, or run inside Blender."
+    ) from None
+except ImportError as error:
+    raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
+
+__all__ = ["bpy", "has_denoiser", "quiet", "scratch", "shader_nodes"]
+
+#: What a scene of ours can be made of, in the order it is taken apart.
+KINDS = (
+    "scenes", "objects", "collections", "meshes", "curves", "fonts", "lights",
+    "cameras", "materials", "worlds", "node_groups", "images",
+)  # fmt: skip
+
+
+def shader_nodes(owner: Any) -> Any:
+    """Return the node tree of a material or world; up to 4.5 it must be asked for, from 5.0 it is there."""
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
+def has_denoiser() -> bool:
+    """Tell whether this Blender was built with Cycles' denoiser; some distributions' are not."""
+    try:
+        import _cycles
+    except ImportError:
+        return False
+    return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+@contextmanager
+def scratch() -> Iterator[None]:
+    """Remove on leaving all data that was added to the open file inside the block."""
+
+    def present() -> dict[int, Any]:
+        return {item.as_pointer(): item for kind in KINDS for item in getattr(bpy.data, kind)}
+
+    before = present().keys()
+    try:
+        yield
+    finally:
+        bpy.data.batch_remove([item for key, item in present().items() if key not in before])
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep the lines Blender itself prints while rendering off the terminal."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)

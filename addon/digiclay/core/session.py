@@ -1,0 +1,184 @@
+"""A session from scene to results: run it, judge it, write its folder."""
+
+from __future__ import annotations
+
+import json
+import platform
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .assembly import assemble
+from .errors import OutputError
+from .metrics import METRICS, summary
+from .recorder import Recording, available_memory, refuse_what_cannot_fit, write
+from .scene import Scene
+from .scene_table import ABSENT, text
+from .simulation import System, begin, periods
+from .trajectory import Trajectory
+
+__all__ = ["Result", "fits", "run", "save"]
+
+History = dict[str, NDArray[Any]]
+
+#: Metrics that say nothing where no force is asked for.
+FORCE_DEVIATIONS = ("set_point", "rfd", "rfd_shaping", "rfd_session")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a session came to.
+
+    Attributes
+    ----------
+    scene : Scene
+    history : dict of ndarray, or None
+        The arrays of ``history.npz``; None without a recorder.
+    periods : int
+        Control periods done.
+    run_time : float
+        Time the simulation took, s; neither building nor writing is in it.
+    metrics : dict
+        What ``metrics.json`` holds; SI units.
+    """
+
+    scene: Scene
+    history: History | None
+    periods: int
+    run_time: float
+    metrics: dict[str, Any]
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether the session was stopped before its end."""
+        return self.periods < self.scene.periods
+
+    def summary(self) -> str:
+        """Return the session in one line."""
+        rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
+        felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
+        simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
+        end = " (incomplete: stopped)" if self.incomplete else ""
+        return f"{simulated:.1f} s simulated in {self.run_time:.2g} s ({factor:.3g} x real time){felt}{end}"
+
+
+def fits(scene: Scene, system: System) -> None:
+    """Refuse a session that cannot fit in memory, before it starts; ParameterError says what to change."""
+    refuse_what_cannot_fit(scene.recorder, system.rows, scene.cells, scene.periods, available_memory())
+
+
+def run(
+    scene: Scene,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+    versions: Mapping[str, str] | None = None,
+) -> Result:
+    """Run a scene from rest to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : callable, optional
+        Told after each control period how many are done, and of how many.
+    stopped : callable, optional
+        Asked after each control period; when it says True, the result is what there is so far.
+    versions : mapping, optional
+        What else to note as versions the run was made with.
+
+    Raises
+    ------
+    ParameterError
+        When the session cannot fit in memory.
+    DivergenceError
+        When the integration leaves the finite numbers.
+    """
+    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    fits(scene, system)
+    state = begin(system)
+    recording = Recording(scene.recorder, system.rows, state, scene.periods) if scene.recorder else None
+    started = time.perf_counter()
+    start = state
+    for state in periods(system, trajectory, start, scene.periods):
+        if recording:
+            recording.observe(state)
+        if progress:
+            progress(state.period, scene.periods)
+        if stopped and stopped():
+            break
+    took = time.perf_counter() - started
+    history: History | None = None
+    if recording:
+        recording.finish(state)
+        history = _history(scene, system, trajectory, recording)
+    return Result(
+        scene, history, state.period, took, _metrics(scene, history, state.period, took, versions or {})
+    )
+
+
+def _history(scene: Scene, system: System, trajectory: Trajectory, recording: Recording) -> History:
+    """Return the arrays of ``history.npz``."""
+    rows = recording.arrays()
+    moments = rows.pop("period") * scene.simulation.control_period
+    return {
+        "time": moments,
+        **rows,
+        "fingertip": trajectory.poses(moments),
+        "total_force": rows["force"].sum(axis=1),
+        "position": system.grid.positions,
+    }
+
+
+def _metrics(
+    scene: Scene, history: History | None, done: int, took: float, versions: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return what a run is judged by, and under what it was made."""
+    simulated = done * scene.simulation.control_period
+    known: dict[str, Any] = {
+        "scene": scene.name,
+        "incomplete": done < scene.periods,
+        "simulated": simulated,
+        "run_time": took,
+        "real_time_factor": simulated / took,
+        "control_periods": done,
+        "cells": scene.cells,
+        "method": scene.method if scene.control else ABSENT,
+        "stepper": scene.simulation.stepper,
+        "versions": {
+            **versions,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+            "system": platform.system(),
+        },
+    }
+    units = {"simulated": "s", "run_time": "s", "real_time_factor": "1"}
+    if history is not None:
+        judged = summary(history, scene.set_point or 0.0)
+        if scene.set_point is None:  # nothing was asked of the force, so nothing deviates
+            judged = {name: None if name in FORCE_DEVIATIONS else value for name, value in judged.items()}
+        known |= judged
+        units |= {name: METRICS[name][0] for name in judged}
+    return {**known, "units": units}
+
+
+def save(result: Result, folder: Path) -> None:
+    """Write ``scene.toml``, ``history.npz`` and ``metrics.json`` into an existing folder.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written.
+    """
+    try:
+        (folder / "scene.toml").write_text(text(result.scene), encoding="utf-8")
+        if result.history is not None:
+            write(result.history, folder / "history.npz")
+        judged = json.dumps(result.metrics, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "metrics.json").write_text(judged + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"Cannot write into {folder}: {error.strerror or error}.") from None

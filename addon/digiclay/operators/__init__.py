@@ -1,0 +1,27 @@
+"""What a user can do in Blender: one small file an operator, and the menus they stand in."""
+
+from __future__ import annotations
+
+from ..compat import bpy
+from . import add_bed, import_run
+
+__all__ = ["register", "unregister"]
+
+CLASSES = (add_bed.AddBed, import_run.ImportRun)
+MENUS = (("VIEW3D_MT_mesh_add", add_bed.entry), ("TOPBAR_MT_file_import", import_run.entry))
+
+
+def register() -> None:
+    """Register the operators and hang them into Blender's menus."""
+    for operator in CLASSES:
+        bpy.utils.register_class(operator)
+    for menu, entry in MENUS:
+        getattr(bpy.types, menu).append(entry)
+
+
+def unregister() -> None:
+    """Undo `register` in the opposite order."""
+    for menu, entry in reversed(MENUS):
+        getattr(bpy.types, menu).remove(entry)
+    for operator in reversed(CLASSES):
+        bpy.utils.unregister_class(operator)

@@ -1,0 +1,43 @@
+"""What the tests inside Blender share: the extension enabled and taken back, and an empty file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import digiclay
+import numpy as np
+import pytest
+from digiclay.core.layout import Layout, grid
+from digiclay.core.modes import Mode
+from digiclay.instant import Instant
+
+
+@pytest.fixture(autouse=True)
+def factory_file() -> None:
+    """Start every test from Blender's factory file: a cube, a camera, a lamp."""
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+
+
+@pytest.fixture
+def extension() -> Iterator[None]:
+    """Enable the extension and take it back: what stays registered crashes or hangs Blender at exit."""
+    digiclay.register()
+    yield
+    digiclay.unregister()
+
+
+@pytest.fixture
+def formed() -> Instant:
+    """A staggered bed in which every pin has a height of its own and every mode occurs."""
+    layout = Layout(rows=6, columns=8, arrangement="staggered")
+    bed = grid(layout)
+    codes = np.arange(bed.count) * 5 % len(Mode)
+    return Instant(
+        position=bed.positions,
+        height=0.03 + 0.02 * np.sin(np.arange(bed.count)),
+        mode=codes,
+        force=0.01 * np.arange(bed.count),
+        fingertip=np.array([0.004, -0.002, 0.055, 1.0, 0.0, 0.0, 0.0]),
+        pitch=layout.pitch,
+    )

@@ -1,0 +1,127 @@
+"""Enabling and disabling the extension, and its operators as a user runs them."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import bpy
+import digiclay
+import numpy as np
+import pytest
+from digiclay import bridge, view
+from digiclay.core.errors import OutputError
+from digiclay.core.layout import Layout, grid
+from digiclay.core.modes import Mode
+from digiclay.instant import Instant
+
+#: Positions are float32 and drawn ten times as large.
+FLOAT32 = 0.1 * 2.0**-23
+MANIFEST = Path(digiclay.__file__).with_name("blender_manifest.toml")
+
+
+def entries(menu: str) -> int:
+    """Count what add-ons have hung into a menu."""
+    draw = getattr(getattr(bpy.types, menu).draw, "_draw_funcs", [])
+    return sum(function.__module__.startswith("digiclay") for function in draw)
+
+
+def footprint() -> tuple[bool, bool, int, int]:
+    """Return what of the extension is to be found in Blender."""
+    return (
+        "MESH_OT_digital_clay_add" in dir(bpy.types),
+        "IMPORT_SCENE_OT_digital_clay_run" in dir(bpy.types),
+        entries("VIEW3D_MT_mesh_add"),
+        entries("TOPBAR_MT_file_import"),
+    )
+
+
+def test_the_extension_registers_unregisters_and_registers_again_without_a_trace() -> None:
+    assert footprint() == (False, False, 0, 0)
+    for _ in range(2):
+        digiclay.register()
+        assert footprint() == (True, True, 1, 1)
+        digiclay.unregister()
+        assert footprint() == (False, False, 0, 0)
+
+
+def test_the_manifest_and_the_package_agree() -> None:
+    manifest = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))
+    assert manifest["version"] == digiclay.__version__
+    assert manifest["id"] == "digiclay"
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+def test_the_operator_adds_the_bed_it_was_asked_for(arrangement: str) -> None:
+    done = bpy.ops.mesh.digital_clay_add(rows=4, columns=7, pitch=2.5, arrangement=arrangement)
+    assert done == {"FINISHED"}
+    bed = bpy.context.object
+    assert view.is_bed(bed)
+    cells = bridge.read_cells(bed.data)
+    wanted = grid(Layout(rows=4, columns=7, pitch=2.5e-3, arrangement=arrangement))
+    np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
+    np.testing.assert_allclose(cells["height"], 0.040, rtol=0, atol=FLOAT32)
+    assert set(cells["mode"]) == {Mode.REST}
+
+
+@pytest.mark.usefixtures("extension")
+def test_a_new_bed_stands_on_the_cursor_selected_with_its_fingertip_above_the_pins() -> None:
+    bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
+    bpy.ops.mesh.digital_clay_add()
+    bed = bpy.context.object
+    assert bpy.context.selected_objects == [bed]
+    bpy.context.view_layer.update()
+    feet = [child.matrix_world @ vertex.co for child in bed.children for vertex in child.data.vertices]
+    assert min(point.z for point in feet) == pytest.approx(3.0, abs=1e-5)  # float32 at 3 units
+    assert bridge.pose(view.fingertip_of(bed))[2] > 0.040
+
+
+@pytest.mark.usefixtures("extension")
+def test_a_bed_is_not_added_in_edit_mode() -> None:
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.mesh.digital_clay_add.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.usefixtures("extension")
+def test_an_imported_run_shows_the_row_asked_for(tmp_path: Path, formed: Instant) -> None:
+    heights = np.stack([formed.height, formed.height[::-1]])
+    (tmp_path / "scene.toml").write_text('[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n')
+    np.savez(
+        tmp_path / "history.npz",
+        time=np.array([0.0, 0.005]),
+        position=formed.position,
+        height=heights,
+        mode=np.stack([formed.mode] * 2),
+        force=np.stack([formed.force] * 2),
+        fingertip=np.stack([formed.fingertip] * 2),
+    )
+    path = str(tmp_path / "history.npz")
+    for row, wanted in ((0, heights[0]), (-1, heights[1])):
+        assert bpy.ops.import_scene.digital_clay_run(filepath=path, row=row) == {"FINISHED"}
+        cells = bridge.read_cells(bpy.context.object.data)
+        np.testing.assert_allclose(cells["height"], wanted, rtol=0, atol=FLOAT32)
+
+
+@pytest.mark.parametrize("row", [2, -3])
+def test_a_row_the_history_does_not_have_is_refused(row: int, formed: Instant) -> None:
+    names = ("height", "mode", "force", "fingertip")
+    history = {name: np.stack([getattr(formed, name)] * 2) for name in names}
+    with pytest.raises(OutputError, match=r"2 rows, 0 to 1 \(got -?\d\)"):
+        Instant.of(history | {"position": formed.position}, row)
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize("content", [None, b"", b"not a run"])
+def test_a_file_that_is_no_run_is_refused_in_one_line(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "history.npz"
+    (tmp_path / "scene.toml").write_text("")
+    if content is not None:
+        path.write_bytes(content)
+    before = len(bpy.data.objects)
+    with pytest.raises(RuntimeError, match=r"history\.npz") as caught:
+        bpy.ops.import_scene.digital_clay_run(filepath=str(path))
+    assert "Traceback" not in str(caught.value)
+    assert len(bpy.data.objects) == before

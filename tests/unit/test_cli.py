@@ -1,0 +1,243 @@
+"""The command line: exit codes, one line for each mistake, and no folder left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay import __version__
+from digiclay.cli import main
+from digiclay.commands.benchmark import PARTS
+
+SCENE = """\
+[layout]
+rows = 3
+columns = 4
+
+[trajectory]
+waypoints = [
+  { time = 0.0, position = [0, 0, 0.041] },
+  { time = 0.05, position = [0, 0, 0.038] },
+  { time = 0.1, position = [0, 0, 0.05] },
+]
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def left(folder: Path) -> list[str]:
+    """Return what lies in the folder besides the scene, hidden things too."""
+    return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")
+
+
+def test_a_run_ends_with_exit_code_0() -> None:
+    assert main(["run", "my.toml", "--quiet"]) == 0
+
+
+def test_a_run_is_written_to_a_folder_called_like_the_scene(here: Path) -> None:
+    main(["run", "my.toml", "--quiet"])
+    assert sorted(path.name for path in (here / "my").iterdir()) == [
+        "history.npz",
+        "metrics.json",
+        "scene.toml",
+    ]
+
+
+def test_a_run_prints_its_summary_and_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--out", "first"])
+    summary, where = capsys.readouterr().out.splitlines()
+    assert summary.startswith("0.1 s simulated in ")
+    assert where == "written to first"
+
+
+def test_a_quiet_run_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    assert capfd.readouterr() == ("", "")
+
+
+def test_no_progress_is_shown_where_there_is_no_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml"])
+    assert capfd.readouterr().err == ""
+
+
+def test_a_run_notes_the_version_it_was_made_with(here: Path) -> None:
+    main(["run", "my.toml", "--quiet"])
+    assert json.loads((here / "my" / "metrics.json").read_text())["versions"]["digiclay"] == __version__
+
+
+def test_a_setting_reaches_the_run(here: Path) -> None:
+    main(["run", "my.toml", "--quiet", "--set", "layout.rows=2"])
+    with np.load(here / "my" / "history.npz") as history:
+        assert history["height"].shape == (21, 8)
+
+
+def test_the_stepper_option_reaches_the_run(here: Path) -> None:
+    main(["run", "my.toml", "--quiet", "--stepper", "runge_kutta_4"])
+    assert json.loads((here / "my" / "metrics.json").read_text())["stepper"] == "runge_kutta_4"
+
+
+def test_a_run_can_be_run_again_from_its_folder(here: Path) -> None:
+    main(["run", "my.toml", "--quiet", "--out", "first"])
+    main(["run", "first", "--quiet", "--out", "second"])
+    with np.load(here / "first" / "history.npz") as one, np.load(here / "second" / "history.npz") as other:
+        assert [name for name in one.files if not np.array_equal(one[name], other[name])] == []
+
+
+MISTAKES: dict[str, tuple[list[str], str]] = {
+    "value": (["run", "my.toml", "--set", "fluid.density=0"], "--set: fluid.density must be above 0 kg/m3"),
+    "key": (["run", "my.toml", "--set", "fluid.densty=1"], "Did you mean fluid.density?"),
+    "combination": (["run", "my.toml", "--set", "layout.pitch=1 mm"], "must be at least actuator.bore"),
+    "multiple": (["run", "my.toml", "--set", "simulation.physics_step=2 ms"], "must be a whole multiple of"),
+    "duration": (["run", "my.toml", "--set", "simulation.duration=-1"], "must be at least 0 s (got -1 s)"),
+    "cells": (["run", "my.toml", "--set", "layout.columns=0"], "layout.columns must be at least 1 (got 0)"),
+    "setting": (["run", "my.toml", "--set", "nothing"], "must be KEY=VALUE (got 'nothing')"),
+    "stepper": (["run", "my.toml", "--stepper", "euler"], "--stepper: simulation.stepper must be one of"),
+    "method": (["run", "my.toml", "--method", "hand"], "--method: control.method must be one of"),
+    "memory": (
+        ["run", "my.toml", "--set", "simulation.duration=1e6", "--set", "layout.rows=10000"],
+        "free memory",
+    ),
+    "file": (["run", "other.toml"], "other.toml: there is no such file."),
+    "name": (["run", "ridge_mound_vally"], "Did you mean ridge_mound_valley?"),
+    "format": (["run", "my.toml", "--export", "stp"], "known are stl, obj, ply, glb"),
+    "surface": (
+        ["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"],
+        "needs at least 2 x 2 cells",
+    ),
+    "no record": (["run", "my.toml", "--set", "recorder=absent", "--plots"], "--plots needs a recorder"),
+    "folder": (["run", "my.toml", "--out", "my.toml"], "my.toml is a file"),
+    "no command": ([], "the following arguments are required: COMMAND"),
+    "command": (["walk"], "invalid choice: 'walk'"),
+    "no scene": (["run"], "the following arguments are required: SCENE"),
+    "description": (["describe", "my.toml", "--set", "layout.rows=0"], "layout.rows must be at least 1"),
+    "export of nothing": (["export", "nowhere"], "nowhere is no run's folder"),
+    "render of nothing": (["render", "my.toml", "--size", "3"], "must be WIDTHxHEIGHT"),
+    "repeats": (["benchmark", "session", "--repeats", "0"], "must be a whole number from 1 to 1000"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "said"), MISTAKES.values(), ids=MISTAKES.keys())
+def test_a_mistake_is_one_line_exit_code_2_and_no_folder(
+    arguments: list[str], said: str, here: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = main(arguments)
+    out, err = capfd.readouterr()
+    assert (code, out, err.count("\n"), said in err, left(here)) == (2, "", 1, True, []), err
+
+
+def test_a_file_that_is_no_toml_is_told_with_its_line(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (here / "my.toml").write_text("a = 1\nb 2\n", encoding="utf-8")
+    main(["run", "my.toml"])
+    assert capfd.readouterr().err == "my.toml, line 2: Expected '=' after a key in a key/value pair.\n"
+
+
+def test_an_older_run_is_not_touched_unless_asked(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    before = (here / "my" / "metrics.json").read_bytes()
+    code = main(["run", "my.toml", "--quiet"])
+    assert (code, (here / "my" / "metrics.json").read_bytes()) == (2, before)
+
+
+def test_an_older_run_is_replaced_when_asked(here: Path) -> None:
+    main(["run", "my.toml", "--quiet", "--plots"])
+    main(["run", "my.toml", "--quiet", "--overwrite"])
+    assert [*left(here), (here / "my" / "session.png").exists()] == ["my", False]
+
+
+def test_a_run_can_have_meshes_and_plots(here: Path) -> None:
+    main(["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots"])
+    added = {path.name for path in (here / "my").iterdir()}
+    assert {"surface.stl", "surface.obj", "session.png", "surface.png"} <= added
+
+
+def test_export_writes_the_surface_of_a_run(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    main(["export", "my", "--format", "ply,glb"])
+    assert capsys.readouterr().out.split() == [
+        os.path.join("my", "surface.ply"),
+        os.path.join("my", "surface.glb"),
+    ]
+
+
+def highest(path: Path) -> float:
+    """Return the highest z of an OBJ file."""
+    return max(float(line.split()[3]) for line in path.read_text().splitlines() if line.startswith("v "))
+
+
+def test_export_can_be_in_metres_and_of_any_instant(here: Path) -> None:
+    main(["run", "my.toml", "--quiet"])
+    main(["export", "my", "--format", "obj", "--unit", "m", "--time", "0", "--out", "meshes", "--quiet"])
+    # At rest all pins are 40 mm high; OBJ files are written to 1e-8.
+    assert highest(here / "meshes" / "surface.obj") == pytest.approx(0.04, abs=1e-8)
+
+
+@pytest.mark.parametrize("when", ["-1", "0.2", "nan", "1 mm", "soon"])
+def test_a_time_outside_the_run_is_refused(when: str, capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    code = main(["export", "my", f"--time={when}"])
+    assert (code, capfd.readouterr().err.count("\n")) == (2, 1)
+
+
+def test_a_history_that_is_damaged_is_told_as_such(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    whole = (here / "my" / "history.npz").read_bytes()
+    (here / "my" / "history.npz").write_bytes(whole[: len(whole) // 2])
+    code = main(["export", "my"])
+    said = capfd.readouterr().err
+    assert (code, said.count("\n"), "cannot be read as a run's history" in said) == (2, 1, True)
+
+
+def test_a_history_of_another_scene_is_told_as_such(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    main(["run", "my.toml", "--quiet"])
+    scene = here / "my" / "scene.toml"
+    scene.write_text(scene.read_text(encoding="utf-8").replace("rows = 3", "rows = 4"), encoding="utf-8")
+    main(["export", "my"])
+    assert "height must have the shape (21, 16) of its scene (got (21, 12))" in capfd.readouterr().err
+
+
+def test_describe_tells_what_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["describe", "my.toml", "--set", "conduit=absent"])
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [line[0] for line in lines if line[1:] == ["left", "out"]] == ["conduit"]
+
+
+def test_describe_counts_cells_periods_and_bytes(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["describe", "my.toml"])
+    out = capsys.readouterr().out
+    # Height, three filters, the valve, two commands on their way, target, force: 9 float64.
+    assert [part in out for part in ("3 x 4 = 12 cells", "20 control periods", "9 rows", "72 bytes")] == [
+        True
+    ] * 4
+
+
+def test_benchmark_gives_a_cost_for_every_part(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["benchmark", "session", "--scene", "my.toml", "--repeats", "1"])
+    lines = capsys.readouterr().out.splitlines()
+    costs = {
+        part: float(line.split("%")[0].split()[-2])
+        for part in PARTS
+        for line in lines
+        if line.startswith(f"  {part} ")
+    }
+    assert [part for part in PARTS if not costs[part] > 0.0] == []
+
+
+def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (main(["--version"]), capsys.readouterr().out) == (0, f"digiclay {__version__}\n")
+
+
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["describe"], ["export"], ["render"], ["benchmark", "session"]]
+)
+def test_help_comes_with_an_example(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, out = main([*command, "--help"]), capsys.readouterr().out
+    assert (code, f"  digiclay {' '.join(command)}" in out.partition("examples:")[2]) == (0, True)

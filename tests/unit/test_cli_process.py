@@ -1,0 +1,123 @@
+"""The command line in a process of its own: libraries that are missing, and signals."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+
+ADDON = Path(__file__).parents[2] / "addon"
+
+SCENE = """\
+[layout]
+rows = 3
+columns = 4
+
+[trajectory]
+waypoints = [
+  { time = 0.0, position = [0, 0, 0.041] },
+  { time = 0.05, position = [0, 0, 0.038] },
+  { time = 0.1, position = [0, 0, 0.05] },
+]
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def left(folder: Path) -> list[str]:
+    """Return what lies in the folder besides the scene, hidden things too."""
+    return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")
+
+
+def process(*arguments: str, block: str = "") -> subprocess.Popen[str]:
+    """Start the program in a process of its own, where a module may be missing."""
+    script = f"import sys; sys.modules.update({{name: None for name in {block.split()!r}}})\n"
+    script += "from digiclay.cli import console; console()"
+    return subprocess.Popen(
+        [sys.executable, "-c", script, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(ADDON)},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "missing", "install"),
+    [
+        (["run", "my.toml", "--render"], "bpy", "digiclay[blender]"),
+        (["run", "my.toml", "--plots"], "matplotlib", "pip install digiclay[plots]"),
+        (["run", "my.toml", "--export", "stl"], "trimesh", "pip install trimesh"),
+    ],
+)
+def test_a_missing_library_is_told_before_any_work(
+    arguments: list[str], missing: str, install: str, here: Path
+) -> None:
+    started = process(*arguments, block=missing)
+    _, err = started.communicate(timeout=60)
+    assert (started.returncode, err.count("\n"), install in err, left(here)) == (2, 1, True, []), err
+
+
+LONG = ["run", "my.toml", "--set", "simulation.duration=1e4", "--set", "recorder.every=1000", "--quiet"]
+
+
+def test_an_output_folder_that_cannot_be_used_is_told_before_any_work(here: Path) -> None:
+    (here / "my").mkdir()
+    (here / "my" / "metrics.json").touch()
+    started = process(*LONG)
+    try:
+        _, err = started.communicate(timeout=30)  # the session itself would take hours
+    finally:
+        started.kill()
+    assert (started.returncode, "is not empty" in err) == (2, True)
+
+
+def interrupted(number: int, here: Path) -> tuple[int, str]:
+    """Start a session of hours, send it a signal once it runs; return exit code and stderr."""
+    ready = here / "ready"
+    script = (
+        "import pathlib, sys\n"
+        "from digiclay.commands import run\n"
+        "begin = run.run\n"
+        "def told(*given, **more):\n"
+        f"    pathlib.Path({str(ready)!r}).touch()\n"
+        "    return begin(*given, **more)\n"
+        "run.run = told\n"
+        "from digiclay.cli import console; console()\n"
+    )
+    started = subprocess.Popen(
+        [sys.executable, "-c", script, *LONG], stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(ADDON)},
+    )  # fmt: skip
+    deadline = time.monotonic() + 30.0
+    while not ready.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    ready.unlink()
+    time.sleep(0.3)
+    started.send_signal(number)
+    _, err = started.communicate(timeout=30)
+    return started.returncode, err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_keeps_an_incomplete_run_and_exits_with_130(number: int, here: Path) -> None:
+    code, err = interrupted(number, here)
+    metrics = json.loads((here / "my" / "metrics.json").read_text(encoding="utf-8"))
+    assert (code, err, metrics["incomplete"], left(here)) == (130, "", True, ["my"])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_what_an_interrupted_run_kept_can_be_exported(here: Path) -> None:
+    interrupted(signal.SIGINT, here)
+    assert main(["export", "my", "--quiet"]) == 0

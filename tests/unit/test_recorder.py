@@ -1,0 +1,131 @@
+"""The recorder: which row holds what, how many there are, and what cannot be held at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.errors import ParameterError
+from digiclay.core.recorder import (
+    Recorder,
+    Recording,
+    available_memory,
+    bytes_needed,
+    refuse_what_cannot_fit,
+    write,
+)
+from digiclay.core.state import Rows, State, at_rest
+
+ROWS = Rows(physics=2, queue=2)
+CELLS = 3
+
+
+def after(start: State, period: int) -> State:
+    """Return a state in which every number tells the period it was made in."""
+    rows = np.zeros_like(start.rows)
+    rows[0], rows[ROWS.force], rows[ROWS.command] = 100 + period, 200 + period, 300 + period
+    return replace(start, period=period, rows=rows, mode=np.full(CELLS, period, np.int8))
+
+
+def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:
+    """Record a session that may be cut short; return the first cell's column of each array."""
+    start = at_rest(ROWS, CELLS, 0.04, None)
+    recording = Recording(Recorder(every), ROWS, start, periods)
+    last = start
+    for period in range(1, (stop or periods) + 1):
+        last = after(start, period)
+        recording.observe(last)
+    recording.finish(last)
+    arrays = recording.arrays()
+    return {name: (array if array.ndim == 1 else array[:, 0]).tolist() for name, array in arrays.items()}
+
+
+def test_the_first_row_is_the_state_before_the_session() -> None:
+    assert recorded(1, 3)["height"][0] == 0.04
+
+
+def test_a_row_is_the_state_at_its_time() -> None:
+    assert recorded(1, 3)["height"][1:] == [101.0, 102.0, 103.0]
+
+
+def test_the_force_is_the_one_at_the_time_of_the_row() -> None:
+    assert recorded(1, 3)["force"] == [0.0, 201.0, 202.0, 203.0]
+
+
+def test_a_command_stands_in_the_row_its_period_starts_with() -> None:
+    assert recorded(1, 3)["command"][:-1] == [301.0, 302.0, 303.0]
+
+
+def test_nothing_is_commanded_after_the_last_row() -> None:
+    assert recorded(1, 3)["command"][-1] == 0.0
+
+
+def test_a_mode_stands_in_the_row_its_period_starts_with_and_the_last_is_repeated() -> None:
+    assert recorded(1, 3)["mode"] == [1, 2, 3, 3]
+
+
+def test_every_second_period_makes_a_row_and_so_does_the_end() -> None:
+    assert recorded(2, 5)["period"] == [0, 2, 4, 5]
+
+
+def test_a_thinned_row_has_the_command_of_the_period_that_starts_with_it() -> None:
+    assert recorded(2, 5)["command"] == [301.0, 303.0, 305.0, 0.0]
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 4, 5, 6])
+def test_there_are_as_many_rows_as_were_announced(every: int) -> None:
+    assert len(recorded(every, 5)["period"]) == Recorder(every).rows(5)
+
+
+def test_a_session_cut_short_ends_with_the_state_it_had_reached() -> None:
+    assert recorded(3, 9, stop=4)["period"] == [0, 3, 4]
+
+
+def test_a_session_cut_short_ends_without_a_command() -> None:
+    assert recorded(3, 9, stop=4)["command"] == [301.0, 304.0, 0.0]
+
+
+def test_a_written_history_is_read_back_bit_for_bit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    history = {"height": rng.normal(size=(5, 7)), "mode": rng.integers(0, 8, (5, 7)).astype(np.int8)}
+    write(history, tmp_path / "history.npz")
+    with np.load(tmp_path / "history.npz", allow_pickle=False) as read:
+        same = {name: np.array_equal(read[name], array) for name, array in history.items()}
+    assert same == {"height": True, "mode": True}
+
+
+def test_a_written_history_is_much_smaller_than_its_arrays(tmp_path: Path) -> None:
+    heights = np.full((500, 400), 0.04)
+    write({"height": heights}, tmp_path / "history.npz")
+    # A bed at rest is the same row over and over: anything but a few per cent is not deflated.
+    assert (tmp_path / "history.npz").stat().st_size < 0.05 * heights.nbytes
+
+
+def test_a_history_that_fits_exactly_is_accepted() -> None:
+    recorder = Recorder(1)
+    refuse_what_cannot_fit(recorder, ROWS, 1000, 100, bytes_needed(recorder, ROWS, 1000, 100))
+
+
+def test_a_history_too_large_is_refused_with_what_to_change() -> None:
+    with pytest.raises(ParameterError) as caught:
+        refuse_what_cannot_fit(Recorder(1), ROWS, 1_000_000, 5200, 20_000_000_000)
+    assert str(caught.value) == (
+        "recorder.every must be at least 7 for the history to fit into 20 GB of free memory "
+        "(got 1: 5201 rows of 1000000 cells are 130 GB)."
+    )
+
+
+def test_the_recommended_thinning_fits() -> None:
+    refuse_what_cannot_fit(Recorder(7), ROWS, 1_000_000, 5200, 20_000_000_000)
+
+
+def test_a_bed_too_large_for_any_history_is_refused_as_such() -> None:
+    with pytest.raises(ParameterError, match=r"^layout.rows \* columns must be few enough for 1 GB"):
+        refuse_what_cannot_fit(Recorder(1000), ROWS, 20_000_000, 100, 1_000_000_000)
+
+
+def test_this_machine_has_some_memory() -> None:
+    # Less than this could not have started the interpreter that runs the test.
+    assert available_memory() > 10_000_000

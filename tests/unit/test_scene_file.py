@@ -1,0 +1,148 @@
+"""Scene files: found, read, overridden, and told of when they are wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from digiclay.core.errors import SceneError
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import SAMPLES, Setting, find, load, sample_names
+
+
+def scene(folder: Path, text: str, **settings: str) -> Scene:
+    """Write a scene file and read it; settings have a double underscore for the dot."""
+    path = folder / "my.toml"
+    path.write_text(text, encoding="utf-8")
+    return load(path, [Setting(key.replace("__", "."), value) for key, value in settings.items()])
+
+
+def refused(folder: Path, text: str, **settings: str) -> str:
+    """Return what is said of a scene file that is wrong, without its folder."""
+    with pytest.raises(SceneError) as caught:
+        scene(folder, text, **settings)
+    return str(caught.value).replace(f"{folder}/", "")
+
+
+def test_a_scene_is_called_like_its_file(tmp_path: Path) -> None:
+    assert scene(tmp_path, "").name == "my"
+
+
+def test_a_mistake_is_told_with_the_file(tmp_path: Path) -> None:
+    said = refused(tmp_path, "[valve]\norifice_diameter = -0.0003")
+    assert said == "my.toml: valve.orifice_diameter must be above 0 m (got -0.0003 m)."
+
+
+def test_a_mistake_in_a_setting_is_told_with_its_option(tmp_path: Path) -> None:
+    said = refused(tmp_path, "", valve__orifice_diameter="-0.0003")
+    assert said == "--set: valve.orifice_diameter must be above 0 m (got -0.0003 m)."
+
+
+def test_a_mistake_in_the_file_is_not_blamed_on_a_setting(tmp_path: Path) -> None:
+    said = refused(tmp_path, "[valve]\nstroke = 0.0", layout__rows="3")
+    assert said == "my.toml: valve.stroke must be above 0 m (got 0 m)."
+
+
+def test_what_file_and_setting_break_together_is_blamed_on_the_setting(tmp_path: Path) -> None:
+    said = refused(tmp_path, "[actuator]\nrest_height = 0.05", actuator__stroke="0.01")
+    assert said == "--set: actuator.rest_height must be at most the stroke, 0.01 m (got 0.05 m)."
+
+
+def test_a_setting_may_mend_a_file(tmp_path: Path) -> None:
+    assert scene(tmp_path, "[valve]\nstroke = 0.0", valve__stroke="3e-5").valve.stroke == 3e-5
+
+
+def test_the_option_that_said_it_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    path.touch()
+    settings = [Setting("simulation.stepper", "euler", "--stepper"), Setting("layout.rows", "3")]
+    with pytest.raises(SceneError, match=r"^--stepper: simulation.stepper must be one of"):
+        load(path, settings)
+
+
+def test_a_setting_may_be_a_quantity_without_quotes(tmp_path: Path) -> None:
+    assert scene(tmp_path, "", layout__pitch="4 mm").layout.pitch == 4e-3
+
+
+def test_a_setting_may_be_a_text_without_quotes(tmp_path: Path) -> None:
+    assert scene(tmp_path, "", layout__arrangement="hexagonal").layout.arrangement == "hexagonal"
+
+
+def test_a_setting_may_be_a_list(tmp_path: Path) -> None:
+    relaxation = scene(tmp_path, "", relaxation__times="[1.0]", relaxation__weights="[1, 1]").relaxation
+    assert relaxation is not None
+    assert relaxation.times == (1.0,)
+
+
+def test_a_setting_may_leave_a_part_out(tmp_path: Path) -> None:
+    assert scene(tmp_path, "[conduit]\nlength = 0.02", conduit="absent").conduit is None
+
+
+def test_a_setting_of_a_part_left_out_puts_it_back(tmp_path: Path) -> None:
+    conduit = scene(tmp_path, 'conduit = "absent"', conduit__length="0.02").conduit
+    assert conduit is not None
+    assert conduit.length == 0.02
+
+
+def test_a_setting_cannot_smuggle_in_a_second_key(tmp_path: Path) -> None:
+    assert refused(tmp_path, "", layout__rows="3\nx = 4") == (
+        "--set: layout.rows must be a whole number (got '3\\nx = 4')."
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[valve\nstroke = 1", "my.toml, line 1: Expected ']' at the end of a table declaration."),
+        ("a = 1\nb 2\n", "my.toml, line 2: Expected '=' after a key in a key/value pair."),
+        ("name = 'x'\nname = 'y'\n", "my.toml, line 2: Cannot overwrite a value."),
+        ('name = """\n\n', "my.toml, line 2: Unterminated string."),
+        ("a = " + "[" * 100_000, "my.toml: lists or tables are nested too deeply."),
+    ],
+)
+def test_text_that_is_no_toml_is_told_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+    assert refused(tmp_path, text) == said
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    path.write_bytes(b"name = '\xff'")
+    with pytest.raises(SceneError, match=r"my\.toml must be UTF-8 text \(byte 8 is not\)\."):
+        load(path)
+
+
+def test_a_sample_is_found_by_its_name() -> None:
+    assert find("ridge_mound_valley") == SAMPLES / "ridge_mound_valley.toml"
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_every_sample_is_a_scene_called_like_its_file(name: str) -> None:
+    assert load(find(name)).name == name
+
+
+def test_a_sample_is_found_although_a_run_of_it_lies_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "tap").mkdir()
+    (tmp_path / "tap" / "scene.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert find("tap") == SAMPLES / "tap.toml"
+
+
+def test_the_folder_of_a_run_stands_for_its_scene(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").touch()
+    assert find(str(tmp_path)) == tmp_path / "scene.toml"
+
+
+def test_a_missing_file_is_told_as_one() -> None:
+    with pytest.raises(SceneError, match=r"^nowhere\.toml: there is no such file\.$"):
+        find("nowhere.toml")
+
+
+def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
+    with pytest.raises(SceneError) as caught:
+        find("ridge_mund_valley")
+    assert str(caught.value) == (
+        "ridge_mund_valley is neither a file nor a sample (ridge_mound_valley, slow_press, tap). "
+        "Did you mean ridge_mound_valley?"
+    )

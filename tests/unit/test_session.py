@@ -1,0 +1,239 @@
+"""A session from scene to results, and the folder they are written to."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.errors import OutputError, ParameterError
+from digiclay.core.run_folder import MARK, may_be_written, written
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.session import Result, run, save
+
+WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
+TABLE: dict[str, Any] = {"layout": {"rows": 3, "columns": 4}, "trajectory": {"waypoints": WAY}}
+
+
+def scene(**sections: Any) -> Scene:
+    """Return a short press on a small bed."""
+    return resolve({**TABLE, **sections}, "press")
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    """Return a session run once."""
+    return run(scene())
+
+
+def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result: Result) -> None:
+    assert result.history is not None
+    assert {name: array.shape for name, array in result.history.items()} == {
+        "time": (41,),
+        "height": (41, 12),
+        "force": (41, 12),
+        "command": (41, 12),
+        "mode": (41, 12),
+        "fingertip": (41, 7),
+        "total_force": (41,),
+        "position": (12, 2),
+    }
+
+
+def test_modes_are_stored_as_small_integers(result: Result) -> None:
+    assert result.history is not None
+    assert result.history["mode"].dtype == np.int8
+
+
+def test_the_finger_stands_in_each_row_where_the_path_is_then(result: Result) -> None:
+    assert result.history is not None
+    wanted = scene().trajectory.trajectory().poses(result.history["time"])
+    assert np.array_equal(result.history["fingertip"], wanted)
+
+
+def test_the_press_is_felt(result: Result) -> None:
+    assert result.metrics["max_total_force"] > 0.01
+
+
+def test_the_same_scene_gives_the_same_history_bit_for_bit(result: Result) -> None:
+    again = run(scene()).history
+    assert result.history is not None
+    assert again is not None
+    assert [name for name in again if not np.array_equal(again[name], result.history[name])] == []
+
+
+def test_a_thinned_history_has_every_fourth_row(result: Result) -> None:
+    thinned = run(scene(recorder={"every": 4})).history
+    assert result.history is not None
+    assert thinned is not None
+    assert np.array_equal(thinned["height"], result.history["height"][::4])
+
+
+def test_a_session_without_a_recorder_keeps_no_history() -> None:
+    assert run(scene(recorder="absent")).history is None
+
+
+def test_metrics_are_the_same_numbers_as_in_the_history(result: Result) -> None:
+    assert result.history is not None
+    assert result.metrics["max_total_force"] == result.history["total_force"].max()
+
+
+def test_every_metric_with_a_unit_is_there(result: Result) -> None:
+    assert [name for name in result.metrics["units"] if name not in result.metrics] == []
+
+
+def test_without_control_there_is_no_force_to_deviate_from() -> None:
+    metrics = run(scene(control="absent")).metrics
+    assert (metrics["rfd"], metrics["set_point"]) == (None, None)
+
+
+def test_without_control_no_valve_opens() -> None:
+    history = run(scene(control="absent")).history
+    assert history is not None
+    assert np.ptp(history["height"]) == 0.0
+
+
+def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
+    made = Result(result.scene, result.history, 40, 0.05, {**result.metrics, "rfd": 0.0612})
+    made.metrics.update(simulated=26.0, real_time_factor=21.6)
+    made = Result(made.scene, made.history, 40, 1.204, made.metrics)
+    assert made.summary() == "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N"
+
+
+def test_the_summary_of_a_session_without_a_touch_says_so() -> None:
+    assert run(scene(fingertip="absent")).summary().endswith("real time), no contact")
+
+
+def test_progress_is_told_after_each_period() -> None:
+    told: list[tuple[int, int]] = []
+    run(scene(), progress=lambda done, total: told.append((done, total)))
+    assert told == [(done, 40) for done in range(1, 41)]
+
+
+def stopped_after(count: int) -> Result:
+    """Run a session that is asked to stop after some periods."""
+    asked = iter(range(1, 1000))
+    return run(scene(), stopped=lambda: next(asked) == count)
+
+
+def test_a_stopped_session_keeps_what_was_computed(result: Result) -> None:
+    kept = stopped_after(10).history
+    assert result.history is not None
+    assert kept is not None
+    assert np.array_equal(kept["height"], result.history["height"][:11])
+
+
+def test_a_stopped_session_is_marked_incomplete() -> None:
+    cut = stopped_after(10)
+    assert (cut.incomplete, cut.metrics["incomplete"]) == (True, True)
+
+
+def test_a_session_stopped_with_its_last_period_is_complete() -> None:
+    assert not stopped_after(40).incomplete
+
+
+def test_a_session_that_cannot_fit_in_memory_is_refused() -> None:
+    # 20 million cells over a year at 200 Hz: 3e18 bytes fit nowhere.
+    endless = scene(layout={"rows": 4000, "columns": 5000}, simulation={"duration": 1e6})
+    with pytest.raises(ParameterError, match="free memory"):
+        run(endless)
+
+
+def test_a_saved_run_has_its_three_files(result: Result, tmp_path: Path) -> None:
+    save(result, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["history.npz", "metrics.json", "scene.toml"]
+
+
+def test_a_saved_scene_is_the_scene(result: Result, tmp_path: Path) -> None:
+    save(result, tmp_path)
+    assert resolve(tomllib.loads((tmp_path / "scene.toml").read_text(encoding="utf-8"))) == result.scene
+
+
+def test_saved_metrics_are_the_metrics(result: Result, tmp_path: Path) -> None:
+    save(result, tmp_path)
+    assert json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8")) == result.metrics
+
+
+def fill(folder: Path, word: str) -> None:
+    """Make a folder look like a run's."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / MARK).write_text(word, encoding="utf-8")
+
+
+def test_a_folder_appears_with_all_that_was_written(tmp_path: Path) -> None:
+    with written(tmp_path / "a" / "b", overwrite=False) as staged:
+        (staged / "x").touch()
+    assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["x"]
+
+
+def test_a_folder_does_not_appear_before_all_is_written(tmp_path: Path) -> None:
+    with written(tmp_path / "run", overwrite=False):
+        assert not (tmp_path / "run").exists()
+
+
+def test_a_failure_leaves_nothing_behind(tmp_path: Path) -> None:
+    def fail() -> None:
+        with written(tmp_path / "a" / "b", overwrite=False) as staged:
+            (staged / "x").touch()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_folder_may_be_written_to(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    with written(tmp_path / "run", overwrite=False) as staged:
+        (staged / "x").touch()
+    assert [path.name for path in tmp_path.rglob("*")] == ["run", "x"]
+
+
+def test_an_older_run_is_refused(tmp_path: Path) -> None:
+    fill(tmp_path / "run", "old")
+    with pytest.raises(OutputError, match=r"is not empty: .* --overwrite"):
+        may_be_written(tmp_path / "run", overwrite=False)
+
+
+def test_an_older_run_is_replaced_when_asked(tmp_path: Path) -> None:
+    fill(tmp_path / "run", "old")
+    with written(tmp_path / "run", overwrite=True) as staged:
+        fill(staged, "new")
+    assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")] == [(MARK, "new")]
+
+
+def test_an_older_run_stays_when_the_new_one_fails(tmp_path: Path) -> None:
+    fill(tmp_path / "run", "old")
+    with pytest.raises(ZeroDivisionError), written(tmp_path / "run", overwrite=True):
+        raise ZeroDivisionError
+    assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")] == [(MARK, "old")]
+
+
+def test_a_folder_that_is_no_runs_is_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "thesis.doc").touch()
+    with pytest.raises(OutputError, match="holds other things than a run"):
+        may_be_written(tmp_path, overwrite=True)
+
+
+def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
+    (tmp_path / "run").touch()
+    with pytest.raises(OutputError, match="is a file"):
+        may_be_written(tmp_path / "run", overwrite=True)
+
+
+def test_a_file_in_the_way_is_told_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot be made"):
+        may_be_written(tmp_path / "file" / "run", overwrite=False)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_leave_to_write_is_told_before_any_work(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="cannot be written to"):
+        may_be_written(tmp_path / "run", overwrite=False)
