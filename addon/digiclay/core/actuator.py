@@ -20,9 +20,15 @@ Floats = NDArray[np.float64]
 class Actuator(Parameters):
     """A single-acting cylinder: the pin is its rod."""
 
-    bore: float = quantity(2e-3, "inner diameter of the cylinder", unit="m", symbol="D_a", source="P", above=0.0)
-    stroke: float = quantity(100e-3, "height of the upper end stop", unit="m", symbol="H_max", source="P", above=0.0)
-    rest_height: float = quantity(40e-3, "height of every pin at the start", unit="m", symbol="H_0", at_least=0.0)
+    bore: float = quantity(
+        2e-3, "inner diameter of the cylinder", unit="m", symbol="D_a", source="P", above=0.0
+    )
+    stroke: float = quantity(
+        100e-3, "height of the upper end stop", unit="m", symbol="H_max", source="P", above=0.0
+    )
+    rest_height: float = quantity(
+        40e-3, "height of every pin at the start", unit="m", symbol="H_0", at_least=0.0
+    )
 
     def check(self) -> None:
         """The rest height lies between the end stops."""

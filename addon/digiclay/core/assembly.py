@@ -5,24 +5,20 @@ Modules of parts that a scene may leave out are imported where the part is put i
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import NDArray
 
 from .delay import Queue, queue
-from .layout import grid
+from .layout import Grid, grid
+from .methods import METHODS
 from .physics import Cell
-from .places import Controller, Flow, Lag, Pulp, Segment, Sensors, Stepper
+from .places import Controller, Flow, Lag, Pulp, Sensors, Stepper
 from .scene import STEPPERS, Scene, part
-from .simulation import System, segments
 from .state import Rows
+from .system import System, segments
 from .touch import Touch
 from .valve import orifice
 
 __all__ = ["assemble"]
-
-Floats = NDArray[np.float64]
 
 
 def assemble(scene: Scene) -> System:
@@ -32,17 +28,19 @@ def assemble(scene: Scene) -> System:
     cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
     line = queue(scene.delay, period) if scene.delay else Queue()
     steps, instants = segments(stepper, line, period, scene.simulation.physics_step)
+    bed = grid(scene.layout)
+    controller, sensors = _controller(scene, bed, cell), _sensors()
     return System(
-        grid=grid(scene.layout),
+        grid=bed,
         cell=cell,
-        sensors=_sensors(),
-        controller=_controller(scene, cell),
+        sensors=sensors,
+        controller=controller,
         stepper=stepper,
         period=period,
         plan=stepper.plan(cell, line, steps),
-        longest_rise=period * _fastest(cell),
+        fastest=_fastest(cell),
         instants=instants,
-        rows=Rows(cell.rows, line.length),
+        rows=Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows),
     )
 
 
@@ -88,25 +86,15 @@ def _sensors() -> Sensors:
     return PerfectSensors()
 
 
-def _controller(scene: Scene, cell: Cell) -> Controller | None:
+def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
     """Return the control method, or None: every valve stays shut."""
-    if scene.control is None or scene.blister is None:
+    if scene.control is None:
         return None
-    from .control.virtual_master import VirtualMasterControl
-    from .steppers.bernoulli import BernoulliExponential
+    from .control.bench import Bench
 
-    # The master is a real cell without load. Its model belongs to the control, so it does not
-    # change with the stepper of the scene: one closed-form step a control period.
-    period, stepper = scene.simulation.control_period, BernoulliExponential()
-    bare = replace(cell, touch=None)
-    plan = stepper.plan(bare, Queue(), (Segment(0.0, period, (0, 1)),))
-    untouched = np.empty((len(stepper.nodes), 0))
-
-    def model(y: Floats, command: Floats) -> None:
-        stepper.advance(plan, y, command, untouched)
-
-    lift = scene.supply.high
-    return VirtualMasterControl(scene.control, scene.blister, scene.actuator, lift, period, model, bare.rows)
+    bench = Bench(bed, cell, scene.simulation.control_period, scene.blister)
+    controller: Controller = part(METHODS[scene.method].module, "assembled")(scene.control, bench)
+    return controller
 
 
 def _fastest(cell: Cell) -> float:

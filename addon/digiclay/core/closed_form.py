@@ -45,11 +45,12 @@ def pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
         ``log(1 + q)``, ``q = decay exp(e) (exp(growth) - 1)/growth``. The mean of exp(e)
         over the step is relief / decay.
     """
-    q = np.expm1(growth)
+    q: Floats = np.expm1(growth)
     q /= growth
     q *= grown
     q *= decay
-    return np.log1p(q, q)
+    np.log1p(q, q)
+    return q
 
 
 def careful(exponent: Floats, growth: Floats, decay: Floats) -> tuple[Floats, Floats]:

@@ -24,7 +24,9 @@ class Contact(Parameters):
     stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
     exponent: float = quantity(2000.0, "how fast the pulp stiffens", unit="1/m", symbol="m", above=0.0)
     offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
-    share: float = quantity(0.34, "share of the flat-plate law a cell carries", symbol="f_d", source="D", above=0.0)
+    share: float = quantity(
+        0.34, "share of the flat-plate law a cell carries", symbol="f_d", source="D", above=0.0
+    )
 
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force T, N, before the share f_d.

@@ -33,8 +33,12 @@ _SLOPE = 0.5 / _ROOT
 class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
 
-    length: float = quantity(10e-3, "semi-axis along the finger", unit="m", symbol="a_x", source="S", above=0.0)
-    width: float = quantity(8e-3, "semi-axis across the finger", unit="m", symbol="a_y", source="S", above=0.0)
+    length: float = quantity(
+        10e-3, "semi-axis along the finger", unit="m", symbol="a_x", source="S", above=0.0
+    )
+    width: float = quantity(
+        8e-3, "semi-axis across the finger", unit="m", symbol="a_y", source="S", above=0.0
+    )
     height: float = quantity(8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="S", above=0.0)
 
     def outline(self, poses: Floats) -> Floats:
@@ -72,7 +76,9 @@ def reaches(outline: Floats) -> Floats:
     """Return what `reach` needs of each outline (..., 10), shape (..., 3): base, m; tilt; bend, 1/m."""
     half = outline[..., 8]
     base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
-    return np.stack([base, np.hypot(outline[..., 6], outline[..., 7]), 2.0 * _SLOPE * half * outline[..., 9]], -1)
+    return np.stack(
+        [base, np.hypot(outline[..., 6], outline[..., 7]), 2.0 * _SLOPE * half * outline[..., 9]], -1
+    )
 
 
 def reach(base: float, tilt: float, bend: float, peak: float) -> float:
@@ -132,14 +138,15 @@ def underside(inward: Floats, middle: Floats, half: Floats, place: Floats) -> Fl
     place : ndarray (6, k)
         Rows 1, x, y, x², x y, y² of the places asked for.
     """
-    root = np.dot(inward, place)
+    root: Floats = np.dot(inward, place)
     kept = np.maximum(root, 1.0 - JOIN)
     # Beyond the join the tangent: sqrt(kept) + (root - kept) / (2 sqrt(1 - JOIN)).
     root -= kept
     root *= _SLOPE
     root += np.sqrt(kept, kept)
     root *= half
-    return np.subtract(np.dot(middle, place), root, root)
+    np.subtract(np.dot(middle, place), root, root)
+    return root
 
 
 def _matrices(quaternions: Floats) -> Floats:

@@ -61,13 +61,21 @@ def taking_part(
         waited = state.period * system.period - state.aged.take(near)
         system.cell.touch.pulp.age(block[system.cell.pulp_rows, : near.size], waited)
     held = Gathered(
-        cells, near.size, block, state.modes.take(cells), grid.place(cells), reach, disc, peak, state.period + KEPT
+        cells,
+        near.size,
+        block,
+        state.modes.take(cells),
+        grid.place(cells),
+        reach,
+        disc,
+        peak,
+        state.period + KEPT,
     )
     return State(state.period, state.rows, state.modes, state.aged, top, held, state.memory)
 
 
 def _put_back(system: System, state: State) -> tuple[Cells, float]:
-    """Put the gathered cells back into the bed; return those that still move, and the highest pin's height."""
+    """Put the gathered cells back; return those that still move, and the highest pin's height."""
     held, rows = state.gathered, system.rows
     state.rows[:, held.cells] = held.block
     state.modes[held.cells] = held.mode

@@ -33,11 +33,20 @@ class Layout(Parameters):
     one pitch apart. *hexagonal*: shifted likewise, rows ``pitch * sqrt(3) / 2`` apart.
     """
 
-    rows: int = quantity(25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000)
-    columns: int = quantity(25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000)
-    pitch: float = quantity(3e-3, "distance between neighbours in a row", unit="m", symbol="p", source="P", above=0.0)
+    rows: int = quantity(
+        25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000
+    )
+    columns: int = quantity(
+        25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
+    )
+    pitch: float = quantity(
+        3e-3, "distance between neighbours in a row", unit="m", symbol="p", source="P", above=0.0
+    )
     arrangement: str = quantity(
-        "aligned", "how neighbouring rows stand to each other", source="P", choices=("aligned", "staggered", "hexagonal")
+        "aligned",
+        "how neighbouring rows stand to each other",
+        source="P",
+        choices=("aligned", "staggered", "hexagonal"),
     )
 
     def check(self) -> None:

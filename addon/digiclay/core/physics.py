@@ -13,9 +13,12 @@ from .places import Flow, Lag
 from .supply import Supply
 from .touch import Touch, force
 
-__all__ = ["Cell", "rates"]
+__all__ = ["GAUSS", "Cell", "rates"]
 
 Floats = NDArray[np.float64]
+
+#: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
+GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Cell:
     @cached_property
     def rows(self) -> int:
         """State rows a cell needs."""
-        return self.lag_rows.stop
+        return 1 + (self.touch.pulp.rows if self.touch else 0) + self.lag.rows
 
 
 def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:

@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from .delay import Queue
 
-__all__ = ["Controller", "Flow", "Lag", "Measurement", "Orders", "Pulp", "Segment", "Sensors", "Stepper", "Truth"]
+__all__ = [
+    "Controller",
+    "Flow",
+    "Lag",
+    "Measurement",
+    "Orders",
+    "Pulp",
+    "Segment",
+    "Sensors",
+    "Stepper",
+    "Truth",
+]
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +37,7 @@ class Flow(Protocol):
     @property
     def knee(self) -> float: ...
 
-    def laminar_conductance(self, opening: Floats) -> Floats: ...
+    def laminar_conductance(self, opening: Any) -> Any: ...
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats: ...
 
@@ -179,7 +190,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Orders:
-    """What a controller makes of a measurement, shape (m,) each: targets, m; modes; valve commands."""
+    """What a controller makes of a measurement, (m,) each: targets, m; modes; valve commands."""
 
     target: Floats
     mode: NDArray[np.int8]

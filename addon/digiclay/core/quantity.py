@@ -131,8 +131,8 @@ def _finite(owner: Parameters, name: str, known: Quantity, value: float) -> floa
     try:
         return float(value)
     except OverflowError:
-        rule = "must be a finite number"
-        raise ParameterError(type(owner).__name__, name, rule, f"a whole number of {value.bit_length()} bits") from None  # type: ignore[attr-defined]
+        rule, shown = "must be a finite number", "a whole number beyond all floats"
+        raise ParameterError(type(owner).__name__, name, rule, shown) from None
 
 
 def parse(text: str, unit: str) -> float:
@@ -158,7 +158,9 @@ def parse(text: str, unit: str) -> float:
     name = name.strip()
     factor, si = UNITS.get(name, (0.0, ""))
     if not si:
-        raise ValueError(f"must have a unit known here: {', '.join(k for k, v in UNITS.items() if v[1] == unit)}")
+        raise ValueError(
+            f"must have a unit known here: {', '.join(k for k, v in UNITS.items() if v[1] == unit)}"
+        )
     if si != unit:
         raise ValueError(f"must be in {unit or 'no unit'} or a multiple of it")
     return value * factor

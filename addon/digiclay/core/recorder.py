@@ -60,15 +60,15 @@ class Recording:
         self._height, self._force, self._command = np.zeros((3, count, cells))
         self._mode = np.zeros((count, cells), np.int8)
         self._keep(0, state)
-        self._mode[0] = state.mode
+        self._mode[0] = state.mode()
         self._last = periods
 
     def observe(self, state: State) -> None:
         """Take in the state after a control period."""
         started = state.period - 1
         if started % self._every == 0:
-            self._command[self._done] = state.rows[self._rows.command]
-            self._mode[self._done] = state.mode
+            self._command[self._done] = state.row(self._rows.command)
+            self._mode[self._done] = state.mode()
         if state.period % self._every == 0 or state.period == self._last:
             self._keep(self._done + 1, state)
 
@@ -76,12 +76,12 @@ class Recording:
         """Keep the state the session ended in; one that was cut short ends between two rows."""
         if self._period[self._done] != state.period:
             self._keep(self._done + 1, state)
-        self._mode[self._done] = state.mode
+        self._mode[self._done] = state.mode()
 
     def _keep(self, row: int, state: State) -> None:
         """Copy what belongs to an instant into a row."""
-        self._height[row] = state.rows[0]
-        self._force[row] = state.rows[self._rows.force]
+        self._height[row] = state.row(0)
+        self._force[row] = state.row(self._rows.force)
         self._period[row] = state.period
         self._done = row
 

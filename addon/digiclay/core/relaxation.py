@@ -62,7 +62,8 @@ class Relaxation(Parameters):
 
     def relaxed(self, own: Floats) -> Floats:
         """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n,), of filters z (k, n)."""
-        return np.dot(self.shares, own)
+        relaxed: Floats = np.dot(self.shares, own)
+        return relaxed
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""

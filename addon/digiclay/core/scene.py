@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import ParameterError
+from .methods import METHODS, ControlParameters
 from .quantity import Parameters, quantity
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
@@ -17,7 +18,6 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from .conduit import Conduit
     from .contact import Contact
     from .control.blister import Blister
-    from .control.virtual_master import VirtualMaster
     from .delay import Delay
     from .fingertip import Fingertip
     from .fluid import Fluid
@@ -30,7 +30,6 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from .valve_lag import ValveLag
 
 __all__ = [
-    "METHODS",
     "NEEDS",
     "OPTIONAL",
     "PARTS",
@@ -70,8 +69,6 @@ SECTIONS = (
 OPTIONAL = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "control", "recorder")
 #: Parts that are left out together with another.
 NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
-#: Control methods: module and class of their parameters.
-METHODS: dict[str, tuple[str, str]] = {"virtual_master": ("control.virtual_master", "VirtualMaster")}
 #: Steppers: module and class.
 STEPPERS: dict[str, tuple[str, str]] = {
     "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
@@ -88,7 +85,9 @@ def part(module: str, name: str) -> Any:
 
 def parameters(section: str, method: str) -> type[Parameters]:
     """Import the class that holds the parameters of a section."""
-    module, name = METHODS[method] if section == "control" else PARTS[section]
+    module, name = (
+        PARTS[section] if section != "control" else (METHODS[method].module, METHODS[method].parameters)
+    )
     kind: type[Parameters] = part(module, name)
     return kind
 
@@ -188,7 +187,7 @@ class Scene:
     fingertip: Fingertip | None
     contact: Contact | None
     relaxation: Relaxation | None
-    control: VirtualMaster | None
+    control: ControlParameters | None
     blister: Blister | None
     simulation: Simulation
     recorder: Recorder | None
@@ -225,5 +224,5 @@ class Scene:
 
     @property
     def set_point(self) -> float | None:
-        """Total force the finger should feel, N; None without control."""
-        return self.control.force_setpoint if self.control else None
+        """Total force the finger should feel, N; None where the control does not say."""
+        return self.control.total_setpoint if self.control else None

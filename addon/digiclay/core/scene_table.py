@@ -9,8 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from .errors import ParameterError
+from .methods import METHODS
 from .quantity import Parameters, nearest, parse, quantities
-from .scene import METHODS, NEEDS, OPTIONAL, SECTIONS, Path, Scene, Waypoint, parameters
+from .scene import NEEDS, OPTIONAL, SECTIONS, Path, Scene, Waypoint, parameters
 
 __all__ = ["ABSENT", "PRESETS", "resolve", "text"]
 
@@ -57,10 +58,16 @@ def resolve(table: Table, name: str = "") -> Scene:
     parts: dict[str, Any] = {}
     for section in SECTIONS:
         own, needed = given[section], NEEDS.get(section)
-        if own is None or (needed and given[needed] is None):
+        if (
+            own is None
+            or (needed and given[needed] is None)
+            or (section == "blister" and not _forms_one(method, own))
+        ):
             parts[section] = None
             continue
         defaults = dict(PRESETS[texts["preset"]].get(section, {}))
+        if section == "blister":
+            defaults |= METHODS[method].blister or {}
         if section == "contact" and parts["layout"].arrangement == "hexagonal":
             defaults["share"] = HEXAGONAL_SHARE
         parts[section] = _part(section, parameters(section, method), defaults, own)
@@ -105,6 +112,15 @@ def _method(control: dict[str, Any] | None) -> str:
     if not isinstance(method, str) or method not in METHODS:
         raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", _shown(method))
     return method
+
+
+def _forms_one(method: str, own: dict[str, Any]) -> bool:
+    """Tell whether a method forms a blister; refuse a section [blister] where it does not."""
+    if METHODS[method].blister is None and own:
+        raise ParameterError(
+            "blister", "", f"must be left out: the method {method} forms no blister", _shown(own)
+        )
+    return METHODS[method].blister is not None
 
 
 def _part(section: str, kind: type[Parameters], defaults: Table, own: Table) -> Parameters:

@@ -19,7 +19,8 @@ from .metrics import METRICS, summary
 from .recorder import Recording, available_memory, refuse_what_cannot_fit, write
 from .scene import Scene
 from .scene_table import ABSENT, text
-from .simulation import System, begin, periods
+from .simulation import begin, periods
+from .system import System
 from .trajectory import Trajectory
 
 __all__ = ["Result", "fits", "run", "save"]

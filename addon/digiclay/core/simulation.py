@@ -86,7 +86,7 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
 
 
 def _attend(system: System, state: State) -> tuple[Any, tuple[float, float, float] | None]:
-    """Let the controller take in the cells under the finger; return its memory and the disc it will control."""
+    """Let the controller take in the touched cells; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
     return system.controller.attend(state.memory, _measured(system, state, state.gathered.near))

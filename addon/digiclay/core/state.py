@@ -146,7 +146,7 @@ class State:
 
     def row(self, index: int) -> Floats:
         """Return one row of all cells, shape (n,), as a new array; `Rows` names them."""
-        values = self.rows[index].copy()
+        values: Floats = self.rows[index].copy()
         values[self.gathered.cells] = self.gathered.block[index]
         return values
 
@@ -170,6 +170,14 @@ def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
     values[0] = values[rows.target] = height
     none = np.empty(0, np.intp)
     nobody = Gathered(
-        none, 0, np.empty((rows.count, 0)), np.empty(0, np.int8), np.empty((6, 0)), NOWHERE, NOWHERE, height, 0
+        none,
+        0,
+        np.empty((rows.count, 0)),
+        np.empty(0, np.int8),
+        np.empty((6, 0)),
+        NOWHERE,
+        NOWHERE,
+        height,
+        0,
     )
     return State(0, values, np.full(count, Mode.REST, np.int8), np.zeros(count), height, nobody, memory)

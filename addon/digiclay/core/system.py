@@ -54,7 +54,9 @@ class System:
     rows: Rows
 
 
-def segments(stepper: Stepper, queue: Queue, period: float, step: float) -> tuple[tuple[Segment, ...], Floats]:
+def segments(
+    stepper: Stepper, queue: Queue, period: float, step: float
+) -> tuple[tuple[Segment, ...], Floats]:
     """Cut a control period into physics steps, also where the valve goes over to the next command.
 
     Returns

@@ -85,8 +85,8 @@ def bounds(grid: Grid, window: Window, peak: float, margin: float) -> Bounds:
     margin : float
         How much farther to look, m.
     """
-    x, y, spread, *shape = window
-    radius = reach(*shape, peak)
+    x, y, spread, base, tilt, bend = window
+    radius = reach(base, tilt, bend, peak)
     return grid.bounds(x, y, radius + spread + margin) if radius >= 0.0 else NOWHERE
 
 

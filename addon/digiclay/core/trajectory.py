@@ -107,12 +107,14 @@ def between(start: Floats, end: Floats, parts: Floats) -> Floats:
         Where on the way, 0 to 1.
     """
     part = parts[:, None]
-    turned = _turned(np.broadcast_to(start[3:], (parts.size, 4)), np.broadcast_to(end[3:], (parts.size, 4)), part)
+    turned = _turned(
+        np.broadcast_to(start[3:], (parts.size, 4)), np.broadcast_to(end[3:], (parts.size, 4)), part
+    )
     return np.concatenate([start[:3] + (end[:3] - start[:3]) * part, turned], axis=1)
 
 
 def _monotone_slopes(times: Floats, values: Floats) -> Floats:
-    """Return slopes (w, d) for cubics through values (w, d) that do not overshoot (Fritsch and Carlson 1980)."""
+    """Return slopes (w, d) for cubics through values (w, d) that do not overshoot (Fritsch and Carlson)."""
     span = np.diff(times)[:, None]
     secant = np.diff(values, axis=0) / span
     slopes = np.zeros_like(values)

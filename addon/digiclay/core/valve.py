@@ -26,11 +26,18 @@ class Valve(Parameters):
     """
 
     orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", symbol="d_o", above=0.0)
-    stroke: float = quantity(30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="S", above=0.0)
-    discharge_slope: float = quantity(0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0)
+    stroke: float = quantity(
+        30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="S", above=0.0
+    )
+    discharge_slope: float = quantity(
+        0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0
+    )
     knee_reynolds: float = quantity(200.0, "where the branches meet", symbol="Re_k", source="P", above=0.0)
     gap: str = quantity(
-        "stroke", "length in Re*: the full stroke (eq. 4), or the actual opening", source="P", choices=("stroke", "opening")
+        "stroke",
+        "length in Re*: the full stroke (eq. 4), or the actual opening",
+        source="P",
+        choices=("stroke", "opening"),
     )
 
 
@@ -62,11 +69,11 @@ class Orifice:
         return (self.turbulent / self.laminar) ** 2
 
     def laminar_conductance(self, opening: Floats) -> Floats:
-        """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K in [-1, 1], shape (n,)."""
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K in [-1, 1], (n,)."""
         return self.laminar * self.laminar_lift(opening)
 
     def laminar_lift(self, opening: Floats) -> Floats:
-        """Return \|K\|^power."""
+        """Return the opening's size to the power of the laminar branch."""
         return opening * opening if self.power == 2 else abs(opening)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
@@ -88,10 +95,8 @@ class Orifice:
 
 
 def orifice(valve: Valve, fluid: Fluid) -> Orifice:
-    """Work out the flow law from the conditions of equation 5 (slope and knee), not from rounded constants."""
+    """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants."""
     area_term = math.pi * valve.discharge_slope * valve.orifice_diameter**2
-    laminar = area_term**2 / (
-        8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke
-    )
+    laminar = area_term**2 / (8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke)
     turbulent = area_term / 4.0 * math.sqrt(2.0 / fluid.density)
     return Orifice(laminar, turbulent, 2 if valve.gap == "stroke" else 1)

@@ -34,7 +34,8 @@ class ValveLag(Parameters):
 
     def opening(self, own: Floats, command: Floats) -> Floats:
         """Return the opening K, shape (n,)."""
-        return own[0]
+        opening: Floats = own[0]
+        return opening
 
     def rate(self, own: Floats, command: Floats) -> Floats:
         """Return dK/dt, 1/s (equation 9), shape (1, n), for held commands, shape (n,)."""

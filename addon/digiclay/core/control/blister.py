@@ -19,8 +19,12 @@ Floats = NDArray[np.float64]
 class Blister(Parameters):
     """Radius and profile of the blister, and the ring around it that gives the edge height."""
 
-    radius: float = quantity(15e-3, "radius of the blister", unit="m", symbol="r_blister", source="P", above=0.0)
-    edge_radius: float = quantity(18.5e-3, "outer radius of the ring of edge cells", unit="m", symbol="r_edge", above=0.0)
+    radius: float = quantity(
+        15e-3, "radius of the blister", unit="m", symbol="r_blister", source="P", above=0.0
+    )
+    edge_radius: float = quantity(
+        18.5e-3, "outer radius of the ring of edge cells", unit="m", symbol="r_edge", above=0.0
+    )
     flat_radius: float = quantity(6e-3, "radius of the flat top", unit="m", symbol="r_flat", at_least=0.0)
     profile: str = quantity("cone", "how the blister falls off", source="P", choices=("cone", "gaussian"))
     sigma: float = quantity(7e-3, "standard deviation of the Gaussian", unit="m", symbol="σ", above=0.0)
@@ -41,8 +45,10 @@ class Blister(Parameters):
         *gaussian*: ``exp(-r²/(2 σ²))``.
         """
         if self.profile == "gaussian":
-            return np.exp(distance * distance * (-0.5 / self.sigma**2))
-        return np.minimum((self.radius - distance) / (self.radius - self.flat_radius), 1.0)
+            bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
+            return bell
+        cone: Floats = np.minimum((self.radius - distance) / (self.radius - self.flat_radius), 1.0)
+        return cone
 
     def height(self, distance: Floats, edge: float, top: Floats | float) -> Floats:
         """Return ``edge + p(r) (top - edge)``, m, at distances r from the virtual master."""

@@ -18,18 +18,23 @@ from numpy.typing import NDArray
 from ..actuator import Actuator
 from ..errors import ParameterError
 from ..layout import ON_THE_SIDE
+from ..methods import ControlParameters
 from ..modes import Mode
 from ..places import Measurement, Orders
-from ..quantity import Parameters, quantity
+from ..quantity import quantity
+from .bench import Bench
 from .blister import Blister
 from .servo import Servo, locked_under_overload
 from .transitions import BY_FORCE, BY_PLACE, changed
 from .travel import Heading, ahead_of, square_distance, turned
 
-__all__ = ["CellStates", "CellStatesControl", "Patch"]
+__all__ = ["CellStates", "CellStatesControl", "Patch", "assembled"]
 
 Floats = NDArray[np.float64]
 Modes = NDArray[np.int8]
+
+#: Cells under a fingertip on the default bed, about.
+PATCH = 10
 
 
 class Patch(NamedTuple):
@@ -58,7 +63,7 @@ class Patch(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CellStates(Parameters):
+class CellStates(ControlParameters):
     """Gains and thresholds of Method II, all of them per cell."""
 
     force_setpoint: float = quantity(0.04, "force held under the finger", unit="N", symbol="F_ref", above=0.0)
@@ -66,7 +71,11 @@ class CellStates(Parameters):
         0.06, "force at which a cell at rest starts to follow", unit="N", symbol="F_trig^VS", above=0.0
     )
     blister_trigger: float = quantity(
-        0.015, "force at which a cell of the blister starts to follow", unit="N", symbol="F_trig^blister", above=0.0
+        0.015,
+        "force at which a cell of the blister starts to follow",
+        unit="N",
+        symbol="F_trig^blister",
+        above=0.0,
     )
     critical_trigger: float = quantity(
         0.005, "force below which a following cell is critical", unit="N", symbol="F_trig^crit", above=0.0
@@ -75,19 +84,37 @@ class CellStates(Parameters):
         50e-3, "time after which a critical cell is given up", unit="s", symbol="t_crit", at_least=0.0
     )
     spring_stiffness: float = quantity(20.0, "virtual spring", unit="N/m", symbol="k_VS", above=0.0)
-    position_gain: float = quantity(500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0)
+    position_gain: float = quantity(
+        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
+    )
     dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
     force_gain: float = quantity(15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0)
     rise: float = quantity(
-        1e-3, "how much higher the blister stands, so as to feel the finger", unit="m", symbol="h_rise", at_least=0.0
+        1e-3,
+        "how much higher the blister stands, so as to feel the finger",
+        unit="m",
+        symbol="h_rise",
+        at_least=0.0,
     )
     jump: float = quantity(
-        8e-3, "way in a control period beyond which the finger was lost", unit="m", symbol="r_VM", source="P", above=0.0
+        8e-3,
+        "way in a control period beyond which the finger was lost",
+        unit="m",
+        symbol="r_VM",
+        source="P",
+        above=0.0,
     )
     travel: float = quantity(
         1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
     )
-    behind: float = quantity(-0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0)
+    behind: float = quantity(
+        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
+    )
+
+    @property
+    def total_setpoint(self) -> float:
+        """Total force the finger should feel, N: what a patch of `PATCH` cells is asked for."""
+        return PATCH * self.force_setpoint
 
     def check(self) -> None:
         """A blister cell starts to follow before one at rest does, and is critical below that."""
@@ -177,7 +204,8 @@ class CellStatesControl:
             "above_blister_trigger": force >= known.blister_trigger,
             "below_critical_trigger": force < known.critical_trigger,
             "above_critical_trigger": force >= known.critical_trigger,
-            "timed_out": (force < known.critical_trigger) & (seen.own[0] * self.period >= known.critical_time),
+            "timed_out": (force < known.critical_trigger)
+            & (seen.own[0] * self.period >= known.critical_time),
         }
 
     def _around(
@@ -215,7 +243,9 @@ class CellStatesControl:
         spring = mode <= Mode.HOLD
         spring |= mode == Mode.SPRING
         formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
-        kind = np.where(force > 0.0, np.int8(Mode.SPRING), np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST)))
+        kind = np.where(
+            force > 0.0, np.int8(Mode.SPRING), np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        )
         return np.where(spring, kind, mode)
 
     def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: NDArray[np.bool_]) -> Floats:
@@ -226,3 +256,9 @@ class CellStatesControl:
         follow = known.force_gain * (known.force_setpoint - seen.force)
         np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
         return locked_under_overload(command, seen.force, self.lift)
+
+
+def assembled(parameters: CellStates, bench: Bench) -> CellStatesControl:
+    """Put Method II together for a device; the bench has a blister."""
+    assert bench.blister is not None
+    return CellStatesControl(parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period)

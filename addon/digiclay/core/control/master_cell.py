@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["MasterCell"]
+import numpy as np
+
+from ..delay import Queue
+from ..physics import GAUSS, Cell
+
+__all__ = ["MasterCell", "master_cell"]
 
 
 @dataclass(frozen=True)
@@ -35,3 +40,19 @@ class MasterCell:
         *nodes, end = (a * opening + b * command for a, b in self.openings)
         rise = self.period * sum(self.speed(node) for node in nodes) / len(nodes)
         return min(max(height + rise, 0.0), self.stroke), end
+
+
+def master_cell(cell: Cell, period: float) -> MasterCell:
+    """Make the master's cylinder and valve like those of the real cells."""
+    nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
+    # Without a lag there is no column for the opening at the start.
+    openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
+    supply, area, laminar = cell.supply, cell.actuator.area, cell.flow.knee > cell.supply.largest
+
+    def speed(opening: float) -> float:
+        pressure = supply.high if opening > 0.0 else supply.low
+        if laminar:
+            return float(cell.flow.laminar_conductance(opening) * pressure / area)
+        return float(cell.flow.flow(np.array([opening]), np.array([pressure]))[0]) / area
+
+    return MasterCell(openings, speed, period, cell.actuator.stroke)

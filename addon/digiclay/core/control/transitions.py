@@ -65,6 +65,4 @@ def changed(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]
 
 
 #: For each set of source modes, whether a mode is among them, by its code.
-_MEMBERS = {
-    arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow in (*BY_FORCE, *BY_PLACE)
-}
+_MEMBERS = {arrow.source: np.isin(np.arange(len(Mode)), arrow.source) for arrow in (*BY_FORCE, *BY_PLACE)}

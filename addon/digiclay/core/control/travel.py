@@ -45,7 +45,8 @@ def ahead_of(heading: Heading, x: float, y: float, place: Floats) -> Floats:
         Rows 1, x, y, ... of the cells.
     """
     _, _, toward_x, toward_y = heading
-    return np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], place[:3])
+    ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], place[:3])
+    return ahead
 
 
 def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
@@ -60,5 +61,6 @@ def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floa
     """
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
-    square = np.dot(form, place)
-    return np.maximum(square, 0.0, square)
+    square: Floats = np.dot(form, place)
+    np.maximum(square, 0.0, square)
+    return square

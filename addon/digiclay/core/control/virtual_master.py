@@ -17,15 +17,17 @@ from numpy.typing import NDArray
 
 from ..actuator import Actuator
 from ..layout import ON_THE_SIDE
+from ..methods import ControlParameters
 from ..modes import Mode
 from ..places import Measurement, Orders
-from ..quantity import Parameters, quantity
+from ..quantity import quantity
+from .bench import Bench
 from .blister import Blister
-from .master_cell import MasterCell
+from .master_cell import MasterCell, master_cell
 from .servo import Servo, locked_under_overload
 from .travel import Heading, ahead_of, square_distance, turned
 
-__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl"]
+__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
 
 Floats = NDArray[np.float64]
 
@@ -79,29 +81,49 @@ class Master(NamedTuple):
 
 
 @dataclass(frozen=True)
-class VirtualMaster(Parameters):
+class VirtualMaster(ControlParameters):
     """Gains and thresholds of Method I."""
 
     force_setpoint: float = quantity(
-        0.4, "total force held while shaping, and at which shaping starts", unit="N", symbol="F_ref", above=0.0
+        0.4,
+        "total force held while shaping, and at which shaping starts",
+        unit="N",
+        symbol="F_ref",
+        above=0.0,
     )
-    spring_stiffness: float = quantity(200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0)
-    position_gain: float = quantity(500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0)
+    spring_stiffness: float = quantity(
+        200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
+    )
+    position_gain: float = quantity(
+        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
+    )
     dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
     force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
     radius: float = quantity(
-        8e-3, "how far from the master the finger is looked for", unit="m", symbol="r_VM", source="P", above=0.0
+        8e-3,
+        "how far from the master the finger is looked for",
+        unit="m",
+        symbol="r_VM",
+        source="P",
+        above=0.0,
     )
     travel: float = quantity(
         1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
     )
-    behind: float = quantity(-0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0)
+    behind: float = quantity(
+        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
+    )
     felt_force: float = quantity(
         1e-3, "total force below which there is no finger", unit="N", symbol="F_0", above=0.0
     )
     loss_time: float = quantity(
         50e-3, "time without force after which the finger is lost", unit="s", symbol="t_l", at_least=0.0
     )
+
+    @property
+    def total_setpoint(self) -> float:
+        """Total force the finger should feel, N."""
+        return self.force_setpoint
 
 
 @dataclass(frozen=True)
@@ -141,7 +163,9 @@ class VirtualMasterControl:
         """Return the memory before a session."""
         return Master()
 
-    def attend(self, memory: Master, touched: Measurement) -> tuple[Master, tuple[float, float, float] | None]:
+    def attend(
+        self, memory: Master, touched: Measurement
+    ) -> tuple[Master, tuple[float, float, float] | None]:
         """Locate the finger and move the master; see `places.Controller`."""
         force = float(touched.force.sum()) if touched.force.size else 0.0
         master = self._locate(memory, touched, force)
@@ -169,7 +193,15 @@ class VirtualMasterControl:
         _, x, y = (np.dot(place[:3], force) / total).tolist()
         surface = float(force @ touched.height) / total
         return Master(
-            Phase.SPRING, x, y, surface, 0.0, reference=surface, edge=surface, heading=Heading(x, y), losses=master.losses
+            Phase.SPRING,
+            x,
+            y,
+            surface,
+            0.0,
+            reference=surface,
+            edge=surface,
+            heading=Heading(x, y),
+            losses=master.losses,
         )
 
     def _alone(self, master: Master) -> Master:
@@ -195,7 +227,7 @@ class VirtualMasterControl:
         return master._replace(phase=phase, height=height, opening=opening)
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
-        """Create the blister, freeze what is left behind, and follow with every cell; see `places.Controller`."""
+        """Create the blister, freeze what is left behind, command every cell; see `places.Controller`."""
         target, mode = seen.target, self._left_alone(seen.target)
         if memory.phase is not Phase.IDLE:
             memory, target = self._created(memory, seen, mode)
@@ -205,7 +237,8 @@ class VirtualMasterControl:
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
         formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
-        return OUTSIDE.take(formed.view(np.int8))
+        mode: NDArray[np.int8] = OUTSIDE.take(formed.view(np.int8))
+        return mode
 
     def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
@@ -236,3 +269,12 @@ class VirtualMasterControl:
         np.putmask(mode, ring, EDGE)
         np.putmask(mode, frozen, FROZEN)
         return master, target
+
+
+def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:
+    """Put Method I together for a device; the bench has a blister."""
+    assert bench.blister is not None
+    model = master_cell(bench.cell, bench.period)
+    return VirtualMasterControl(
+        parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, model
+    )

@@ -21,15 +21,12 @@ from ..absent import Unrelaxed
 from ..closed_form import LARGE, TINY, careful, crossed, pressed
 from ..contact import LARGEST_EXPONENT, Contact
 from ..delay import Queue
-from ..physics import Cell
+from ..physics import GAUSS, Cell
 from ..places import Segment
 
 __all__ = ["BernoulliExponential", "BernoulliPlan"]
 
 Floats = NDArray[np.float64]
-
-#: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
-GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +87,7 @@ class BernoulliExponential:
         m, stroke = contact.exponent, cell.actuator.stroke
         to_load = to_decay / m
         # How far the load may drive up the drop before some flow could turn turbulent.
-        spare = cell.flow.knee - max(abs(cell.supply.high), abs(cell.supply.low))
+        spare = cell.flow.knee - cell.supply.largest
         means = np.kron(np.diag(lengths), [0.5, 0.5]) / cell.actuator.area
         return BernoulliPlan(
             cell,
@@ -100,8 +97,12 @@ class BernoulliExponential:
             to_decay * means,
             tuple(pulp.halfway(h) for h in lengths),
             tuple(pulp.transition(h) for h in lengths),
-            (lambda opening, _: cell.flow.laminar_conductance(opening)) if spare > 0.0 else cell.flow.conductance,
-            np.array([m, contact.offset, contact.stiffness / m, stroke, LARGEST_EXPONENT, 1.0, 0.5, 0.0, TINY]),
+            (lambda opening, _: cell.flow.laminar_conductance(opening))
+            if spare > 0.0
+            else cell.flow.conductance,
+            np.array(
+                [m, contact.offset, contact.stiffness / m, stroke, LARGEST_EXPONENT, 1.0, 0.5, 0.0, TINY]
+            ),
             to_load,
             min(LARGE, math.log1p(spare / to_load)) if spare > 0.0 else -math.inf,
         )
@@ -202,9 +203,10 @@ def _easy(plan: BernoulliPlan, exponent: Floats, slip: Floats, decay: Floats, fi
 
 def _grown(exponent: Floats, zero: Floats | float = 0.0, most: Floats | float = LARGEST_EXPONENT) -> Floats:
     """Return exp(e), 1 where there is a gap."""
-    grown = np.maximum(exponent, zero)
+    grown: Floats = np.maximum(exponent, zero)
     np.minimum(grown, most, grown)
-    return np.exp(grown, grown)
+    np.exp(grown, grown)
+    return grown
 
 
 def _loaded_valve(

@@ -1,0 +1,37 @@
+"""What a controller may know of the device it controls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..layout import Grid
+from ..physics import Cell
+from .blister import Blister
+
+__all__ = ["Bench"]
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """The device, as its maker would describe it to a controller.
+
+    Attributes
+    ----------
+    grid : Grid
+    cell : Cell
+        The cells' physics.
+    period : float
+        Control period, s.
+    blister : Blister or None
+        For the methods that form one.
+    """
+
+    grid: Grid
+    cell: Cell
+    period: float
+    blister: Blister | None = None
+
+    @property
+    def lift(self) -> float:
+        """Force the high reservoir can lift, ``P_high A_a``, N."""
+        return self.cell.supply.high * self.cell.actuator.area

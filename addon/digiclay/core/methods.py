@@ -1,0 +1,47 @@
+"""The control methods a scene can name: one row a method, one module each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .quantity import Parameters
+
+__all__ = ["METHODS", "ControlParameters", "Method"]
+
+
+@dataclass(frozen=True)
+class ControlParameters(Parameters):
+    """Base of every method's parameters."""
+
+    @property
+    def total_setpoint(self) -> float | None:
+        """Total force the finger should feel, N; None where the method asks for none."""
+        return None
+
+
+@dataclass(frozen=True)
+class Method:
+    """Where a method is, and what it needs.
+
+    Attributes
+    ----------
+    module : str
+        Within the core; holds a function ``assembled(parameters, bench)``.
+    parameters : str
+        Class of its parameters there.
+    blister : mapping or None
+        Its defaults for the blister where they differ; None: it forms no blister.
+    """
+
+    module: str
+    parameters: str
+    blister: Mapping[str, float] | None = field(default=None)
+
+
+METHODS: dict[str, Method] = {
+    "virtual_master": Method("control.virtual_master", "VirtualMaster", {}),
+    "cell_states": Method(
+        "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
+    ),
+}
