@@ -19,16 +19,15 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "errors modes",
-    "quantity",
-    "closed_form delay fluid layout",
-    "places",
-    "absent valve valve_lag actuator contact relaxation fingertip supply state surface",
-    "conduit touch trajectory export metrics control.servo control.blister",
-    "physics",
-    "steppers.* sensors recorder control.virtual_master",
+    "errors modes closed_form control.travel",
+    "quantity run_folder surface control.transitions",
+    "layout fluid delay supply actuator contact relaxation fingertip methods export metrics control.servo control.blister",
+    "places valve valve_lag state trajectory",
+    "absent conduit touch recorder",
+    "physics scene",
+    "system steppers.* control.bench control.master_cell scene_table",
+    "assembly gathering control.virtual_master control.cell_states scene_file",
     "simulation",
-    "scene",
     "session",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.

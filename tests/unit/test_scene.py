@@ -157,7 +157,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown preset": ({"preset": "quick"}, "preset must be one of paper, fast, viscous (got 'quick')."),
     "unknown method": (
         {"control": {"method": "hand"}},
-        "control.method must be one of virtual_master (got 'hand').",
+        "control.method must be one of virtual_master, cell_states (got 'hand').",
     ),
     "no section": ({"layout": 3}, "layout must be a section, [layout] (got 3)."),
     "part that must be there": (

@@ -213,7 +213,7 @@ class Controller(Protocol):
         ...
 
     def attend(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Take in the cells the finger presses; return memory and the disc (x, y, radius) to control, if any."""
+        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
         ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:

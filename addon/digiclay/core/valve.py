@@ -69,7 +69,7 @@ class Orifice:
         return (self.turbulent / self.laminar) ** 2
 
     def laminar_conductance(self, opening: Floats) -> Floats:
-        """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K in [-1, 1], (n,)."""
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K, shape (n,)."""
         return self.laminar * self.laminar_lift(opening)
 
     def laminar_lift(self, opening: Floats) -> Floats:
