@@ -21,7 +21,8 @@ CORE = PACKAGE / "core"
 LEVELS = (
     "errors modes closed_form control.travel",
     "quantity run_folder surface control.transitions",
-    "layout fluid delay supply actuator contact relaxation fingertip methods export metrics control.servo control.blister",
+    "layout fluid delay supply actuator contact relaxation fingertip "
+    "methods export metrics control.servo control.blister",
     "places valve valve_lag state trajectory",
     "absent conduit touch recorder",
     "physics scene",

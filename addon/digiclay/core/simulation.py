@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,7 @@ def _command(system: System, state: State, memory: Any) -> Any:
     held.block[rows.target] = orders.target
     held.mode[:] = orders.mode
     commands = held.block[rows.commands]
-    for older, newer in zip(commands[:-1], commands[1:], strict=True):
+    for older, newer in pairwise(commands):
         older[:] = newer
     commands[-1] = orders.command
     return memory

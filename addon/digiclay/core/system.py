@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ def segments(
     if queue.cut:
         times = {t for t in times if abs(t - queue.cut) > 1e-9 * period} | {queue.cut}
     edges = sorted(times)
-    pairs = list(zip(edges[:-1], edges[1:], strict=True))
+    pairs = list(pairwise(edges))
     instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
     cut = tuple(
         Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))

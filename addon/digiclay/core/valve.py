@@ -65,11 +65,11 @@ class Orifice:
 
     @property
     def knee(self) -> float:
-        """Smallest drop, over all openings, at which the flow can turn turbulent, Pa (equation 6 at h* = 1)."""
+        """Smallest drop at which some opening lets the flow turn turbulent, Pa (equation 6 at h* = 1)."""
         return (self.turbulent / self.laminar) ** 2
 
     def laminar_conductance(self, opening: Floats) -> Floats:
-        """Return Q/ΔP in the laminar branch, m³/(s Pa), for openings K, shape (n,)."""
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K, (n,)."""
         return self.laminar * self.laminar_lift(opening)
 
     def laminar_lift(self, opening: Floats) -> Floats:
