@@ -1,0 +1,158 @@
+"""Method II, one control period at a time: what a cell becomes, and what it is commanded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from digiclay.core.actuator import Actuator
+from digiclay.core.control.blister import Blister
+from digiclay.core.control.cell_states import CellStates, CellStatesControl, Patch
+from digiclay.core.control.travel import Heading
+from digiclay.core.errors import ParameterError
+from digiclay.core.layout import Grid, Layout, grid
+from digiclay.core.modes import Mode
+from digiclay.core.places import Measurement, Orders
+
+REST = 40e-3
+BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
+CONTROL = CellStatesControl(CellStates(), BLISTER, Actuator(), lift=0.157, period=5e-3)
+BED = grid(Layout(rows=13, columns=13))
+MIDDLE = 6 * 13 + 6
+
+
+def seen(
+    force: dict[int, float] | None = None, mode: dict[int, Mode] | None = None, bed: Grid = BED
+) -> Measurement:
+    """Measure a bed at rest on which some cells are pressed, or in some mode."""
+    forces, modes = np.zeros(bed.count), np.full(bed.count, Mode.REST, np.int8)
+    for cell, value in (force or {}).items():
+        forces[cell] = value
+    for cell, value in (mode or {}).items():
+        modes[cell] = value
+    level = np.full(bed.count, REST)
+    return Measurement(
+        bed.place(np.arange(bed.count)), level, forces, level.copy(), modes, np.zeros((1, bed.count))
+    )
+
+
+def ordered(measured: Measurement, memory: Patch | None = None) -> tuple[Patch, Orders]:
+    """Let the controller attend and command."""
+    memory, _ = CONTROL.attend(memory or CONTROL.begin(), measured)
+    return CONTROL.command(memory, measured)
+
+
+def distance(cell: int) -> float:
+    """Return how far a cell is from the middle one, m."""
+    return float(np.hypot(BED.x[cell] - BED.x[MIDDLE], BED.y[cell] - BED.y[MIDDLE]))
+
+
+def test_a_cell_pressed_to_the_trigger_follows_the_force() -> None:
+    assert ordered(seen({MIDDLE: 0.06}))[1].mode[MIDDLE] == Mode.FORCE_FOLLOW
+
+
+def test_a_cell_pressed_less_stays_on_its_spring() -> None:
+    assert ordered(seen({MIDDLE: 0.059}))[1].mode[MIDDLE] == Mode.SPRING
+
+
+def test_a_spring_cell_gives_way_by_force_over_stiffness() -> None:
+    # 0.02 N over 20 N/m is 1 mm below; the gain of 500 1/m makes half a valve of it.
+    assert ordered(seen({MIDDLE: 0.02}))[1].command[MIDDLE] == pytest.approx(-0.5, rel=1e-12)
+
+
+def test_the_neighbours_of_a_following_cell_become_its_blister() -> None:
+    mode = ordered(seen({MIDDLE: 0.1}))[1].mode
+    inside = [c for c in range(BED.count) if 0.0 < distance(c) < BLISTER.radius * (1 - 1e-6)]
+    assert {Mode(int(m)) for m in mode[inside]} == {Mode.BLISTER}
+
+
+def test_cells_just_outside_are_the_edge() -> None:
+    mode = ordered(seen({MIDDLE: 0.1}))[1].mode
+    ring = [c for c in range(BED.count) if BLISTER.radius < distance(c) < BLISTER.edge_radius]
+    assert {Mode(int(m)) for m in mode[ring]} == {Mode.EDGE}
+
+
+def test_a_blister_cell_follows_at_a_lower_force_than_one_at_rest() -> None:
+    first = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.BLISTER}
+    mode = ordered(seen({MIDDLE: 0.05, MIDDLE + 1: 0.016}, first))[1].mode
+    assert mode[MIDDLE + 1] == Mode.FORCE_FOLLOW
+
+
+def test_a_following_cell_opens_up_by_gain_times_missing_force() -> None:
+    # 15 1/N times (0.04 - 0.02) N.
+    measured = seen({MIDDLE: 0.02}, {MIDDLE: Mode.FORCE_FOLLOW})
+    assert ordered(measured)[1].command[MIDDLE] == pytest.approx(0.3, rel=1e-12)
+
+
+def test_a_following_cell_that_loses_the_finger_is_critical_before_it_is_given_up() -> None:
+    memory = Patch(felt=True)
+    assert ordered(seen({}, {MIDDLE: Mode.FORCE_FOLLOW}), memory)[1].mode[MIDDLE] == Mode.CRITICAL
+
+
+def test_a_critical_cell_is_given_up_after_the_time_out() -> None:
+    measured, memory, periods = seen({}, {MIDDLE: Mode.CRITICAL}), Patch(felt=True), 0
+    while measured.mode[MIDDLE] == Mode.CRITICAL:
+        memory, orders = CONTROL.command(memory, measured)
+        measured.mode[:] = orders.mode
+        periods += 1
+    assert periods * CONTROL.period == pytest.approx(CONTROL.parameters.critical_time, abs=CONTROL.period)
+
+
+def test_giving_up_the_last_cell_counts_as_a_loss() -> None:
+    measured = seen({}, {MIDDLE: Mode.CRITICAL})
+    measured.own[0] = 100.0
+    memory, _ = CONTROL.command(Patch(felt=True), measured)
+    assert (memory.losses, memory.felt) == (1, False)
+
+
+def test_without_any_following_cell_no_cell_is_left_in_a_blister() -> None:
+    modes = {MIDDLE + 1: Mode.BLISTER, MIDDLE + 2: Mode.FROZEN, MIDDLE + 3: Mode.EDGE}
+    assert set(ordered(seen({}, modes))[1].mode.tolist()) == {int(Mode.REST)}
+
+
+def test_the_blister_stands_a_rise_above_its_following_cells() -> None:
+    target = ordered(seen({MIDDLE: 0.1}))[1].target
+    assert target[MIDDLE + 1] == pytest.approx(REST + 1e-3, abs=1e-12)
+
+
+def test_the_blister_falls_off_to_the_edge() -> None:
+    target = ordered(seen({MIDDLE: 0.1}))[1].target
+    # 9 mm from the cell: a third of the way down the cone from 3 to 12 mm is left.
+    assert target[MIDDLE + 3] == pytest.approx(REST + 1e-3 / 3.0, abs=1e-9)
+
+
+def test_a_cell_behind_a_travelling_finger_is_frozen_at_its_command() -> None:
+    modes = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 3: Mode.BLISTER}
+    measured = seen({MIDDLE: 0.04}, modes)
+    measured.target[MIDDLE - 3] = 47e-3
+    memory, _ = CONTROL.attend(Patch(x=-2e-3, heading=Heading(-2e-3), felt=True), measured)
+    _, orders = CONTROL.command(memory, measured)
+    assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
+
+
+def test_a_finger_that_jumps_farther_than_r_vm_is_counted_as_lost() -> None:
+    memory, _ = CONTROL.attend(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))
+    assert memory.losses == 1
+
+
+def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell() -> None:
+    _, disc = CONTROL.attend(CONTROL.begin(), seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}))
+    assert disc == pytest.approx((0.0, 0.0, 3e-3 + BLISTER.edge_radius), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"blister_trigger": 0.07},
+            "CellStates.blister_trigger must be below spring_trigger, 0.06 N (got 0.07 N).",
+        ),
+        (
+            {"critical_trigger": 0.02},
+            "CellStates.critical_trigger must be below blister_trigger, 0.015 N (got 0.02 N).",
+        ),
+    ],
+)
+def test_thresholds_in_the_wrong_order_are_refused(given: dict[str, float], said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        CellStates(**given)
+    assert str(caught.value) == said
