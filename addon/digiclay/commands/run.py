@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..core.accuracy import can_be_estimated, estimated
 from ..core.errors import DigiclayError, OutputError, ParameterError, SceneError
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
@@ -47,6 +48,11 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--plots", action="store_true", help="also plots, session.png and surface.png")
     parser.add_argument("--render", action="store_true", help="also a picture, pins.png (needs bpy)")
+    parser.add_argument(
+        "--no-errors",
+        action="store_true",
+        help="do not estimate the errors, which takes twice the run's time",
+    )
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
     parser.set_defaults(carry_out=carry_out)
 
@@ -59,6 +65,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     _refuse_early(arguments, scene)
     with Stop() as stop:
         result = _simulated(scene, _blamed(arguments, path), stop, quiet=arguments.quiet)
+        if not arguments.no_errors:
+            result = _judged(result, stop, quiet=arguments.quiet)
         wrong: list[DigiclayError] = []
         with written(out, overwrite=arguments.overwrite) as folder:
             save(result, folder)
@@ -109,6 +117,15 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
             )
     except ParameterError as error:
         raise SceneError(f"{origin}: {error}") from None
+
+
+def _judged(result: Result, stop: Stop, *, quiet: bool) -> Result:
+    """Return the result with its errors, where they can be estimated, under a progress bar."""
+    if result.history is None or result.incomplete or not can_be_estimated(result.scene):
+        return result
+    with Bar(sys.stderr, "errors", result.scene.simulation.control_period) as bar:
+        errors = estimated(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
+    return result.with_errors(errors) if errors else result
 
 
 def _extras(arguments: argparse.Namespace, result: Result, folder: Path) -> Iterator[Callable[[], object]]:

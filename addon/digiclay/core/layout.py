@@ -135,6 +135,14 @@ class Grid:
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
 
+    def at(self, x: Floats, y: Floats) -> Cells:
+        """Return the cells nearest to some places, m, shape (k,)."""
+        plan, (left, bottom) = self.layout, self.corner
+        row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
+        column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
+        cells: Cells = (row * plan.columns + column).astype(np.intp)
+        return cells
+
     def place(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
         x, y = self.x.take(cells), self.y.take(cells)

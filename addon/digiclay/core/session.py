@@ -6,13 +6,14 @@ import json
 import platform
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .accuracy import Errors
 from .assembly import assemble
 from .errors import OutputError
 from .metrics import METRICS, summary
@@ -65,7 +66,21 @@ class Result:
         felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
         simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
         end = " (incomplete: stopped)" if self.incomplete else ""
-        return f"{simulated:.1f} s simulated in {self.run_time:.2g} s ({factor:.3g} x real time){felt}{end}"
+        errors = ""
+        if "height_error" in self.metrics:
+            height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
+            errors = f", height error <= {height:.2g} µm, force error <= {force:.2g} mN"
+        return f"{simulated:.1f} s simulated in {self.run_time:.2g} s ({factor:.3g} x real time){felt}{errors}{end}"
+
+    def with_errors(self, errors: Errors) -> Result:
+        """Return the result with its estimated errors among the metrics."""
+        known = {
+            "height_error": errors.height,
+            "force_error": errors.force,
+            "total_force_error": errors.total_force,
+        }
+        units = {**self.metrics["units"], "height_error": "m", "force_error": "N", "total_force_error": "N"}
+        return replace(self, metrics={**self.metrics, **known, "units": units})
 
 
 def fits(scene: Scene, system: System) -> None:

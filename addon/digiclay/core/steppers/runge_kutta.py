@@ -1,4 +1,4 @@
-"""The classical fourth-order Runge-Kutta method, on the rates as they stand."""
+"""The classical fourth-order Runge-Kutta method."""
 
 from __future__ import annotations
 
@@ -8,21 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell, rates
+from ..physics import Cell
 from ..places import Segment
+from .explicit import ExplicitPlan, Rates, marched
 
-__all__ = ["RungeKutta4", "RungeKuttaPlan"]
+__all__ = ["RungeKutta4"]
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class RungeKuttaPlan:
-    """What all periods share."""
-
-    cell: Cell
-    queue: Queue
-    segments: tuple[Segment, ...]
 
 
 @dataclass(frozen=True)
@@ -33,21 +25,19 @@ class RungeKutta4:
     order = 4
     nodes = (0.0, 0.5, 1.0)
 
-    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> RungeKuttaPlan:
+    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
         """Work out once what all periods share."""
-        return RungeKuttaPlan(cell, queue, segments)
+        return ExplicitPlan(cell, queue, segments)
 
-    def advance(self, plan: RungeKuttaPlan, driven: Floats, under: Floats) -> None:
+    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> None:
         """Move a block of cells on by one control period, in place; see `places.Stepper`."""
-        cell, height = plan.cell, driven[0]
-        y, commands = driven[: cell.rows], driven[cell.rows :]
-        for part in plan.segments:
-            step, command = part.length, commands[plan.queue.seen(part.start)]
-            start, middle, end = (under[node] for node in part.nodes)
-            first = rates(cell, y, start, command)
-            second = rates(cell, y + (0.5 * step) * first, middle, command)
-            third = rates(cell, y + (0.5 * step) * second, middle, command)
-            fourth = rates(cell, y + step * third, end, command)
-            y += (step / 6.0) * (first + 2.0 * (second + third) + fourth)
-            np.clip(height, 0.0, cell.actuator.stroke, out=height)
-        cell.lag.settle(y[cell.lag_rows])
+        marched(plan, driven, under, _increment)
+
+
+def _increment(rates: Rates, y: Floats, step: float) -> Floats:
+    """Return how far the rows go in one step."""
+    first = rates(y, 0)
+    second = rates(y + (0.5 * step) * first, 1)
+    third = rates(y + (0.5 * step) * second, 1)
+    fourth = rates(y + step * third, 2)
+    return (step / 6.0) * (first + 2.0 * (second + third) + fourth)

@@ -1,0 +1,59 @@
+"""Recorded commands, played again: what is left is the integration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..layout import Grid
+from ..places import Measurement, Orders
+
+__all__ = ["Replay"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A controller that measures nothing and commands what was recorded.
+
+    Attributes
+    ----------
+    grid : Grid
+    commands : ndarray (t, n)
+        Valve commands, a row a control period; none afterwards.
+    """
+
+    grid: Grid
+    commands: Floats
+
+    name = "replay"
+    rows = 0
+
+    @cached_property
+    def disc(self) -> tuple[float, float, float] | None:
+        """The disc that holds every cell that is ever commanded: x, y, radius, m."""
+        cells = np.flatnonzero(self.commands.any(axis=0))
+        if not cells.size:
+            return None
+        x, y = self.grid.x[cells], self.grid.y[cells]
+        at_x, at_y = float(x.min() + x.max()) / 2, float(y.min() + y.max()) / 2
+        return at_x, at_y, float(np.hypot(x - at_x, y - at_y).max())
+
+    def begin(self) -> int:
+        """Return the number of periods played."""
+        return 0
+
+    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float] | None]:
+        """Take every commanded cell along."""
+        return memory, self.disc
+
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
+        """Return the commands of the period."""
+        command = np.zeros(seen.height.size)
+        if memory < len(self.commands):
+            command = self.commands[memory, self.grid.at(seen.place[1], seen.place[2])]
+        return memory + 1, Orders(seen.target, seen.mode, command)
