@@ -24,6 +24,11 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
     parser.add_argument("--method", metavar="M", help="control method: the same as --set control.method=M")
     parser.add_argument("--stepper", metavar="S", help="stepper: the same as --set simulation.stepper=S")
     parser.add_argument(
+        "--tolerance",
+        metavar="T",
+        help='error of the heights to keep to, such as "1 um": chooses the adaptive stepper',
+    )
+    parser.add_argument(
         "--set",
         dest="settings",
         metavar="KEY=VALUE",
@@ -40,6 +45,10 @@ def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
     for option, key in (("method", "control.method"), ("stepper", "simulation.stepper")):
         if getattr(arguments, option) is not None:
             settings.append(Setting(key, getattr(arguments, option), f"--{option}"))
+    if arguments.tolerance is not None:
+        settings.append(Setting("simulation.tolerance", arguments.tolerance, "--tolerance"))
+        if arguments.stepper is None:
+            settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
     return load(path, settings), path
 
 

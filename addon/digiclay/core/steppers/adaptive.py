@@ -1,0 +1,129 @@
+"""Sub-steps chosen cell by cell, so that heights keep within a tolerance.
+
+Each control period is done with whole steps and with half steps. Where the two differ by
+more than a cell may add to its error, that cell alone is done again with quarter steps, and
+so on. Under the finger what is kept is the extrapolation of the two finest, whose error is
+smaller still.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..delay import Queue
+from ..physics import Cell
+from ..places import Segment
+from .bernoulli import BernoulliExponential, BernoulliPlan
+
+__all__ = ["Adaptive", "AdaptivePlan"]
+
+Floats = NDArray[np.float64]
+
+#: Steps are halved at most so often.
+FINEST = 7
+#: Share of the tolerance that a control period may add to a cell under the finger, where errors
+#: die out within some periods, and to any other, where they add up over the session.
+PRESSED, FREE = 0.1, 0.001
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptivePlan:
+    """What all periods share.
+
+    Attributes
+    ----------
+    levels : tuple of BernoulliPlan
+        For whole steps, half steps, quarter steps and so on.
+    between : tuple of ndarray (i, p)
+        From the finger's underside at the period's instants to that at the ends of a level's
+        steps: exact at the instants, by parabolas between them.
+    allowed, allowed_tension : float
+        Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
+        filters, N: what so much height makes at first touch, where the pulp is softest.
+    """
+
+    levels: tuple[BernoulliPlan, ...]
+    between: tuple[Floats, ...]
+    allowed: float
+    allowed_tension: float
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """As accurate as asked for, and as stable as the closed-form step.
+
+    Attributes
+    ----------
+    tolerance : float
+        Error of the heights over a run, m.
+    """
+
+    tolerance: float
+
+    name = "adaptive"
+    order = 3
+    nodes = (0.0, 0.5, 1.0)
+
+    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> AdaptivePlan:
+        """Work out once what all periods share."""
+        closed_form = BernoulliExponential()
+        count = segments[-1].nodes[-1] + 1
+        levels, between = [], []
+        for level in range(FINEST + 1):
+            parts, rows = _divided(segments, 2**level, count)
+            levels.append(closed_form.plan(cell, queue, parts))
+            between.append(rows)
+        allowed = 3.0 * self.tolerance
+        stiffness = cell.touch.contact.stiffness if cell.touch else 0.0
+        return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed)
+
+    def advance(self, plan: AdaptivePlan, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+        cell, k = plan.levels[0].cell, under.shape[1]
+        start, share = driven.copy(), np.full(driven.shape[1], FREE)
+        share[:k][start[0, :k] > under.min(axis=0)] = PRESSED
+        coarse = _done(plan, 0, start, under)
+        open_cells = np.arange(driven.shape[1])
+        for level in range(1, FINEST + 1):
+            near = open_cells[open_cells < k]
+            fine = _done(plan, level, start[:, open_cells], under[:, near])
+            # Extrapolation holds where the error is of second order; a free cell's is of fourth.
+            gain = (fine[: cell.rows] - coarse[: cell.rows]) / 3.0
+            driven[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
+            off = np.abs(fine - coarse)
+            wide = off[0] > plan.allowed * share[open_cells]
+            wide |= (off[cell.pulp_rows] > plan.allowed_tension * PRESSED).any(axis=0)
+            if not np.count_nonzero(wide):
+                break
+            open_cells, coarse = open_cells[wide], fine[:, wide]
+        np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
+        cell.lag.settle(driven[cell.lag_rows])
+
+
+def _done(plan: AdaptivePlan, level: int, block: Floats, under: Floats) -> Floats:
+    """Return a block moved on by one control period with the steps of a level."""
+    moved = block.copy()
+    BernoulliExponential().advance(plan.levels[level], moved, np.dot(plan.between[level], under))
+    return moved
+
+
+def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tuple[Segment, ...], Floats]:
+    """Cut segments into equal parts; return them, and the map from instants to their ends."""
+    cut: list[Segment] = []
+    rows: list[Floats] = []
+    for segment in segments:
+        for i in range(parts):
+            at, length = len(cut), segment.length / parts
+            cut.append(Segment(segment.start + i * length, length, (at, at + 1)))
+            rows.append(_parabola(segment, i / parts, count))
+    return tuple(cut), np.array([*rows, _parabola(segments[-1], 1.0, count)])
+
+
+def _parabola(segment: Segment, part: float, count: int) -> Floats:
+    """Return the weights of the period's instants in the parabola through a segment's three."""
+    row = np.zeros(count)
+    row[list(segment.nodes)] = (1 - part) * (1 - 2 * part), 4 * part * (1 - part), part * (2 * part - 1)
+    return row

@@ -1,0 +1,38 @@
+"""The adaptive stepper keeps the heights within its tolerance, in every sample scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from digiclay.core.accuracy import estimated
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.session import run
+
+SCENES = ("ridge_mound_valley", "slow_press", "tap")
+
+
+def scene_of(name: str, tolerance: float) -> Scene:
+    """Return a sample scene of at most 3 s, with whole control periods as steps."""
+    settings = [
+        Setting("simulation.stepper", '"adaptive"'),
+        Setting("simulation.physics_step", "5e-3"),
+        Setting("simulation.tolerance", str(tolerance)),
+    ]
+    scene = load(find(name), settings)
+    short = min(scene.simulation.duration, 3.0)
+    return replace(scene, simulation=replace(scene.simulation, duration=short))
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("name", SCENES)
+def test_the_heights_keep_within_the_tolerance(name: str, tolerance: float) -> None:
+    scene = scene_of(name, tolerance)
+    history = run(scene).history
+    assert history is not None
+    # The reference, Richardson's extrapolation at half of 0.5 ms, is some 1e-10 m from exact.
+    exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=5e-4))
+    errors = estimated(exact, history)
+    assert errors is not None
+    assert errors.height <= tolerance
