@@ -1,0 +1,177 @@
+"""Beds put together part by part for tests: every part at its default unless a test names another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from digiclay.core.actuator import Actuator
+from digiclay.core.assembly import assemble
+from digiclay.core.conduit import Conduit
+from digiclay.core.contact import Contact
+from digiclay.core.control.blister import Blister
+from digiclay.core.control.travel import Heading
+from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
+from digiclay.core.delay import Delay
+from digiclay.core.fingertip import LEVEL, Fingertip, forms, underside
+from digiclay.core.fluid import Fluid
+from digiclay.core.layout import Layout
+from digiclay.core.modes import Mode
+from digiclay.core.places import Measurement, Orders
+from digiclay.core.relaxation import Relaxation
+from digiclay.core.scene import Path, Scene, Simulation
+from digiclay.core.scene_file import find, load
+from digiclay.core.simulation import System, begin, periods
+from digiclay.core.state import State
+from digiclay.core.supply import Supply
+from digiclay.core.trajectory import Trajectory, level
+from digiclay.core.valve import Valve
+from digiclay.core.valve_lag import ValveLag
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:
+    """Return the path of a level finger through waypoints (time in s, then x, y, z in mm)."""
+    table = np.array(waypoints, float)
+    return level(table[:, 0], table[:, 1:] * 1e-3, interpolation)
+
+
+#: A finger nobody meets.
+AWAY = path((0.0, 0.0, 0.0, 500.0))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A level finger that moves over the origin as a function of time says, m."""
+
+    height: Callable[[Floats], Floats]
+
+    def poses(self, times: Floats) -> Floats:
+        """Return poses (k, 7)."""
+        poses = np.tile([0.0, 0.0, 0.0, *LEVEL], (times.size, 1))
+        poses[:, 2] = self.height(times)
+        return poses
+
+
+def make_system(
+    layout: Layout | None = None,
+    *,
+    stepper: str = "bernoulli",
+    period: float = 5e-3,
+    step: float = 1e-3,
+    dead_time: float = 1e-3,
+    control: VirtualMaster | Callable[[float], Any] | None = None,
+    blister: Blister | None = None,
+    **parts: Any,
+) -> System:
+    """Return a bed; parts that are None are left out, and without `control` every valve stays shut.
+
+    `control` is the parameters of Method I, or a function that makes a controller for a control period.
+    """
+    master = control if isinstance(control, VirtualMaster) else None
+    given = {
+        "actuator": Actuator(), "supply": Supply(), "fluid": Fluid(), "valve": Valve(), "conduit": Conduit(),
+        "valve_lag": ValveLag(), "fingertip": Fingertip(), "contact": Contact(), "relaxation": Relaxation(),
+    }  # fmt: skip
+    assert parts.keys() <= given.keys(), f"no such part: {parts.keys() - given.keys()}"
+    scene = Scene(
+        **{**given, **parts}, layout=layout or Layout(), delay=Delay(dead_time), control=master,
+        blister=(blister or Blister()) if master else None, simulation=Simulation(period, step, stepper),
+        recorder=None, trajectory=Path.press(40e-3),
+    )  # fmt: skip
+    system = assemble(scene)
+    return replace(system, controller=control(period)) if callable(control) else system
+
+
+@dataclass(frozen=True)
+class Scripted:
+    """A controller without feedback: the command of every cell is a function of time and place."""
+
+    script: Callable[[float, Floats, Floats], Any]
+    period: float
+
+    name = "scripted"
+    rows = 0
+
+    def begin(self) -> int:
+        """Return the number of periods done."""
+        return 0
+
+    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
+        """Ask for the whole bed."""
+        return memory, (0.0, 0.0, 1.0)
+
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
+        """Command what the script says."""
+        _, x, y, *_ = seen.place
+        command = np.broadcast_to(self.script(memory * self.period, x, y), x.shape).astype(float)
+        return memory + 1, Orders(seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command)
+
+
+def scripted(script: Callable[[float, Floats, Floats], Any]) -> Callable[[float], Scripted]:
+    """Return a scripted controller for `make_system`; `script` takes time, x and y."""
+    return lambda period: Scripted(script, period)
+
+
+@dataclass(frozen=True)
+class Record:
+    """A session row by row, as ``history.npz`` has it, with all state rows besides."""
+
+    time: Floats
+    height: Floats
+    force: Floats
+    command: Floats
+    mode: NDArray[np.int8]
+    rows: Floats
+    memory: list[Any]
+    last: State
+
+
+def whole(state: State) -> Floats:
+    """Return all rows of all cells, (r, n)."""
+    return np.array([state.row(index) for index in range(len(state.rows))])
+
+
+def record(system: System, trajectory: Trajectory | Motion, count: int, state: State | None = None) -> Record:
+    """Simulate `count` control periods and keep every row; row 0 is the state handed in."""
+    state = state.copy() if state else begin(system)
+    rows, modes, memory = [whole(state)], [], []
+    for state in periods(system, trajectory, state, count):  # noqa: B020
+        rows.append(whole(state))
+        modes.append(state.mode())
+        memory.append(state.memory)
+    kept = np.array(rows)
+    command = np.concatenate([kept[1:, system.rows.command], np.zeros((1, system.grid.count))])
+    time = np.arange(count + 1) * system.period
+    mode = np.array([*modes, state.mode()])
+    return Record(time, kept[:, 0], kept[:, system.rows.force], command, mode, kept, memory, state)
+
+
+def place(x: Floats, y: Floats) -> Floats:
+    """Return rows 1, x, y, x², x y, y² of some places."""
+    return np.array([np.ones(x.size), x, y, x * x, x * y, y * y])
+
+
+def under(outline: Floats, x: Floats, y: Floats) -> Floats:
+    """Return the finger's underside, (k, n), m, for outlines (k, 10)."""
+    return underside(*forms(outline), outline[:, 8:9], place(x, y))
+
+
+def one_cell(**parts: Any) -> System:
+    """Return a bed of a single cell at the origin."""
+    return make_system(Layout(rows=1, columns=1), **parts)
+
+
+def master(*toward: float, **known: Any) -> Master:
+    """Return a master that shapes at the bed's centre, 5 mm above it, and travels some way or none."""
+    start = Master(Phase.SHAPING, height=45e-3, reference=40e-3, edge=40e-3)
+    return start._replace(heading=Heading(0.0, 0.0, *toward), **known)
+
+
+def sample(name: str) -> Scene:
+    """Return a sample scene."""
+    return load(find(name))

@@ -1,0 +1,76 @@
+"""Where the finger can be met at all: its reach, and the window of cells that may touch it."""
+
+from __future__ import annotations
+
+import numpy as np
+from digiclay.core.fingertip import Fingertip, reach, reaches
+from digiclay.core.layout import Layout, grid
+from digiclay.core.touch import approach, bounds
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from tests.assemble import under
+
+BED = grid(Layout(15, 15, arrangement="staggered"))
+axes = st.floats(1e-3, 20e-3)
+fingers = st.builds(Fingertip, length=axes, width=axes, height=axes)
+unit = st.floats(-1.0, 1.0)
+turns = st.tuples(unit, unit, unit, unit).filter(lambda q: np.hypot.reduce(q) > 0.1)
+spots = st.tuples(st.floats(-30e-3, 30e-3), st.floats(-30e-3, 30e-3), st.floats(0.0, 60e-3))
+peaks = st.floats(0.0, 0.1)
+
+
+def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> NDArray[np.float64]:
+    """Return a pose (7,)."""
+    return np.array([*spot, *(np.array(turn) / np.linalg.norm(turn))])
+
+
+@given(fingers, spots, turns, peaks, st.floats(0.0, 6.3), st.floats(1.0, 3.0))
+def test_beyond_its_reach_the_underside_is_above_the_peak(
+    finger: Fingertip,
+    spot: tuple[float, ...],
+    turn: tuple[float, ...],
+    peak: float,
+    angle: float,
+    farther: float,
+) -> None:
+    outline = finger.outline(pose(spot, turn)[None])
+    radius = max(reach(*reaches(outline)[0].tolist(), peak), 0.0) * farther + 1e-9
+    x, y = outline[0, 0] + radius * np.cos(angle), outline[0, 1] + radius * np.sin(angle)
+    # Rounding of heights, which grow with the square of the distance.
+    assert under(outline, np.array([x]), np.array([y]))[0, 0] >= peak - 1e-9
+
+
+@given(fingers, spots, turns, st.floats(0.0, 6.3), st.floats(0.0, 0.1))
+def test_no_point_of_the_underside_is_below_the_position(
+    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], angle: float, radius: float
+) -> None:
+    outline = finger.outline(pose(spot, turn)[None])
+    x, y = spot[0] + radius * np.cos(angle), spot[1] + radius * np.sin(angle)
+    # Rounding; in a flat and steep ellipsoid, slopes of 20 multiply that of the position.
+    assert under(outline, np.array([x]), np.array([y]))[0, 0] >= spot[2] - 1e-12
+
+
+@given(fingers, spots, turns, spots, st.floats(0.0, 10e-3))
+def test_the_window_has_every_cell_the_finger_could_touch_on_its_way(
+    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], toward: tuple[float, ...], way: float
+) -> None:
+    # A control period's straight way of up to 10 mm, 2 m/s, in three poses.
+    direction = np.array(toward) / max(np.linalg.norm(toward), 1e-3)
+    poses = np.array([pose(tuple(np.array(spot) + part * way * direction), turn) for part in (0.0, 0.5, 1.0)])
+    outline, peak = finger.outline(poses), 40e-3
+    cells = BED.within(bounds(BED, approach(finger, poses[None])[0].window, peak, 0.0))
+    touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
+    assert np.isin(touchable, cells).all()
+
+
+@given(fingers, spots, turns, spots)
+def test_a_dip_within_the_period_is_seen_as_well(
+    finger: Fingertip, spot: tuple[float, ...], turn: tuple[float, ...], dip: tuple[float, ...]
+) -> None:
+    poses = np.array([pose(at, turn) for at in (spot, dip, spot)])
+    outline, peak = finger.outline(poses), 40e-3
+    cells = BED.within(bounds(BED, approach(finger, poses[None])[0].window, peak, 0.0))
+    touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
+    assert np.isin(touchable, cells).all()

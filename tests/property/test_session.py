@@ -1,0 +1,180 @@
+"""What holds in any session: small beds, random fingers, a second or less."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from digiclay.core.actuator import Actuator
+from digiclay.core.control.virtual_master import VirtualMaster
+from digiclay.core.fluid import Fluid
+from digiclay.core.layout import Layout
+from digiclay.core.simulation import begin, step
+from digiclay.core.system import System
+from digiclay.core.trajectory import Trajectory, level
+from digiclay.core.valve import Valve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.assemble import Record, make_system, one_cell, record, scripted, under, whole
+
+COUNT = 80
+CELLS = Layout(7, 7, arrangement="staggered")
+
+#: Millimetres, to the tenth.
+xy = st.integers(-140, 140).map(lambda tenths: tenths / 10)
+#: Down to 8 mm below the tops, and far above; at up to 0.2 m/s.
+points = st.lists(
+    st.tuples(xy, xy, st.integers(320, 600).map(lambda tenths: tenths / 10)), min_size=3, max_size=6
+)
+turns = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
+steppers = st.sampled_from(["bernoulli", "runge_kutta_4"])
+
+
+def finger(spots: list[tuple[float, float, float]]) -> Trajectory:
+    """Return a level finger that visits spots, in mm, within the session."""
+    return level(np.linspace(0.0, COUNT * 5e-3, len(spots)), np.array(spots) * 1e-3)
+
+
+def tilted(path: Trajectory, turn: tuple[float, ...]) -> Trajectory:
+    """Return the path with a tilted finger."""
+    return Trajectory(path.times, path.positions, np.tile([1.0, *turn], (path.times.size, 1)))
+
+
+def bed(stepper: str = "bernoulli", **parts: object) -> System:
+    """Return a small bed under Method I; Runge and Kutta's steps are short enough for a deep press."""
+    return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
+
+
+def shaped(spots: list[tuple[float, float, float]], **parts: object) -> Record:
+    """Return a session under Method I."""
+    return record(bed(control=VirtualMaster(), **parts), finger(spots), COUNT)
+
+
+@settings(max_examples=20)
+@given(points, turns)
+def test_every_number_stays_finite(spots: list[tuple[float, float, float]], turn: tuple[float, ...]) -> None:
+    system = bed(control=VirtualMaster())
+    assert np.isfinite(record(system, tilted(finger(spots), turn), COUNT).rows).all()
+
+
+@settings(max_examples=20)
+@given(points, st.floats(0.0, 100.0))
+def test_pins_stay_within_their_stroke(spots: list[tuple[float, float, float]], rest: float) -> None:
+    system = bed(control=VirtualMaster(), actuator=Actuator(rest_height=rest * 1e-3))
+    shifted = [(x, y, z + rest - 40.0) for x, y, z in spots]
+    height = record(system, finger(shifted), COUNT).height
+    assert height.min() >= 0.0
+    assert height.max() <= 100e-3
+
+
+@settings(max_examples=20)
+@given(points, steppers)
+def test_no_force_pulls(spots: list[tuple[float, float, float]], stepper: str) -> None:
+    assert shaped(spots, stepper=stepper).force.min() >= 0.0
+
+
+@settings(max_examples=20)
+@given(points)
+def test_there_is_no_force_without_contact(spots: list[tuple[float, float, float]]) -> None:
+    system = bed(control=VirtualMaster())
+    path = finger(spots)
+    run = record(system, path, COUNT)
+    outline = system.cell.touch.fingertip.outline(path.poses(run.time))
+    gap = under(outline, system.grid.x, system.grid.y) - run.height
+    # Rounding: the underside is taken over another sum here.
+    assert not run.force[gap > 1e-15].any()
+
+
+@settings(max_examples=20)
+@given(points)
+def test_commands_are_openings(spots: list[tuple[float, float, float]]) -> None:
+    assert np.abs(shaped(spots).command).max() <= 1.0
+
+
+@settings(max_examples=20)
+@given(points)
+def test_a_bed_without_control_does_not_move(spots: list[tuple[float, float, float]]) -> None:
+    run = record(bed(), finger(spots), COUNT)
+    assert np.all(run.height == 40e-3)
+
+
+@settings(max_examples=10)
+@given(points)
+def test_the_same_session_twice_is_the_same_bit_for_bit(spots: list[tuple[float, float, float]]) -> None:
+    first, second = shaped(spots), shaped(spots)
+    assert np.array_equal(first.rows, second.rows)
+    assert first.memory == second.memory
+
+
+@settings(max_examples=10)
+@given(points, st.integers(0, COUNT - 1))
+def test_a_step_leaves_the_state_it_was_given_as_it_was(
+    spots: list[tuple[float, float, float]], when: int
+) -> None:
+    system, path = bed(control=VirtualMaster()), finger(spots)
+    state = record(system, path, when).last if when else begin(system)
+    kept = state.copy()
+    once = step(system, state, path.poses(state.period * 5e-3 + system.instants))
+    again = step(system, state, path.poses(state.period * 5e-3 + system.instants))
+    for name in ("rows", "modes", "aged"):
+        assert np.array_equal(getattr(state, name), getattr(kept, name)), name
+    for name in ("cells", "block", "mode"):
+        assert np.array_equal(getattr(state.gathered, name), getattr(kept.gathered, name)), name
+    assert np.array_equal(whole(once), whole(again))
+
+
+@settings(max_examples=10)
+@given(points, st.integers(1, COUNT - 1))
+def test_a_session_interrupted_and_gone_on_with_is_the_whole_session(
+    spots: list[tuple[float, float, float]], when: int
+) -> None:
+    system, path = bed(control=VirtualMaster()), finger(spots)
+    whole = record(system, path, COUNT)
+    rest = record(system, path, COUNT - when, record(system, path, when).last)
+    assert np.array_equal(rest.rows, whole.rows[when:])
+
+
+@settings(max_examples=10)
+@given(points)
+def test_no_pin_is_higher_than_the_peaks(spots: list[tuple[float, float, float]]) -> None:
+    last = shaped(spots).last
+    outside = np.delete(last.rows[0], last.gathered.cells)
+    assert outside.max(initial=0.0) <= last.peak
+    assert last.gathered.block[0, : last.gathered.near].max(initial=0.0) <= max(last.gathered.peak, last.peak)
+
+
+commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
+#: A laminar valve, and one that is turbulent in between.
+valves = st.sampled_from([{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}])
+
+
+@settings(max_examples=20)
+@given(commands, valves)
+def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: dict[str, object]) -> None:
+    # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead time.
+    system = one_cell(dead_time=0.0, control=scripted(lambda t, x, y: script[round(t / 5e-3)]), **parts)
+    run = record(system, level(np.zeros(1), np.array([[0, 0, 1.0]])), len(script))
+    opening, volume, count = 0.0, 0.0, 1000
+    dt = 5e-3 / count
+    for command in script:
+        times = (np.arange(count) + 0.5) * dt
+        k = command + (opening - command) * np.exp(-times / 2e-3)
+        volume += system.cell.flow.flow(k, system.cell.supply.pressure(k)).sum() * dt
+        opening = command + (opening - command) * np.exp(-2.5)
+    way = run.height[-1, 0] - run.height[0, 0]
+    # Two Gauss points a millisecond: 1e-5 of the way where all is smooth; where the opening changes sign or
+    # the flow turns turbulent within a step, up to a thousandth of what a pin can rise in a period.
+    assert system.cell.actuator.area * way == pytest.approx(
+        volume, abs=1e-3 * system.cell.actuator.area * system.fastest * system.period
+    )
+
+
+@settings(max_examples=20)
+@given(points, steppers)
+def test_a_locked_cell_does_not_move_however_it_is_pressed(
+    spots: list[tuple[float, float, float]], stepper: str
+) -> None:
+    system = bed(stepper=stepper, control=scripted(lambda t, x, y: np.where(x < 0.0, 0.0, 0.5)))
+    run = record(system, finger(spots), COUNT)
+    assert np.all(run.height[:, system.grid.x < 0.0] == 40e-3)
+    assert np.any(run.height[-1, system.grid.x >= 0.0] != 40e-3)

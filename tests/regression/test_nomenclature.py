@@ -1,0 +1,71 @@
+"""The pages on symbols and equations say what the code says."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from digiclay.core.quantity import quantities
+from digiclay.core.scene import SECTIONS, parameters
+
+ROOT = Path(__file__).parents[2]
+EQUATIONS = ROOT / "docs" / "equations.md"
+
+
+@pytest.fixture(scope="module")
+def maker() -> ModuleType:
+    """The program that makes the page."""
+    spec = importlib.util.spec_from_file_location("nomenclature", ROOT / "tools" / "nomenclature.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_of_symbols_is_the_one_the_declarations_make(maker: ModuleType) -> None:
+    written = maker.PAGE.read_text(encoding="utf-8")
+    assert written == maker.page(), "run `python tools/nomenclature.py`"
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_parameter_is_on_the_page_of_symbols(maker: ModuleType, section: str) -> None:
+    text = maker.PAGE.read_text(encoding="utf-8")
+    names = quantities(parameters(section, "virtual_master"))
+    assert [name for name in names if f"`{section}.{name}`" not in text] == []
+
+
+def test_all_fourteen_equations_have_a_row() -> None:
+    numbers = re.findall(r"^\| (\d+)", EQUATIONS.read_text(encoding="utf-8"), re.MULTILINE)
+    assert {int(n) for n in numbers} == set(range(1, 15))
+
+
+def test_every_test_the_equations_name_exists() -> None:
+    text = EQUATIONS.read_text(encoding="utf-8")
+    named = re.findall(r"`(test_\w+)::(test_\w+)`", text)
+    assert len(named) > 20
+    files = list((ROOT / "tests").rglob("test_*.py"))
+    known = {
+        (path.stem, name)
+        for path in files
+        for name in re.findall(r"^def (test_\w+)\(", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    assert [pair for pair in named if pair not in known] == []
+
+
+def test_every_place_in_the_code_the_equations_name_exists() -> None:
+    text = EQUATIONS.read_text(encoding="utf-8")
+    named = re.findall(r"`core/([\w/]+)\.py: ([\w.]+)`", text)
+    assert len(named) > 12
+    missing = []
+    for module, name in named:
+        code = (ROOT / "addon" / "digiclay" / "core" / f"{module}.py").read_text(encoding="utf-8")
+        parts = name.split(".")
+        if not all(
+            re.search(rf"\b(def|class) {part}\b|^ *{part}\b *[:=]", code, re.MULTILINE) for part in parts
+        ):
+            missing.append(f"{module}: {name}")
+    assert missing == []

@@ -1,0 +1,56 @@
+"""What can go wrong is said in one line."""
+
+from __future__ import annotations
+
+import pytest
+from digiclay.core.contact import Contact
+from digiclay.core.errors import DigiclayError, DivergenceError, OutputError, ParameterError, SceneError
+
+from tests.assemble import one_cell, path, record, scripted
+
+
+def test_a_parameter_error_names_owner_field_rule_and_value() -> None:
+    error = ParameterError("Valve", "stroke", "must be above 0 m", "-1 m", "Is it in µm?")
+    assert str(error) == "Valve.stroke must be above 0 m (got -1 m). Is it in µm?"
+
+
+def test_a_rule_that_joins_fields_names_the_owner_alone() -> None:
+    assert str(ParameterError("Supply", "", "must be whole", "half")) == "Supply must be whole (got half)."
+
+
+@pytest.mark.parametrize("kind", [ParameterError, SceneError, OutputError, DivergenceError])
+def test_every_error_a_user_can_cause_has_one_base(kind: type[Exception]) -> None:
+    assert issubclass(kind, DigiclayError)
+
+
+def test_a_parameter_error_is_a_value_error_to_python() -> None:
+    assert issubclass(ParameterError, ValueError)
+
+
+def test_a_divergence_names_time_cell_quantity_and_remedy() -> None:
+    error = DivergenceError(1.25, 312, "force", float("inf"), "Use a shorter step.")
+    assert str(error) == "At 1.25 s the force of cell 312 became inf. Use a shorter step."
+
+
+def run_too_stiff(stepper: str) -> None:
+    """Run a stiff scene with steps far beyond the limit of explicit methods."""
+    system = one_cell(
+        contact=Contact(exponent=2e4),
+        period=50e-3,
+        step=50e-3,
+        stepper=stepper,
+        control=scripted(lambda t, x, y: 1.0),
+    )
+    record(system, path((0, 0, 0, 40.5), (1, 0, 0, 35.0)), 200)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_explicit_method_that_leaves_the_finite_numbers_is_reported() -> None:
+    with pytest.raises(
+        DivergenceError, match=r"^At [\d.]+ s the \w+ of cell 0 became (nan|inf|-inf)\. Use a shorter"
+    ):
+        run_too_stiff("runge_kutta_4")
+
+
+def test_the_closed_form_step_does_not_diverge_where_the_explicit_one_does() -> None:
+    run_too_stiff("bernoulli")

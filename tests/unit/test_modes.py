@@ -1,0 +1,41 @@
+"""The table of control modes: stored codes, meanings, colours."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from digiclay.core.modes import COLOURS, MEANINGS, Mode
+
+
+def test_the_stored_codes_never_change() -> None:
+    # Histories on disk hold them.
+    assert {mode.name: int(mode) for mode in Mode} == {
+        "REST": 0, "HOLD": 1, "EDGE": 2, "BLISTER": 3,
+        "SPRING": 4, "FORCE_FOLLOW": 5, "CRITICAL": 6, "FROZEN": 7,
+    }  # fmt: skip
+
+
+def test_every_mode_has_a_meaning() -> None:
+    assert MEANINGS.keys() == set(Mode)
+
+
+def test_every_mode_has_a_colour() -> None:
+    assert COLOURS.keys() == set(Mode)
+
+
+def test_colours_are_srgb() -> None:
+    values = np.array(list(COLOURS.values()))
+    assert values.min() >= 0.0
+    assert values.max() <= 1.0
+
+
+def test_no_two_modes_look_alike() -> None:
+    # 0.15 apart in the unit cube: the two nearest, the blues, are 0.4 apart.
+    pairs = itertools.combinations(np.array(list(COLOURS.values())), 2)
+    assert min(np.linalg.norm(a - b) for a, b in pairs) > 0.15
+
+
+def test_cells_that_need_no_step_have_the_lowest_codes() -> None:
+    # The simulation takes modes above HOLD for busy ones.
+    assert sorted(Mode)[:2] == [Mode.REST, Mode.HOLD]

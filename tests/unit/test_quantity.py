@@ -1,0 +1,123 @@
+"""Parameters: defaults, types, bounds, and the one line said when a rule is broken."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import pytest
+from digiclay.core.errors import ParameterError
+from digiclay.core.quantity import UNITS, Parameters, nearest, parse, quantities, quantity
+
+
+@dataclass(frozen=True)
+class Lever(Parameters):
+    """A part that has every kind of field."""
+
+    length: float = quantity(0.1, "length", unit="m", symbol="l", source="P", above=0.0, below=10.0)
+    teeth: int = quantity(12, "teeth", at_least=3, at_most=99)
+    metal: str = quantity("brass", "what it is made of", choices=("brass", "steel"))
+    notches: tuple[float, ...] = quantity((0.1, 0.2), "notches", unit="m", at_least=0.0)
+
+
+def test_defaults_are_valid() -> None:
+    assert dataclasses.astuple(Lever()) == (0.1, 12, "brass", (0.1, 0.2))
+
+
+def test_whole_numbers_pass_for_floats() -> None:
+    assert isinstance(Lever(length=1).length, float)
+
+
+def test_a_float_without_fraction_passes_for_a_whole_number() -> None:
+    assert isinstance(Lever(teeth=7.0).teeth, int)
+
+
+def test_a_list_passes_for_a_tuple() -> None:
+    assert Lever(notches=[0, 0.5]).notches == (0.0, 0.5)
+
+
+def test_parameters_cannot_be_changed() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Lever().length = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ({"length": 0}, "Lever.length must be above 0 m (got 0 m)."),
+        ({"length": 10.0}, "Lever.length must be below 10 m (got 10 m)."),
+        ({"length": math.nan}, "Lever.length must be a finite number (got nan m)."),
+        ({"length": -math.inf}, "Lever.length must be a finite number (got -inf m)."),
+        ({"length": 10**400}, "Lever.length must be a finite number (got a whole number beyond all floats)."),
+        ({"length": "long"}, "Lever.length must be a number (got 'long')."),
+        ({"length": True}, "Lever.length must be a number (got True)."),
+        ({"length": None}, "Lever.length must be a number (got None)."),
+        ({"teeth": 2}, "Lever.teeth must be at least 3 (got 2)."),
+        ({"teeth": 100}, "Lever.teeth must be at most 99 (got 100)."),
+        ({"teeth": 3.5}, "Lever.teeth must be a whole number (got 3.5)."),
+        ({"teeth": False}, "Lever.teeth must be a whole number (got False)."),
+        ({"metal": "tin"}, "Lever.metal must be one of brass, steel (got 'tin')."),
+        ({"metal": 3}, "Lever.metal must be a text (got 3)."),
+        ({"notches": []}, "Lever.notches must be a list of numbers (got [])."),
+        ({"notches": (0.1, -0.2)}, "Lever.notches must be at least 0 m (got -0.2 m)."),
+        ({"notches": (0.1, "x")}, "Lever.notches must be a number (got 'x')."),
+    ],
+)
+def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(
+    given: dict[str, object], line: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Lever(**given)
+    assert str(caught.value) == line
+
+
+def test_bounds_that_are_included_are_allowed() -> None:
+    assert (Lever(teeth=3).teeth, Lever(teeth=99).teeth) == (3, 99)
+
+
+def test_quantities_tell_what_is_known_of_a_field() -> None:
+    known = quantities(Lever)["length"]
+    assert (known.doc, known.unit, known.symbol, known.source) == ("length", "m", "l", "P")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("3 mm", "m", 3e-3),
+        ("0.5 bar", "Pa", 5e4),
+        ("1.6 cSt", "m2/s", 1.6e-6),
+        (" 2  ms ", "s", 2e-3),
+        ("-5e-1 N", "N", -0.5),
+    ],
+)
+def test_a_quantity_with_a_unit_is_read_into_si(text: str, unit: str, value: float) -> None:
+    assert parse(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_every_unit_reads_as_its_factor(name: str) -> None:
+    factor, unit = UNITS[name]
+    assert parse(f"2 {name}", unit) == 2 * factor
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("three mm", "must be a number, or a text such as '3 m'"),
+        ("3 parsec", "must have a unit known here"),
+        ("3", "must have a unit known here"),
+        ("3 bar", "must be in m or a multiple of it"),
+    ],
+)
+def test_a_quantity_that_cannot_be_read_names_the_rule(text: str, rule: str) -> None:
+    with pytest.raises(ValueError, match=rule):
+        parse(text, "m")
+
+
+def test_the_nearest_name_is_suggested() -> None:
+    assert nearest("viscosty", ["density", "viscosity"]) == "viscosity"
+
+
+def test_nothing_is_suggested_for_a_name_unlike_all() -> None:
+    assert nearest("qqq", ["density", "viscosity"]) == ""

@@ -1,0 +1,85 @@
+"""The rows of a state, and states as values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from digiclay.core.control.virtual_master import VirtualMaster
+from digiclay.core.layout import Layout
+from digiclay.core.modes import Mode
+from digiclay.core.simulation import begin
+from digiclay.core.state import Rows, State, at_rest
+
+from tests.assemble import make_system, one_cell, path, record
+
+
+@pytest.mark.parametrize("owners", [(1, 1), (5, 2), (4, 7), (5, 2, 3, 1)])
+def test_every_row_has_one_owner(owners: tuple[int, ...]) -> None:
+    rows = Rows(*owners)
+    all_rows = range(rows.count)
+    parts = [*all_rows[rows.commands], *all_rows[rows.controlled], *all_rows[rows.sensed]]
+    owned = [*range(rows.physics), *parts, rows.target, rows.force]
+    assert sorted(owned) == list(range(rows.count))
+
+
+def test_the_newest_command_is_the_last_of_the_queue() -> None:
+    rows = Rows(5, 3)
+    assert rows.command == range(rows.count)[rows.commands][-1]
+
+
+def test_at_rest_every_pin_is_at_its_target_and_every_valve_shut() -> None:
+    rows = Rows(5, 2)
+    state = at_rest(rows, 4, 40e-3, None)
+    assert np.all(state.rows[[0, rows.target]] == 40e-3)
+    others = np.delete(state.rows, [0, rows.target], axis=0)
+    assert not others.any()
+
+
+def test_at_rest_nothing_moves() -> None:
+    state = at_rest(Rows(5, 2), 4, 40e-3, None)
+    assert (state.gathered.cells.size, state.mode().tolist()) == (0, [Mode.REST] * 4)
+
+
+def pressed() -> State:
+    """Return a state some of whose cells are gathered."""
+    return record(
+        make_system(Layout(9, 9), control=VirtualMaster()), path((0, 0, 0, 41), (0.2, 0, 0, 37)), 40
+    ).last
+
+
+def test_a_copy_shares_no_array_that_a_step_changes() -> None:
+    state = pressed()
+    copy = state.copy()
+    pairs = [(getattr(state, name), getattr(copy, name)) for name in ("rows", "modes", "aged")]
+    pairs += [(getattr(state.gathered, name), getattr(copy.gathered, name)) for name in ("block", "mode")]
+    assert [np.shares_memory(*pair) for pair in pairs] == [False] * 5
+
+
+def test_a_row_has_the_gathered_cells_own_values() -> None:
+    state = pressed()
+    assert state.gathered.cells.size
+    assert np.array_equal(state.row(0)[state.gathered.cells], state.gathered.block[0])
+
+
+def test_a_row_is_a_new_array() -> None:
+    state = pressed()
+    state.row(0)[:] = -1.0
+    assert state.row(0).min() > 0.0
+
+
+def test_modes_are_the_gathered_cells_own() -> None:
+    state = pressed()
+    assert np.array_equal(state.mode()[state.gathered.cells], state.gathered.mode)
+
+
+@pytest.mark.parametrize(
+    ("absent", "rows"),
+    [
+        ({}, 5),
+        ({"valve_lag": None}, 4),
+        ({"relaxation": None}, 2),
+        ({"valve_lag": None, "relaxation": None}, 1),
+    ],
+)
+def test_a_part_that_is_left_out_owns_no_row(absent: dict[str, None], rows: int) -> None:
+    assert begin(one_cell(dead_time=0.0, **absent)).rows.shape[0] == rows + 3  # command, target, force

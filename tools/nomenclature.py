@@ -1,0 +1,105 @@
+"""Write docs/nomenclature.md: `python tools/nomenclature.py`.
+
+The parameters come from their declarations in the core; the variables are listed here.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "nomenclature.md"
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT / "addon"))
+
+from digiclay.core.methods import METHODS  # noqa: E402
+from digiclay.core.quantity import Parameters, quantities  # noqa: E402
+from digiclay.core.scene import SECTIONS, parameters  # noqa: E402
+
+INTRODUCTION = """\
+# Nomenclature
+
+Everything is in SI units inside. Heights grow upwards from the floor of the bed; a force that presses a pin
+down is positive; flow into a cylinder is positive; a valve command lies in −1 to 1, above 0 for the high
+reservoir.
+
+This page is made by `tools/nomenclature.py`; a test compares the two.
+
+## Variables
+"""
+#: Symbol, name in code, unit, meaning.
+VARIABLES = (
+    ("H", "`height`, row 0 of `State.rows`", "m", "height of a pin's top"),
+    ("H_com", "`target`", "m", "height a cell is commanded to"),
+    ("K_com", "`command`", "1", "valve command, held for a control period"),
+    ("K", "`opening`, `Cell.lag_rows`", "1", "valve opening; its sign picks the reservoir"),
+    ("h\\*", "size of `opening`", "1", "relative opening of the valve, \\|K\\|"),
+    (
+        "z_i",
+        "`filters`, `Cell.pulp_rows`",
+        "N",
+        "force the pulp over a cell has relaxed, one a relaxation time",
+    ),
+    ("x", "`depth`", "m", "indentation: pin top less underside of the finger"),
+    ("T", "`tension`", "N", "elastic force of the pulp (11)"),
+    ("F", "`force`", "N", "force on a pin, `f_d max(T − Σ ĉ_i z_i, 0)` (14)"),
+    ("ĉ_i", "`Relaxation.shares`", "1", "share of a relaxation time, c_i / Σ c"),
+    ("G", "`Relaxation.reduced`", "1", "reduced relaxation (12)"),
+    ("P_a", "`Actuator.pressure`", "Pa", "gauge pressure in a cylinder (2)"),
+    ("A_a", "`Actuator.area`", "m2", "cross section of a cylinder"),
+    ("P_s", "`Supply.pressure`", "Pa", "gauge pressure of the reservoir the valve opens to"),
+    ("ΔP", "`drop`", "Pa", "pressure drop over valve and conduit, P_s − P_a"),
+    ("ΔP_crit", "`Orifice.knee`", "Pa", "drop at which the flow turns turbulent (6), fully open valve"),
+    ("Q, q", "`flow`", "m3/s", "flow into the cylinder (7)"),
+    ("g, a", "`Orifice.laminar`, `Orifice.turbulent`", "m3/(s Pa), …", "coefficients of the open valve (7)"),
+    ("C_q", "in `valve.orifice`", "1", "discharge coefficient (3, 5)"),
+    ("Re\\*", "in `valve.orifice`", "1", "modified Reynolds number (4)"),
+    ("R", "`Conduit.resistance`", "Pa s/m3", "resistance of the conduit (8)"),
+    ("μ", "`Fluid.dynamic_viscosity`", "Pa s", "dynamic viscosity ρ ν"),
+    ("r_VM", "`Master.x`, `Master.y`", "m", "place of the virtual master (13 again)"),
+)
+LEGEND = """\
+
+## Parameters
+
+The name is the key in a scene file. Source: P the paper, S another source, D derived, C chosen. A default in
+brackets means several values, one after another.
+"""
+RULE = "|---|---|---|---|---|---|"
+
+
+def shown(value: object) -> str:
+    """Write a default: the shortest digits that give it back."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(shown(item) for item in value) + "]"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def section(name: str, method: str) -> list[str]:
+    """Return the lines of one section of a scene file."""
+    kind: type[Parameters] = parameters(name, method)
+    title = f"### [{name}]" + (f' with method = "{method}"' if name == "control" else "")
+    lines = ["", title, "", "| Symbol | Name | Unit | Meaning | Default | Source |", RULE]
+    defaults = kind()
+    for field, known in quantities(kind).items():
+        meaning = known.doc + (f" ({', '.join(known.choices)})" if known.choices else "")
+        default = shown(getattr(defaults, field))
+        cells = (known.symbol, f"`{name}.{field}`", known.unit, meaning, default, known.source)
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def page() -> str:
+    """Return the page."""
+    lines = [INTRODUCTION, "| Symbol | Name in code | Unit | Meaning |", "|---|---|---|---|"]
+    lines += ["| " + " | ".join(row) + " |" for row in VARIABLES]
+    lines.append(LEGEND.rstrip())
+    for name in SECTIONS:
+        for method in METHODS if name == "control" else ("virtual_master",):
+            lines += section(name, method)
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
