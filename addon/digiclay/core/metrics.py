@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
-from .modes import Mode
+from .metrics_path import Rows, in_contact, lag, ridge_errors, shaping, surface_under
+from .metrics_signal import deviation, mean, overshoot, settling_time, weights
 from .surface import grid_shape
 
 __all__ = [
+    "BAND",
     "METRICS",
     "cell_area",
     "contact_loss_share",
+    "first_touch",
     "in_contact",
     "lag",
     "rfd",
@@ -30,7 +33,9 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+
+#: Settled is a force this near to its set point, as a share of it.
+BAND = 0.1
 
 #: Every key of `summary`: its unit and its meaning.
 METRICS: dict[str, tuple[str, str]] = {
@@ -43,6 +48,19 @@ METRICS: dict[str, tuple[str, str]] = {
     "contact_loss_share": ("1", "share of the time from first to last contact in which it does not touch"),
     "lag_mean": ("m", "mean horizontal distance from fingertip to the centroid of the cells' forces"),
     "lag_max": ("m", "largest such distance"),
+    "force_deviation": ("N", "standard deviation over time of the total force while shaping"),
+    "force_overshoot": ("1", "first touch: largest force beyond the set point, as a share of it"),
+    "settling_time": (
+        "s",
+        "first touch: from touching down until the force stays within 10 % of its set point",
+    ),
+    "height_deviation": (
+        "m",
+        "standard deviation over time of the surface's height over the finger, shaping",
+    ),
+    "ridge_offset": ("m", "mean height of what the finger left behind over its path"),
+    "ridge_error": ("m", "rms of the same"),
+    "ridge_unevenness": ("m", "standard deviation of the same"),
     "max_cell_force": ("N", "largest force on one cell"),
     "max_total_force": ("N", "largest force on all cells together"),
     "lowest": ("m", "height of the lowest pin at the end"),
@@ -51,51 +69,6 @@ METRICS: dict[str, tuple[str, str]] = {
     "raised_volume": ("m3", "volume formed above the initial surface"),
     "sunk_volume": ("m3", "volume formed below the initial surface"),
 }
-
-
-def in_contact(total_force: ArrayLike) -> Rows:
-    """Return which rows have contact, shape (t,), from the total force in N."""
-    touching: Rows = np.asarray(total_force, dtype=np.float64) > 0.0
-    return touching
-
-
-def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
-    """Return which rows shape the clay: in contact, and a cell under the finger follows the force.
-
-    Parameters
-    ----------
-    total_force : array_like, shape (t,)
-        N.
-    mode : array_like of int, shape (t, n)
-        Codes of `Mode`.
-
-    Returns
-    -------
-    ndarray of bool, shape (t,)
-    """
-    rows: Rows = in_contact(total_force) & np.any(np.asarray(mode) == Mode.FORCE_FOLLOW, axis=1)
-    return rows
-
-
-def weights(time: ArrayLike) -> Floats:
-    """Return the time each row stands for, s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half of it at the ends.
-
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        Increasing, s.
-
-    Returns
-    -------
-    ndarray, shape (t,)
-        The weight of a single row is 1.
-    """
-    moment = np.asarray(time, dtype=np.float64)
-    if len(moment) < 2:
-        return np.ones(len(moment))
-    half = 0.5 * np.diff(moment)
-    each: Floats = np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
-    return each
 
 
 def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | None = None) -> float | None:
@@ -122,7 +95,7 @@ def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | 
     """
     force = np.asarray(total_force, dtype=np.float64)
     chosen = in_contact(force) if rows is None else rows
-    square = _mean(((force - set_point) ** 2)[chosen], weights(time)[chosen])
+    square = mean(((force - set_point) ** 2)[chosen], weights(time)[chosen])
     return None if square is None else float(np.sqrt(square))
 
 
@@ -147,35 +120,27 @@ def contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
     if not np.any(touching):
         return None
     first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
-    return _mean(1.0 - touching[first:after], weights(time)[first:after])
+    return mean(1.0 - touching[first:after], weights(time)[first:after])
 
 
-def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
-    """Return how far the blister is behind the finger, in the rows in contact.
+def first_touch(total_force: ArrayLike) -> slice:
+    """Return the rows from the last one before the first contact to the last one of that contact."""
+    touching = in_contact(total_force)
+    if not np.any(touching):
+        return slice(0, 0)
+    start = int(np.argmax(touching))
+    gone = np.flatnonzero(~touching[start:])
+    return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
 
-    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
-    point, r_j the cells' positions.
 
-    Parameters
-    ----------
-    position : array_like, shape (n, 2)
-        m.
-    force : array_like, shape (t, n)
-        N.
-    fingertip : array_like, shape (t, 7)
-        Lowest point, m, and quaternion.
-
-    Returns
-    -------
-    ndarray, shape (rows in contact,)
-        m.
-    """
-    pressed = np.asarray(force, dtype=np.float64)
-    total = pressed.sum(axis=1)
-    rows = in_contact(total)
-    centroid = pressed[rows] @ np.asarray(position, dtype=np.float64) / total[rows, None]
-    distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
-    return distance
+def _followed(
+    time: Floats, total: Floats, set_point: float, first: slice
+) -> tuple[float | None, float | None]:
+    """Return overshoot and settling time of the force at first touch; None where no force is asked for."""
+    if set_point <= 0.0 or first.stop == first.start:
+        return None, None
+    beyond = overshoot(np.concatenate([[0.0], total[first]]), set_point)
+    return beyond, settling_time(time[first], total[first], set_point, BAND * set_point)
 
 
 def cell_area(position: ArrayLike) -> float | None:
@@ -229,16 +194,29 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
     touching = in_contact(total)
     behind, weight = lag(position, force, history["fingertip"]), weights(time)[in_contact(force.sum(axis=1))]
     formed, area = height[-1] - height[0], cell_area(position)
+    rows = shaping(total, history["mode"])
+    beyond, settled = _followed(time, total, float(set_point), first_touch(total))
+    above = surface_under(height, force, history["fingertip"])
+    felt = in_contact(force.sum(axis=1))
+    ridge = ridge_errors(position, height[-1], history["fingertip"], rows)
+    each = np.ones(len(ridge))
     found: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
         "set_point": float(set_point),
         "rfd": rfd(time, total, set_point),
-        "rfd_shaping": rfd(time, total, set_point, shaping(total, history["mode"])),
+        "rfd_shaping": rfd(time, total, set_point, rows),
         "rfd_session": rfd(time, total, set_point, np.ones(len(time), dtype=bool)),
-        "contact_share": _mean(touching.astype(np.float64), weights(time)),
+        "contact_share": mean(touching.astype(np.float64), weights(time)),
         "contact_loss_share": contact_loss_share(time, total),
-        "lag_mean": _mean(behind, weight),
+        "lag_mean": mean(behind, weight),
         "lag_max": float(behind.max()) if len(behind) else None,
+        "force_deviation": deviation(total[rows], weights(time)[rows]),
+        "force_overshoot": beyond,
+        "settling_time": settled,
+        "height_deviation": deviation(above[rows[felt]], weights(time)[felt][rows[felt]]),
+        "ridge_offset": mean(ridge, each),
+        "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
+        "ridge_unevenness": deviation(ridge, each),
         "max_cell_force": float(force.max()),
         "max_total_force": float(total.max()),
         "lowest": float(height[-1].min()),
@@ -250,9 +228,3 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
     return {
         name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
     }
-
-
-def _mean(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted mean, or None when there is nothing to average."""
-    total = float(np.sum(weight))
-    return float(np.sum(weight * values)) / total if total > 0.0 else None

@@ -119,7 +119,7 @@ def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: A
         return int(value)
     if kind is tuple and isinstance(value, (list, tuple)) and value:
         return tuple(_typed(owner, name, known, item, default[0]) for item in value)
-    if isinstance(value, kind) and (number or kind not in (int, float)):
+    if isinstance(value, kind) and kind is not tuple and (number or kind not in (int, float)):
         return value
     wanted = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
     rule = f"must be {wanted.get(kind, 'a list of numbers')}"

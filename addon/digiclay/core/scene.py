@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from .layout import Layout
     from .recorder import Recorder
     from .relaxation import Relaxation
+    from .sensors import Sensing
     from .supply import Supply
     from .trajectory import Trajectory
     from .valve import Valve
@@ -35,6 +36,7 @@ __all__ = [
     "PARTS",
     "SECTIONS",
     "STEPPERS",
+    "UNASKED",
     "Path",
     "Scene",
     "Simulation",
@@ -56,6 +58,7 @@ PARTS: dict[str, tuple[str, str]] = {
     "fingertip": ("fingertip", "Fingertip"),
     "contact": ("contact", "Contact"),
     "relaxation": ("relaxation", "Relaxation"),
+    "sensors": ("sensors", "Sensing"),
     "blister": ("control.blister", "Blister"),
     "simulation": ("scene", "Simulation"),
     "recorder": ("recorder", "Recorder"),
@@ -63,15 +66,21 @@ PARTS: dict[str, tuple[str, str]] = {
 #: The sections of a scene that are parts, in the order they are written.
 SECTIONS = (
     "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
-    "relaxation", "control", "blister", "simulation", "recorder",
+    "relaxation", "sensors", "control", "blister", "simulation", "recorder",
 )  # fmt: skip
 #: Parts a scene may leave out.
-OPTIONAL = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "control", "recorder")
+OPTIONAL = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "recorder")
+#: Parts a scene leaves out unless it names them.
+UNASKED = ("sensors",)
 #: Parts that are left out together with another.
 NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
 #: Steppers: module and class.
 STEPPERS: dict[str, tuple[str, str]] = {
     "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
+    "richardson": ("steppers.richardson", "Richardson"),
+    "adaptive": ("steppers.adaptive", "Adaptive"),
+    "euler": ("steppers.euler", "Euler"),
+    "heun": ("steppers.heun", "Heun"),
     "runge_kutta_4": ("steppers.runge_kutta", "RungeKutta4"),
 }
 #: Most physics steps in a control period, and most control periods on their way to a valve.
@@ -99,6 +108,9 @@ class Simulation(Parameters):
     control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
     physics_step: float = quantity(1e-3, "longest step of the physics", unit="s", symbol="h", above=0.0)
     stepper: str = quantity("bernoulli", "how a step is integrated", choices=tuple(STEPPERS))
+    tolerance: float = quantity(
+        1e-6, "error of the heights that the adaptive stepper keeps to", unit="m", symbol="ε", at_least=1e-7
+    )
     duration: float = quantity(
         0.0, "simulated time; 0: as long as the trajectory lasts", unit="s", at_least=0.0, at_most=1e6
     )
@@ -196,6 +208,7 @@ class Scene:
     description: str = ""
     preset: str = "paper"
     method: str = "virtual_master"
+    sensors: Sensing | None = None
 
     def __post_init__(self) -> None:
         if self.layout.pitch < self.actuator.bore:

@@ -11,7 +11,7 @@ from typing import Any
 from .errors import ParameterError
 from .methods import METHODS
 from .quantity import Parameters, nearest, parse, quantities
-from .scene import NEEDS, OPTIONAL, SECTIONS, Path, Scene, Waypoint, parameters
+from .scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, Path, Scene, Waypoint, parameters
 
 __all__ = ["ABSENT", "PRESETS", "resolve", "text"]
 
@@ -53,7 +53,10 @@ def resolve(table: Table, name: str = "") -> Scene:
     }
     if texts["preset"] not in PRESETS:
         raise ParameterError("preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"]))
-    given = {section: _section(section, table.get(section, {})) for section in SECTIONS}
+    given = {
+        section: _section(section, table.get(section, ABSENT if section in UNASKED else {}))
+        for section in SECTIONS
+    }
     method = _method(given["control"])
     parts: dict[str, Any] = {}
     for section in SECTIONS:

@@ -121,7 +121,7 @@ def _monotone_slopes(times: Floats, values: Floats) -> Floats:
     before, after = secant[:-1], secant[1:]
     weight_before, weight_after = 2.0 * span[1:] + span[:-1], span[1:] + 2.0 * span[:-1]
     level_out = before * after <= 0.0
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         harmonic = (weight_before + weight_after) / (weight_before / before + weight_after / after)
     slopes[1:-1] = np.where(level_out, 0.0, harmonic)
     return slopes

@@ -8,21 +8,18 @@ effort into the master's height; the cells around follow the blister's profile.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..actuator import Actuator
 from ..layout import ON_THE_SIDE
-from ..methods import ControlParameters
 from ..modes import Mode
 from ..places import Measurement, Orders
-from ..quantity import quantity
 from .bench import Bench
 from .blister import Blister
+from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
 from .servo import Servo, locked_under_overload
 from .travel import Heading, ahead_of, square_distance, turned
@@ -36,94 +33,6 @@ OUTSIDE = np.array([Mode.REST, Mode.HOLD], np.int8)
 EDGE, BLISTER, SPRING, FORCE_FOLLOW, FROZEN = (
     np.int8(mode) for mode in (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
 )
-
-
-class Phase(IntEnum):
-    """What the master is doing."""
-
-    IDLE = 0
-    SPRING = 1
-    SHAPING = 2
-
-
-class Master(NamedTuple):
-    """The controller's memory.
-
-    Attributes
-    ----------
-    phase : Phase
-    x, y, height : float
-        Where the master is, m.
-    opening : float
-        Of its own valve.
-    reference : float
-        Surface height at first touch, from which the virtual spring is pressed down, m.
-    edge : float
-        Height of the surface around the blister, m.
-    heading : Heading
-        Which way it travels.
-    alone : int
-        Control periods since the finger was last felt.
-    losses : int
-        How often the finger was lost while shaping.
-    """
-
-    phase: Phase = Phase.IDLE
-    x: float = 0.0
-    y: float = 0.0
-    height: float = 0.0
-    opening: float = 0.0
-    reference: float = 0.0
-    edge: float = 0.0
-    heading: Heading = Heading()
-    alone: int = 0
-    losses: int = 0
-
-
-@dataclass(frozen=True)
-class VirtualMaster(ControlParameters):
-    """Gains and thresholds of Method I."""
-
-    force_setpoint: float = quantity(
-        0.4,
-        "total force held while shaping, and at which shaping starts",
-        unit="N",
-        symbol="F_ref",
-        above=0.0,
-    )
-    spring_stiffness: float = quantity(
-        200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
-    )
-    position_gain: float = quantity(
-        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
-    )
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
-    force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
-    radius: float = quantity(
-        8e-3,
-        "how far from the master the finger is looked for",
-        unit="m",
-        symbol="r_VM",
-        source="P",
-        above=0.0,
-    )
-    travel: float = quantity(
-        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
-    )
-    behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
-    )
-    felt_force: float = quantity(
-        1e-3, "total force below which there is no finger", unit="N", symbol="F_0", above=0.0
-    )
-    loss_time: float = quantity(
-        50e-3, "time without force after which the finger is lost", unit="s", symbol="t_l", at_least=0.0
-    )
-
-    @property
-    def total_setpoint(self) -> float:
-        """Total force the finger should feel, N."""
-        return self.force_setpoint
 
 
 @dataclass(frozen=True)
@@ -171,7 +80,9 @@ class VirtualMasterControl:
         master = self._locate(memory, touched, force)
         if master.phase is Phase.IDLE:
             return master, None
-        master = self._lead(master, force)
+        # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
+        given_up = self._given_up(master)
+        master = master._replace(height=master.felt) if given_up else self._lead(master, force)
         return master, (master.x, master.y, self.blister.edge_radius)
 
     def _locate(self, master: Master, touched: Measurement, total: float) -> Master:
@@ -200,6 +111,7 @@ class VirtualMasterControl:
             0.0,
             reference=surface,
             edge=surface,
+            felt=surface,
             heading=Heading(x, y),
             losses=master.losses,
         )
@@ -208,11 +120,14 @@ class VirtualMasterControl:
         """Count the periods without a finger; give it up after the loss time."""
         if master.phase is Phase.IDLE:
             return master
-        alone = master.alone + 1
-        if alone * self.period <= self.parameters.loss_time:
-            return master._replace(alone=alone)
+        if not self._given_up(master):
+            return master._replace(alone=master.alone + 1)
         lost = master.phase is Phase.SHAPING
-        return master._replace(phase=Phase.IDLE, alone=alone, losses=master.losses + lost)
+        return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
+
+    def _given_up(self, master: Master) -> bool:
+        """Tell whether the finger has been away for longer than the loss time."""
+        return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
 
     def _lead(self, master: Master, force: float) -> Master:
         """VM Control and VM Model: the effort, and the height a real cell would make of it."""
@@ -224,7 +139,8 @@ class VirtualMasterControl:
         else:
             effort = known.force_gain * (known.force_setpoint - force)
         height, opening = self.model.after(master.height, master.opening, min(max(effort, -1.0), 1.0))
-        return master._replace(phase=phase, height=height, opening=opening)
+        felt = height if master.alone == 0 else master.felt
+        return master._replace(phase=phase, height=height, opening=opening, felt=felt)
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
         """Create the blister, freeze what is left behind, command every cell; see `places.Controller`."""
@@ -255,15 +171,18 @@ class VirtualMasterControl:
             master = master._replace(edge=float(facing.sum()) / facing.size)
         touched = seen.force > 0.0
         backward = ahead < self.parameters.behind * distance
-        backward &= distance > blister.flat_radius
+        backward &= distance > blister.flat_radius * (1.0 + ON_THE_SIDE)
         backward |= seen.mode == FROZEN
         backward &= inside
-        frozen = backward > touched
+        frozen = backward & (seen.force < self.parameters.release_force)
         profile = blister.height(distance, master.edge, master.height)
         np.maximum(profile, 0.0, profile)
         np.minimum(profile, self.actuator.stroke, profile)
+        # What is frozen is never called back; a blister that outgrows it takes it along.
+        outgrown = np.maximum if master.height >= master.edge else np.minimum
+        np.putmask(profile, frozen, outgrown(profile, seen.target))
         target = seen.target.copy()
-        np.putmask(target, inside > frozen, profile)
+        np.putmask(target, inside, profile)
         np.putmask(mode, inside, BLISTER)
         np.putmask(mode, inside & touched, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING)
         np.putmask(mode, ring, EDGE)

@@ -146,6 +146,7 @@ def _under_finger(
     work = np.empty((pulp + 3, k))
     filters, first, mean, last = work[:pulp], work[pulp], work[pulp + 1], work[pulp + 2]
     np.divide(y[plan.cell.pulp_rows], unit, filters)
+    np.maximum(filters, zero, filters)
     exponent = m * height
     exponent -= floor[0]
     grown = _grown(exponent, zero, most)
@@ -187,7 +188,8 @@ def _under_finger(
         mean *= half
         rate -= one
         np.putmask(mean, ~idle, rate)
-        filters[:] = np.dot(plan.transition[s], work)
+        # Of a tension that falls steeply a straight line would make a filter that pulls.
+        np.maximum(np.dot(plan.transition[s], work), zero, filters)
     np.multiply(filters, unit, y[plan.cell.pulp_rows])
 
 

@@ -1,0 +1,136 @@
+"""Moving a pin at a wanted speed, to a wanted height, or as a force asks: what the behaviours share.
+
+A valve's flow goes with the square of its opening, so a height control that is proportional in the
+opening comes in like 1/t. Here the opening is worked out from the wanted speed instead, by the flow law
+of a pin without load, and heights come in exponentially.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ParameterError
+from ..methods import ControlParameters
+from ..physics import Cell
+from ..quantity import quantity
+
+__all__ = ["Drive", "DriveParameters", "TouchParameters", "check_damping", "drive"]
+
+Floats = NDArray[np.float64]
+
+#: Openings at which the speed is worked out; in between it is interpolated.
+OPENINGS = np.linspace(0.0, 1.0, 129)
+
+
+@dataclass(frozen=True)
+class DriveParameters(ControlParameters):
+    """What every behaviour's height control needs."""
+
+    settling_time: float = quantity(
+        20e-3, "time constant with which a free pin comes to its height", unit="s", symbol="τ_s", above=0.0
+    )
+    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+
+
+@dataclass(frozen=True)
+class TouchParameters(DriveParameters):
+    """What a behaviour needs that goes by the force on each cell."""
+
+    felt_force: float = quantity(
+        5e-3,
+        "force from which on a cell counts as touched; five times the sensors' noise or more",
+        unit="N",
+        symbol="F_0",
+        above=0.0,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Valve commands for wanted speeds.
+
+    Attributes
+    ----------
+    settling_time : float
+        s.
+    dead_band : float
+        m.
+    up, down : ndarray (129,)
+        Speed of a pin without load at `OPENINGS`, towards either reservoir, growing, m/s.
+    lift : float
+        Force the high reservoir can lift, N.
+    """
+
+    settling_time: float
+    dead_band: float
+    up: Floats
+    down: Floats
+    lift: float
+
+    def at_speed(self, speed: Floats) -> Floats:
+        """Return valve commands, shape (m,), that move pins without load at some speeds, m/s, up positive."""
+        size = np.abs(speed)
+        return np.where(
+            speed > 0.0, np.interp(size, self.up, OPENINGS), -np.interp(size, self.down, OPENINGS)
+        )
+
+    def approach(self, error: Floats) -> Floats:
+        """Return the speed that takes a pin to its height, m/s, for commanded less measured heights, m.
+
+        ``v = e / τ_s``, nothing within the dead band.
+        """
+        speed: Floats = np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
+        return speed
+
+
+def drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
+    """Make the drive for a device.
+
+    Raises
+    ------
+    ParameterError
+        When the height control would be faster than it is asked.
+    """
+    if parameters.settling_time < 2.0 * period:
+        rule = f"must be at least two control periods, {2.0 * period:g} s"
+        raise ParameterError("control", "settling_time", rule, f"{parameters.settling_time:g} s")
+    area, supply = cell.actuator.area, cell.supply
+
+    def speeds(pressure: float) -> Floats:
+        """Return the speeds towards a reservoir; one that cannot move a pin gets the valve wide open."""
+        free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / area
+        rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
+        return rising
+
+    return Drive(
+        parameters.settling_time,
+        parameters.dead_band,
+        speeds(supply.high),
+        speeds(-supply.low),
+        supply.high * area,
+    )
+
+
+def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 0.0) -> None:
+    """Refuse a damping at which finger and pin would swing.
+
+    A pin that gives way by ``c dH/dt = -F`` under a pulp of stiffness k loses ``k T_c / c`` of the
+    force in a control period. With the dead time and the lag of the default valve it swings from about
+    2 on, so 1 is allowed. The pulp is stiffest at the largest force a pin can lift,
+    ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if cell.touch is None:
+        return
+    contact = cell.touch.contact
+    stiffest = contact.share * contact.stiffness + contact.exponent * cell.supply.high * cell.actuator.area
+    least = (stiffest + stiffness) * period
+    if damping < least:
+        rule = f"must be at least {least:.3g} N s/m at this control period, or the pin would swing"
+        raise ParameterError("control", "damping", rule, f"{damping:g} N s/m")

@@ -1,0 +1,72 @@
+"""Elastic: a pressed pin gives way like a spring, and springs back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import quantity
+from .bench import Bench
+from .drive import Drive, TouchParameters, check_damping, drive
+from .servo import locked_under_overload
+
+__all__ = ["Elastic", "ElasticControl", "assembled"]
+
+Floats = NDArray[np.float64]
+
+#: Share of the felt force down to which a touched cell stays touched: its spring may press no harder.
+STILL = 0.2
+
+
+@dataclass(frozen=True)
+class Elastic(TouchParameters):
+    """A spring under every pin, and what damps it."""
+
+    stiffness: float = quantity(20.0, "spring of a cell", unit="N/m", symbol="k", above=0.0)
+    damping: float = quantity(
+        5.0, "force for the speed at which a pressed pin moves", unit="N s/m", symbol="c", above=0.0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticControl:
+    """The elastic behaviour, put together for a bed.
+
+    Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
+    """
+
+    parameters: Elastic
+    actuator: Actuator
+    drive: Drive
+
+    name = "elastic"
+    rows = 0
+
+    def begin(self) -> None:
+        """Nothing to remember."""
+
+    def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
+        """Ask for no more than the cells near the finger and those that move; see `places.Controller`."""
+        return memory, None
+
+    def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
+        """Let pressed cells give way, and the others spring back; see `places.Controller`."""
+        known, rest = self.parameters, self.actuator.rest_height
+        error = rest - seen.height
+        pressed = seen.force >= known.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)
+        giving = (known.stiffness * error - seen.force) / known.damping
+        command = self.drive.at_speed(np.where(pressed, giving, self.drive.approach(error)))
+        command = locked_under_overload(command, seen.force, self.drive.lift)
+        mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
+        return memory, Orders(np.full(seen.height.size, rest), mode, command)
+
+
+def assembled(parameters: Elastic, bench: Bench) -> ElasticControl:
+    """Put the elastic behaviour together for a device."""
+    check_damping(parameters.damping, bench.cell, bench.period, parameters.stiffness)
+    return ElasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))

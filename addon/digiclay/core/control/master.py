@@ -1,0 +1,107 @@
+"""The virtual master of Method I: its gains and thresholds, and what it remembers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+from ..methods import ControlParameters
+from ..quantity import quantity
+from .travel import Heading
+
+__all__ = ["Master", "Phase", "VirtualMaster"]
+
+
+class Phase(IntEnum):
+    """What the master is doing."""
+
+    IDLE = 0
+    SPRING = 1
+    SHAPING = 2
+
+
+class Master(NamedTuple):
+    """The controller's memory.
+
+    Attributes
+    ----------
+    phase : Phase
+    x, y, height : float
+        Where the master is, m.
+    opening : float
+        Of its own valve.
+    reference : float
+        Surface height at first touch, from which the virtual spring is pressed down, m.
+    edge : float
+        Height of the surface around the blister, m.
+    heading : Heading
+        Which way it travels.
+    felt : float
+        Its height when the finger was last felt, m.
+    alone : int
+        Control periods since the finger was last felt.
+    losses : int
+        How often the finger was lost while shaping.
+    """
+
+    phase: Phase = Phase.IDLE
+    x: float = 0.0
+    y: float = 0.0
+    height: float = 0.0
+    opening: float = 0.0
+    reference: float = 0.0
+    edge: float = 0.0
+    heading: Heading = Heading()
+    felt: float = 0.0
+    alone: int = 0
+    losses: int = 0
+
+
+@dataclass(frozen=True)
+class VirtualMaster(ControlParameters):
+    """Gains and thresholds of Method I."""
+
+    force_setpoint: float = quantity(
+        0.4,
+        "total force held while shaping, and at which shaping starts",
+        unit="N",
+        symbol="F_ref",
+        above=0.0,
+    )
+    spring_stiffness: float = quantity(
+        200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
+    )
+    position_gain: float = quantity(
+        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
+    )
+    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+    force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
+    radius: float = quantity(
+        8e-3,
+        "how far from the master the finger is looked for",
+        unit="m",
+        symbol="r_VM",
+        source="P",
+        above=0.0,
+    )
+    travel: float = quantity(
+        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
+    )
+    behind: float = quantity(
+        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
+    )
+    release_force: float = quantity(
+        0.02, "force that frees a frozen cell", unit="N", symbol="F_free", above=0.0
+    )
+    felt_force: float = quantity(
+        1e-3, "total force below which there is no finger", unit="N", symbol="F_0", above=0.0
+    )
+    loss_time: float = quantity(
+        50e-3, "time without force after which the finger is lost", unit="s", symbol="t_l", at_least=0.0
+    )
+
+    @property
+    def total_setpoint(self) -> float:
+        """Total force the finger should feel, N."""
+        return self.force_setpoint

@@ -1,0 +1,85 @@
+"""Plastic: a pin pressed harder than it yields gives way, and stays at the deepest press."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..errors import ParameterError
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import quantity
+from .bench import Bench
+from .drive import Drive, TouchParameters, check_damping, drive
+from .servo import locked_under_overload
+
+__all__ = ["Plastic", "PlasticControl", "assembled"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plastic(TouchParameters):
+    """A Bingham body under every pin: rigid up to a yield force, viscous above."""
+
+    yield_force: float = quantity(
+        0.03, "force above which a cell gives way", unit="N", symbol="F_y", above=0.0
+    )
+    damping: float = quantity(
+        5.0, "force above yield for the speed at which a pin sinks", unit="N s/m", symbol="c", above=0.0
+    )
+
+    def check(self) -> None:
+        """A cell that yields is felt."""
+        if not self.yield_force >= self.felt_force:
+            rule = f"must be at least felt_force, {self.felt_force:g} N"
+            raise ParameterError("Plastic", "yield_force", rule, f"{self.yield_force:g} N")
+
+
+@dataclass(frozen=True, eq=False)
+class PlasticControl:
+    """The plastic behaviour, put together for a bed.
+
+    Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
+    the pin stays; left alone, it goes to the deepest height it was pressed to.
+    """
+
+    parameters: Plastic
+    actuator: Actuator
+    drive: Drive
+
+    name = "plastic"
+    rows = 0
+
+    def begin(self) -> None:
+        """Nothing to remember but the cells' targets."""
+
+    def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
+        """Ask for no more than the cells near the finger and those that move; see `places.Controller`."""
+        return memory, None
+
+    def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
+        """Let cells give way that are pressed beyond yield, hold the others; see `places.Controller`."""
+        known = self.parameters
+        pressed = seen.force >= known.felt_force
+        yielding = seen.force > known.yield_force
+        target = np.where(yielding, np.minimum(seen.target, seen.height), seen.target)
+        # A pin under the finger is not pushed back up: what it sank after yielding is felt as no force.
+        back = self.drive.approach(target - seen.height)
+        speed = np.where(pressed, np.minimum(back, 0.0), back)
+        np.putmask(speed, yielding, (known.yield_force - seen.force) / known.damping)
+        command = locked_under_overload(self.drive.at_speed(speed), seen.force, self.drive.lift)
+        formed = np.abs(target - self.actuator.rest_height) > known.dead_band
+        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        np.putmask(mode, pressed, np.int8(Mode.SPRING))
+        np.putmask(mode, yielding, np.int8(Mode.FORCE_FOLLOW))
+        return memory, Orders(target, mode, command)
+
+
+def assembled(parameters: Plastic, bench: Bench) -> PlasticControl:
+    """Put the plastic behaviour together for a device."""
+    check_damping(parameters.damping, bench.cell, bench.period)
+    return PlasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))

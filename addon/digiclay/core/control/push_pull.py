@@ -1,0 +1,166 @@
+"""Pin push and pull: a touch shows in commanded less measured height; no force is ever read.
+
+A shut valve locks its pin, and a locked pin does not give: nothing would show. So the pins near the hand
+listen: their valves open a little to the high and to the low reservoir in turn. A free pin ends every such
+cycle where it began; a loaded one rises less than it falls, drifts off, and so gives the hand away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..errors import ParameterError
+from ..layout import ON_THE_SIDE
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import quantity
+from .bench import Bench
+from .drive import Drive, DriveParameters, drive
+from .travel import square_distance
+
+__all__ = ["Listening", "PushPull", "PushPullControl", "assembled"]
+
+Floats = NDArray[np.float64]
+
+#: Control periods of a cycle: up, then down.
+CYCLE = 2
+
+
+class Listening(NamedTuple):
+    """The controller's memory: the disc that listens, m (a negative radius: none), and periods done."""
+
+    x: float = 0.0
+    y: float = 0.0
+    radius: float = -1.0
+    period: int = 0
+
+
+@dataclass(frozen=True)
+class PushPull(DriveParameters):
+    """How pins listen, and how they give way."""
+
+    listening_speed: float = quantity(
+        8e-3, "speed of a free pin up and down while it listens", unit="m/s", symbol="v_l", above=0.0
+    )
+    following_speed: float = quantity(
+        20e-3, "speed of a free pin up and down while it is moved", unit="m/s", symbol="v_f", above=0.0
+    )
+    threshold: float = quantity(
+        0.1e-3, "commanded less measured height that is a touch", unit="m", symbol="θ", above=0.0
+    )
+    centring_time: float = quantity(
+        0.5, "time constant with which a listening pin is brought back", unit="s", symbol="τ_c", above=0.0
+    )
+    assist: float = quantity(
+        0.5, "share of its last drift that a moved pin goes on with", symbol="a", at_least=0.0, at_most=0.9
+    )
+    release_time: float = quantity(
+        0.1, "time without drift after which a pin is let go", unit="s", symbol="t_r", at_least=0.0
+    )
+
+    def check(self) -> None:
+        """A pin that is moved must give way more readily than one that listens."""
+        if not self.following_speed >= self.listening_speed:
+            rule = f"must be at least listening_speed, {self.listening_speed:g} m/s"
+            raise ParameterError("PushPull", "following_speed", rule, f"{self.following_speed:g} m/s")
+
+
+@dataclass(frozen=True, eq=False)
+class PushPullControl:
+    """Push and pull, put together for a bed.
+
+    With e = H_com - H at the end of a cycle, a cell is pushed where e > θ and pulled where e < -θ; its
+    commanded height is then dragged along, to within θ of the measured one. A cell remembers how many
+    cycles it will still count as touched, and how fast it was last dragged, m/s.
+    """
+
+    parameters: PushPull
+    actuator: Actuator
+    drive: Drive
+    period: float
+    margin: float
+
+    name = "push_pull"
+    rows = 2
+
+    def begin(self) -> Listening:
+        """Return the memory before a session."""
+        return Listening()
+
+    def attend(
+        self, memory: Listening, touched: Measurement
+    ) -> tuple[Listening, tuple[float, float, float] | None]:
+        """Listen where a hand may be; see `places.Controller`.
+
+        The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
+        they are left out.
+        """
+        memory = memory._replace(period=memory.period + 1, radius=-1.0)
+        if not touched.height.size:
+            return memory, None
+        low, high = touched.place[1:3].min(axis=1), touched.place[1:3].max(axis=1)
+        x, y = ((low + high) / 2).tolist()
+        radius = float(np.hypot(*(high - low))) / 2 + self.margin
+        return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
+
+    def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Orders]:
+        """Drag commanded heights along, and move every pin up or down; see `places.Controller`."""
+        known, target = self.parameters, seen.target
+        limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
+        listening = square_distance(memory.x, memory.y, seen.place) <= limit
+        rising = memory.period % CYCLE == 0
+        if rising:  # a whole cycle lies behind: what is left of it is no ripple
+            target = self._dragged(seen, listening)
+        touched = seen.own[0] > 0.0
+        error = target - seen.height
+        stroke = np.where(touched, known.following_speed, known.listening_speed)
+        # Brought back in the rising half alone, and so at twice the speed.
+        centring = CYCLE * error / known.centring_time
+        swing = stroke + centring if rising else -stroke
+        speed = np.where(listening, swing + known.assist * seen.own[1], self.drive.approach(error))
+        formed = np.abs(target - self.actuator.rest_height) > known.dead_band
+        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
+        return memory, Orders(target, mode, self.drive.at_speed(speed))
+
+    def _dragged(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
+        """Return the targets after a cycle; what the cells remember is brought up to date in place."""
+        known, left = self.parameters, seen.own[0]
+        error = seen.target - seen.height
+        # A height dragged to the threshold lies on it, but for rounding.
+        moved = (np.abs(error) > known.threshold * (1.0 + ON_THE_SIDE)) & listening
+        was = left > 0.0
+        cycles = 1.0 + round(known.release_time / (CYCLE * self.period))
+        left[:] = np.where(moved, cycles, np.where(listening, np.maximum(left - 1.0, 0.0), 0.0))
+        released = was & (left == 0.0)
+        play = np.minimum(np.maximum(error, -known.threshold), known.threshold)
+        followed: Floats = np.where(moved, seen.height + play, seen.target)
+        seen.own[1] = np.where(moved, followed - seen.target, 0.0) / (CYCLE * self.period)
+        np.putmask(followed, released, seen.height)
+        return followed
+
+
+def assembled(parameters: PushPull, bench: Bench) -> PushPullControl:
+    """Put push and pull together for a device.
+
+    Raises
+    ------
+    ParameterError
+        When a pin's own ripple would be a touch.
+    """
+    ripple = parameters.listening_speed * bench.period
+    if not parameters.threshold > ripple:
+        rule = f"must be above a listening pin's own way in a control period, {ripple:g} m"
+        raise ParameterError("control", "threshold", rule, f"{parameters.threshold:g} m")
+    return PushPullControl(
+        parameters,
+        bench.cell.actuator,
+        drive(parameters, bench.cell, bench.period),
+        bench.period,
+        bench.grid.layout.pitch,
+    )

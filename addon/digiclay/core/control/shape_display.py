@@ -1,0 +1,178 @@
+"""Shape display: all cells go to given heights, in one of three ways of refreshing the surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..errors import ParameterError
+from ..layout import Grid
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import quantity
+from .bench import Bench
+from .drive import Drive, DriveParameters, drive
+from .neighbours import cells_at
+from .servo import locked_under_overload
+from .shapes import FILE, check_shape, from_file, named
+
+__all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "assembled"]
+
+Floats = NDArray[np.float64]
+
+
+class Move(NamedTuple):
+    """One move of a refresh: rows `first` to `last` go a share of the way from rest to the shape."""
+
+    first: int
+    last: int
+    share: float
+
+
+class Progress(NamedTuple):
+    """The controller's memory: which move is under way, and for how many periods."""
+
+    move: int = 0
+    periods: int = 0
+
+
+@dataclass(frozen=True)
+class ShapeDisplay(DriveParameters):
+    """What is displayed, and how the surface gets there."""
+
+    shape: str = quantity("dome", "what is displayed: its name, or a file .npy of heights, m")
+    amplitude: float = quantity(
+        10e-3, "height of a named shape over the bed at rest", unit="m", symbol="h_s",
+        at_least=-100.0, at_most=100.0,
+    )  # fmt: skip
+    refresh: str = quantity(
+        "one_time",
+        "how the surface gets there",
+        source="S",
+        choices=("one_time", "gradual", "approximate_gradual"),
+    )
+    surfaces: int = quantity(
+        5, "intermediate surfaces of a gradual refresh, the last one counted", symbol="n_s",
+        at_least=1, at_most=1000,
+    )  # fmt: skip
+    patience: float = quantity(2.0, "longest time a move is waited for", unit="s", symbol="t_p", above=0.0)
+
+    def check(self) -> None:
+        """The shape has a name, or is a file."""
+        check_shape("ShapeDisplay", "shape", self.shape)
+
+    def moves(self, rows: int) -> tuple[Move, ...]:
+        """Return the moves of a refresh of a bed with so many rows.
+
+        *one_time*: row by row, each in one move. *gradual*: row by row to the first intermediate
+        surface, row by row to the next... *approximate_gradual*: all rows at once, from surface to surface.
+        """
+        if self.refresh == "one_time":
+            return tuple(Move(row, row, 1.0) for row in range(rows))
+        shares = [(i + 1) / self.surfaces for i in range(self.surfaces)]
+        if self.refresh == "gradual":
+            return tuple(Move(row, row, share) for share in shares for row in range(rows))
+        return tuple(Move(0, rows - 1, share) for share in shares)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeDisplayControl:
+    """Shape display, put together for a bed.
+
+    A move is over when its cells are within the dead band of their heights, or the patience is over.
+    While there are moves all cells take part; afterwards those that stand at their heights are let go.
+
+    Attributes
+    ----------
+    heights : ndarray (n,)
+        Of the shape, m.
+    moves : tuple of Move
+    patience : int
+        Control periods.
+    whole : (float, float, float)
+        Disc x, y, radius that holds the bed, m.
+    """
+
+    parameters: ShapeDisplay
+    grid: Grid
+    actuator: Actuator
+    drive: Drive
+    heights: Floats
+    moves: tuple[Move, ...]
+    patience: int
+    whole: tuple[float, float, float]
+
+    name = "shape_display"
+    rows = 0
+
+    def begin(self) -> Progress:
+        """Return the memory before a session."""
+        return Progress()
+
+    def attend(
+        self, memory: Progress, touched: Measurement
+    ) -> tuple[Progress, tuple[float, float, float] | None]:
+        """Ask for all cells while there is a move to make; see `places.Controller`."""
+        return memory, self.whole if memory.move < len(self.moves) else None
+
+    def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Orders]:
+        """Set the heights of the move under way, and bring every cell to its own; see `places.Controller`."""
+        rest, target = self.actuator.rest_height, seen.target
+        if memory.move < len(self.moves):
+            memory, target = self._moved(memory, seen)
+        error = target - seen.height
+        command = self.drive.at_speed(self.drive.approach(error))
+        command = locked_under_overload(command, seen.force, self.drive.lift)
+        formed = np.abs(target - rest) > self.parameters.dead_band
+        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
+        return memory, Orders(target, mode, command)
+
+    def _moved(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
+        """Return the progress and the targets of the move under way; on to the next if it is over."""
+        cells, rest = cells_at(self.grid, seen.place), self.actuator.rest_height
+        row, target = cells // self.grid.layout.columns, seen.target.copy()
+        goal = self.heights.take(cells)
+        while memory.move < len(self.moves):
+            first, last, share = self.moves[memory.move]
+            mine = (row >= first) & (row <= last)
+            np.putmask(target, mine, rest + share * (goal - rest))
+            amiss = np.abs(target - seen.height)[mine].max(initial=0.0)
+            if amiss > self.parameters.dead_band and memory.periods < self.patience:
+                return memory._replace(periods=memory.periods + 1), target
+            memory = Progress(memory.move + 1)
+        return memory, target
+
+
+def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
+    """Put shape display together for a device.
+
+    Raises
+    ------
+    ParameterError
+        When the shape leaves the stroke, or its file cannot be used.
+    """
+    actuator, grid = bench.cell.actuator, bench.grid
+    if parameters.shape.endswith(FILE):
+        heights = from_file("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
+    else:
+        heights = actuator.rest_height + parameters.amplitude * named(parameters.shape, grid)
+        low, high = float(heights.min()), float(heights.max())
+        if low < 0.0 or high > actuator.stroke:
+            rule = f"must keep the shape between 0 and the stroke, {actuator.stroke:g} m"
+            raise ParameterError("control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m")
+    return ShapeDisplayControl(
+        parameters,
+        grid,
+        actuator,
+        drive(parameters, bench.cell, bench.period),
+        heights,
+        parameters.moves(grid.layout.rows),
+        math.ceil(parameters.patience / bench.period),
+        (0.0, 0.0, float(np.hypot(grid.x, grid.y).max())),
+    )

@@ -1,0 +1,156 @@
+"""Viscous: a pressed pin sinks slowly, draws its neighbours along, and recovers slowly.
+
+What Materiable calls viscosity: every cell a spring and a damper, and neighbours evened out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..actuator import Actuator
+from ..layout import Grid
+from ..modes import Mode
+from ..places import Measurement, Orders
+from ..quantity import quantity
+from .bench import Bench
+from .drive import Drive, TouchParameters, check_damping, drive
+from .neighbours import Exchange, cells_at, exchange
+from .servo import locked_under_overload
+
+__all__ = ["Spot", "Viscous", "ViscousControl", "assembled"]
+
+Floats = NDArray[np.float64]
+
+#: Displacement below which the border of the displaced region is of no interest, in dead bands.
+BORDER = 0.1
+
+
+class Spot(NamedTuple):
+    """The controller's memory: the box that holds all displaced cells, m; empty before any touch."""
+
+    left: float = math.inf
+    right: float = -math.inf
+    bottom: float = math.inf
+    top: float = -math.inf
+
+    def around(self, place: Floats) -> Spot:
+        """Return a box that holds some places as well."""
+        if not place.shape[1]:
+            return self
+        (left, bottom), (right, top) = place[1:3].min(axis=1).tolist(), place[1:3].max(axis=1).tolist()
+        return Spot(
+            min(self.left, left), max(self.right, right), min(self.bottom, bottom), max(self.top, top)
+        )
+
+    def disc(self, margin: float) -> tuple[float, float, float] | None:
+        """Return x, y and radius of a disc that holds the box and a margin, m; None of an empty one."""
+        if self.left > self.right:
+            return None
+        across = math.hypot(self.right - self.left, self.top - self.bottom)
+        return (self.left + self.right) / 2, (self.bottom + self.top) / 2, across / 2 + margin
+
+
+@dataclass(frozen=True)
+class Viscous(TouchParameters):
+    """A spring and a damper side by side under every pin, and the exchange between neighbours."""
+
+    damping: float = quantity(
+        10.0, "force for the speed at which a pin sinks", unit="N s/m", symbol="c", above=0.0
+    )
+    recovery_time: float = quantity(
+        1.0, "time constant with which the surface recovers", unit="s", symbol="τ_r", above=0.0
+    )
+    diffusivity: float = quantity(
+        10e-6, "how quickly displacement spreads to neighbours", unit="m2/s", symbol="D", at_least=0.0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ViscousControl:
+    """The viscous behaviour, put together for a bed.
+
+    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbours exchange,
+    then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
+    dent decays with τ_r whatever D is.
+
+    Attributes
+    ----------
+    margin : float
+        How far beyond the displaced cells cells take part, m.
+    """
+
+    parameters: Viscous
+    grid: Grid
+    actuator: Actuator
+    drive: Drive
+    exchange: Exchange
+    period: float
+    margin: float
+
+    name = "viscous"
+    rows = 0
+
+    def begin(self) -> Spot:
+        """Return the memory before a session."""
+        return Spot()
+
+    def attend(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
+        """Ask for all displaced cells and a margin around them; see `places.Controller`."""
+        spot = memory.around(touched.place[:, touched.force >= self.parameters.felt_force])
+        return spot, spot.disc(self.margin)
+
+    def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Orders]:
+        """Exchange, relax, and move every cell to its new height; see `places.Controller`."""
+        known, actuator = self.parameters, self.actuator
+        cells, rest = cells_at(self.grid, seen.place), actuator.rest_height
+        pressed = seen.force >= known.felt_force
+        shift = self.exchange.evened(cells, seen.target - rest)
+        decay = math.exp(-self.period / known.recovery_time)
+        # Spring k = c / τ_r: the exact solution of c du/dt = -F - k u over the period.
+        shift *= decay
+        shift -= seen.force * pressed * (known.recovery_time / known.damping * (1.0 - decay))
+        shift = np.minimum(np.maximum(shift, -rest), actuator.stroke - rest)
+        size = np.abs(shift)
+        if not pressed.any() and size.max(initial=0.0) <= known.dead_band:
+            memory, shift, size = Spot(), np.zeros(shift.size), np.zeros(shift.size)
+        else:
+            memory = memory.around(seen.place[:, size > BORDER * known.dead_band])
+        target, formed = rest + shift, size > known.dead_band
+        # The surface creeps by less than the dead band a period: its own speed is asked for as well.
+        creep = np.where(formed, (target - seen.target) / self.period, 0.0)
+        command = self.drive.at_speed(creep + self.drive.approach(target - seen.height))
+        command = locked_under_overload(command, seen.force, self.drive.lift)
+        return memory, Orders(target, self._modes(cells, pressed, formed), command)
+
+    def _modes(
+        self, cells: NDArray[np.intp], pressed: NDArray[np.bool_], formed: NDArray[np.bool_]
+    ) -> NDArray[np.int8]:
+        """Return the modes: pressed, drawn along by a pressed neighbour, recovering, at rest."""
+        drawn = np.zeros(cells.size, np.bool_)
+        if pressed.any():
+            for one, other, _ in self.exchange.pairs(cells):
+                drawn[one] |= pressed[other]
+                drawn[other] |= pressed[one]
+        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
+        np.putmask(mode, drawn & formed, np.int8(Mode.BLISTER))
+        np.putmask(mode, pressed, np.int8(Mode.SPRING))
+        return mode
+
+
+def assembled(parameters: Viscous, bench: Bench) -> ViscousControl:
+    """Put the viscous behaviour together for a device."""
+    check_damping(parameters.damping, bench.cell, bench.period)
+    return ViscousControl(
+        parameters,
+        bench.grid,
+        bench.cell.actuator,
+        drive(parameters, bench.cell, bench.period),
+        exchange(bench.grid, parameters.diffusivity, bench.period),
+        bench.period,
+        2.0 * bench.grid.layout.pitch,
+    )

@@ -1,0 +1,139 @@
+"""What a session is judged by along the finger's path: contact, lag, and the heights it leaves behind."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .modes import Mode
+
+__all__ = ["AWAY", "in_contact", "lag", "ridge_errors", "shaping", "surface_under"]
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+#: How far the finger must have gone on from a cell for it to count as left behind, m.
+AWAY = 12e-3
+#: Rows of a history looked at at a time: distances to all cells of a long session would not fit in memory.
+CHUNK = 256
+
+
+def in_contact(total_force: ArrayLike) -> Rows:
+    """Return which rows have contact, shape (t,), from the total force in N."""
+    touching: Rows = np.asarray(total_force, dtype=np.float64) > 0.0
+    return touching
+
+
+def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
+    """Return which rows shape the clay: in contact, and a cell under the finger follows the force.
+
+    Parameters
+    ----------
+    total_force : array_like, shape (t,)
+        N.
+    mode : array_like of int, shape (t, n)
+        Codes of `Mode`.
+
+    Returns
+    -------
+    ndarray of bool, shape (t,)
+    """
+    rows: Rows = in_contact(total_force) & np.any(np.asarray(mode) == Mode.FORCE_FOLLOW, axis=1)
+    return rows
+
+
+def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
+    """Return how far the blister is behind the finger, in the rows in contact.
+
+    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
+    point, r_j the cells' positions.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        m.
+    force : array_like, shape (t, n)
+        N.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+
+    Returns
+    -------
+    ndarray, shape (rows in contact,)
+        m.
+    """
+    pressed = np.asarray(force, dtype=np.float64)
+    total = pressed.sum(axis=1)
+    rows = in_contact(total)
+    centroid = pressed[rows] @ np.asarray(position, dtype=np.float64) / total[rows, None]
+    distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
+    return distance
+
+
+def surface_under(height: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
+    """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
+
+    ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
+
+    Parameters
+    ----------
+    height, force : array_like, shape (t, n)
+        m, N.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+
+    Returns
+    -------
+    ndarray, shape (rows in contact,)
+        m.
+    """
+    pressed = np.asarray(force, dtype=np.float64)
+    total = pressed.sum(axis=1)
+    rows = in_contact(total)
+    mean = np.einsum("tn,tn->t", pressed[rows], np.asarray(height, dtype=np.float64)[rows]) / total[rows]
+    above: Floats = mean - np.asarray(fingertip, dtype=np.float64)[rows, 2]
+    return above
+
+
+def ridge_errors(
+    position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Rows, away: float = AWAY
+) -> Floats:
+    """Return how far the cells the finger has passed over stand above its path at the end.
+
+    ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
+    finger than cell j. A cell counts when the finger went on, in rows of the same unbroken
+    stretch, to a place at least `away` from it: where it pressed or left is no ridge.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        m.
+    final : array_like, shape (n,)
+        Heights at the end, m.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+    rows : ndarray of bool, shape (t,)
+        Rows in which the finger shapes.
+    away : float, optional
+        m.
+
+    Returns
+    -------
+    ndarray, shape (cells that count,)
+        m, in the order in which the finger passed them.
+    """
+    place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
+    chosen = np.flatnonzero(rows)
+    nearest = np.empty(chosen.size, dtype=np.intp)
+    for first in range(0, chosen.size, CHUNK):
+        part = slice(first, first + CHUNK)
+        gap = tip[chosen[part], None, :2] - place
+        nearest[part] = np.argmin(np.einsum("tnk,tnk->tn", gap, gap), axis=1)
+    last = {int(cell): i for i, cell in enumerate(nearest)}
+    stretch = np.concatenate([[0], np.cumsum(np.diff(chosen) > 1)]) if chosen.size else chosen
+    errors = []
+    for cell, i in sorted(last.items(), key=lambda pair: pair[1]):
+        after = chosen[i:][stretch[i:] == stretch[i]]
+        if np.max(np.hypot(*(tip[after, :2] - place[cell]).T)) >= away:
+            errors.append(float(np.asarray(final)[cell]) - float(tip[chosen[i], 2]))
+    return np.array(errors)

@@ -1,0 +1,108 @@
+"""What one signal over time is judged by: averages, overshoot, settling, oscillation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["amplitude", "deviation", "frequency", "mean", "overshoot", "settling_time", "weights"]
+
+Floats = NDArray[np.float64]
+
+
+def weights(time: ArrayLike) -> Floats:
+    """Return the time each row stands for, s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half of it at the ends.
+
+    Parameters
+    ----------
+    time : array_like, shape (t,)
+        Increasing, s.
+
+    Returns
+    -------
+    ndarray, shape (t,)
+        The weight of a single row is 1.
+    """
+    moment = np.asarray(time, dtype=np.float64)
+    if len(moment) < 2:
+        return np.ones(len(moment))
+    half = 0.5 * np.diff(moment)
+    each: Floats = np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
+    return each
+
+
+def mean(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted mean, or None when there is nothing to average."""
+    total = float(np.sum(weight))
+    return float(np.sum(weight * values)) / total if total > 0.0 else None
+
+
+def deviation(values: Floats, weight: Floats) -> float | None:
+    """Return the weighted standard deviation about the weighted mean, or None without any rows."""
+    middle = mean(values, weight)
+    if middle is None:
+        return None
+    square = mean((values - middle) ** 2, weight)
+    return None if square is None else float(np.sqrt(square))
+
+
+def overshoot(values: ArrayLike, target: float) -> float | None:
+    """Return how far a signal goes beyond its target, as a share of its way there.
+
+    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; a falling signal is judged alike.
+
+    Parameters
+    ----------
+    values : array_like, shape (t,)
+        The signal, from the row in which it sets out.
+    target : float
+
+    Returns
+    -------
+    float or None
+        0 for a signal that never passes its target; None for one that has no way to go.
+    """
+    signal = np.asarray(values, dtype=np.float64)
+    if not len(signal) or signal[0] == target:
+        return None
+    way = target - float(signal[0])
+    return max(0.0, float(np.max((signal - target) / way)))
+
+
+def settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
+    """Return the time after which a signal stays within a band about its target, s.
+
+    From the first row to the first one from which on ``|y_i - y_target| <= band`` to the end.
+
+    Parameters
+    ----------
+    time, values : array_like, shape (t,)
+        s, and the signal.
+    target, band : float
+        In the signal's unit.
+
+    Returns
+    -------
+    float or None
+        None when the signal is outside the band at its end, or has no rows.
+    """
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    outside = np.flatnonzero(~(np.abs(signal - target) <= band))
+    if not len(signal) or (outside.size and outside[-1] == len(signal) - 1):
+        return None
+    return float(moment[outside[-1] + 1] - moment[0]) if outside.size else 0.0
+
+
+def amplitude(values: ArrayLike) -> float:
+    """Return half the distance from a signal's lowest to its highest value."""
+    return 0.5 * float(np.ptp(np.asarray(values, dtype=np.float64)))
+
+
+def frequency(time: ArrayLike, values: ArrayLike) -> float | None:
+    """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
+    rises = np.flatnonzero(~above[:-1] & above[1:])
+    if rises.size < 3:
+        return None
+    return float((rises.size - 1) / (moment[rises[-1]] - moment[rises[0]]))
