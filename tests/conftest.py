@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -15,7 +15,14 @@ SETTINGS = tempfile.TemporaryDirectory(prefix="digiclay-blender-")
 os.environ.setdefault("BLENDER_USER_RESOURCES", SETTINGS.name)
 
 # The same examples in every run, so that a failure can be seen again; no deadline, since machines are shared.
-settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=50)
+settings.register_profile(
+    "repeatable",
+    derandomize=True,
+    database=None,
+    deadline=None,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("repeatable")
 
 WINDOW = Path(__file__).parent / "window"

@@ -12,6 +12,7 @@ from digiclay.core.metrics import (
     METRICS,
     cell_area,
     contact_loss_share,
+    first_touch,
     lag,
     rfd,
     shaping,
@@ -152,8 +153,38 @@ def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimetres):
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():
     found = summary(history(np.zeros(2001)), 0.4)
     nothing = {name for name, value in found.items() if value is None}
-    assert nothing == {"rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max"}
+    assert nothing == {
+        "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
+        "force_overshoot", "settling_time", "height_deviation", "ridge_offset", "ridge_error",
+        "ridge_unevenness",
+    }  # fmt: skip
     assert found["contact_share"] == 0.0
+
+
+def test_the_first_touch_ends_where_contact_does_and_begins_a_row_before_it():
+    total = np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.4])
+    assert first_touch(total) == slice(1, 4)
+
+
+def test_the_overshoot_of_the_first_touch_is_its_peak_over_the_set_point():
+    total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
+    assert summary(history(total), 0.4)["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
+
+
+def test_the_first_touch_settles_when_its_force_comes_within_a_tenth_of_the_set_point():
+    # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
+    total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
+    assert summary(history(total), 0.4)["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
+
+
+def test_without_a_set_point_there_is_no_overshoot_and_no_settling():
+    found = summary(history(np.full(2001, 0.4)), 0.0)
+    assert (found["force_overshoot"], found["settling_time"]) == (None, None)
+
+
+def test_the_force_deviation_leaves_out_a_constant_offset():
+    total = 0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)
+    assert summary(history(total), 0.4)["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
 
 
 def test_a_single_pin_has_no_area_to_form_a_volume_over():

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from digiclay.core.errors import ParameterError
-from digiclay.core.scene import NEEDS, OPTIONAL, PARTS, SECTIONS, Scene
+from digiclay.core.scene import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene
 from digiclay.core.scene_table import PRESETS, resolve, text
 
 
@@ -22,9 +22,9 @@ def test_an_empty_file_is_a_whole_scene() -> None:
     assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (25, 3e-3, 0.5e-3)
 
 
-def test_every_section_has_a_part_in_the_scene() -> None:
+def test_every_section_but_those_nobody_asked_for_has_a_part_in_the_scene() -> None:
     scene = resolve({})
-    assert [name for name in SECTIONS if getattr(scene, name) is None] == []
+    assert tuple(name for name in SECTIONS if getattr(scene, name) is None) == UNASKED
 
 
 def test_a_scene_without_a_path_presses_once_below_the_rest_height() -> None:
@@ -52,7 +52,8 @@ def test_a_whole_number_passes_for_a_quantity() -> None:
 
 @pytest.mark.parametrize("preset", ["fast", "viscous"])
 def test_a_preset_changes_what_it_says_and_nothing_else(preset: str) -> None:
-    changed, plain = resolve({"preset": preset}), resolve({})
+    asked: dict[str, Any] = {name: {} for name in UNASKED}
+    changed, plain = resolve({"preset": preset, **asked}), resolve(asked)
     for name in PARTS:
         wanted = replace(getattr(plain, name), **PRESETS[preset].get(name, {}))
         assert getattr(changed, name) == wanted
@@ -151,13 +152,15 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         "valve.stroke must be in m or a multiple of it (got '3 s').",
     ),
     "unknown choice": (
-        {"simulation": {"stepper": "euler"}},
-        "simulation.stepper must be one of bernoulli, runge_kutta_4 (got 'euler').",
+        {"simulation": {"stepper": "leapfrog"}},
+        "simulation.stepper must be one of bernoulli, richardson, adaptive, euler, heun, runge_kutta_4 "
+        "(got 'leapfrog').",
     ),
     "unknown preset": ({"preset": "quick"}, "preset must be one of paper, fast, viscous (got 'quick')."),
     "unknown method": (
         {"control": {"method": "hand"}},
-        "control.method must be one of virtual_master, cell_states (got 'hand').",
+        "control.method must be one of virtual_master, cell_states, elastic, plastic, viscous, "
+        "push_pull, force_display, shape_display (got 'hand').",
     ),
     "no section": ({"layout": 3}, "layout must be a section, [layout] (got 3)."),
     "part that must be there": (
@@ -278,7 +281,7 @@ def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table: dict[str, A
 
 
 def test_a_written_scene_names_every_parameter() -> None:
-    tables = tomllib.loads(text(resolve({})))
-    scene = resolve({})
+    scene = resolve({name: {} for name in UNASKED})
+    tables = tomllib.loads(text(scene))
     missing = [(name, key) for name in PARTS for key in vars(getattr(scene, name)) if key not in tables[name]]
     assert missing == []

@@ -55,7 +55,7 @@ def test_a_setting_may_mend_a_file(tmp_path: Path) -> None:
 def test_the_option_that_said_it_is_named(tmp_path: Path) -> None:
     path = tmp_path / "my.toml"
     path.touch()
-    settings = [Setting("simulation.stepper", "euler", "--stepper"), Setting("layout.rows", "3")]
+    settings = [Setting("simulation.stepper", "leapfrog", "--stepper"), Setting("layout.rows", "3")]
     with pytest.raises(SceneError, match=r"^--stepper: simulation.stepper must be one of"):
         load(path, settings)
 
@@ -143,6 +143,7 @@ def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
     with pytest.raises(SceneError) as caught:
         find("ridge_mund_valley")
     assert str(caught.value) == (
-        "ridge_mund_valley is neither a file nor a sample (ridge_mound_valley, slow_press, tap). "
+        "ridge_mund_valley is neither a file nor a sample (elastic_press, force_display, plastic_press, push_pull, "
+        "ridge_mound_valley, shape_display, slow_press, tap, viscous_press). "
         "Did you mean ridge_mound_valley?"
     )

@@ -25,7 +25,7 @@ examples:
 PLACES = (
     ("finger", "fingertip"), ("contact", "contact"), ("relaxation", "relaxation"), ("actuator", "actuator"),
     ("supply", "supply"), ("fluid", "fluid"), ("valve", "valve"), ("conduit", "conduit"),
-    ("valve lag", "valve_lag"), ("dead time", "delay"), ("controller", "control"), ("blister", "blister"),
+    ("valve lag", "valve_lag"), ("dead time", "delay"), ("sensors", "sensors"), ("controller", "control"), ("blister", "blister"),
     ("recorder", "recorder"),
 )  # fmt: skip
 #: Units people read: factor and name.
@@ -85,6 +85,8 @@ def _rows(system: System) -> Iterator[tuple[str, int]]:
     yield "commands on their way", system.rows.queue
     yield "commanded height", 1
     yield "force", 1
+    yield "the controller's", system.rows.control
+    yield "the sensors'", system.rows.sensors
 
 
 def _filled(place: str, text: str) -> str:

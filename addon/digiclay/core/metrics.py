@@ -136,8 +136,8 @@ def first_touch(total_force: ArrayLike) -> slice:
 def _followed(
     time: Floats, total: Floats, set_point: float, first: slice
 ) -> tuple[float | None, float | None]:
-    """Return overshoot and settling time of the force at first touch; None where no force is asked for."""
-    if set_point <= 0.0 or first.stop == first.start:
+    """Return overshoot and settling time of the force at first touch; None at a set point of 0."""
+    if first.stop == first.start:
         return None, None
     beyond = overshoot(np.concatenate([[0.0], total[first]]), set_point)
     return beyond, settling_time(time[first], total[first], set_point, BAND * set_point)

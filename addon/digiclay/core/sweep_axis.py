@@ -12,7 +12,7 @@ from .errors import ParameterError
 __all__ = ["MOST", "Axis", "axis"]
 
 #: More points than this are refused: a slip of the keyboard, not a sweep.
-MOST = 100_000
+MOST = 10_000
 SYNTAX = "must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C"
 
 

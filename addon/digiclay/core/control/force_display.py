@@ -29,7 +29,7 @@ class ForceDisplay(TouchParameters):
     """The field, and how the cells follow it."""
 
     field: str = quantity("wave", "shape of the field: its name, or a file .npy of forces, N")
-    force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_0", above=0.0)
+    force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_m", above=0.0)
     contrast: float = quantity(
         0.5, "share of the mean by which a named field varies", symbol="κ", at_least=0.0, at_most=1.0
     )

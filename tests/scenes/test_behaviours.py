@@ -1,0 +1,295 @@
+"""The behaviours under a finger: what each claims, over whole sessions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.modes import Mode
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import SAMPLES, find, load
+from digiclay.core.scene_table import resolve
+from digiclay.core.session import Result, run
+from digiclay.core.simulation import begin, periods
+from digiclay.core.system import System
+
+TOUCHING = ("elastic", "plastic", "viscous", "push_pull", "force_display")
+BEHAVIOURS = (*TOUCHING, "shape_display")
+SESSIONS = ("elastic_press", "plastic_press", "viscous_press", "push_pull", "force_display", "shape_display")
+RESTING = {int(Mode.REST), int(Mode.HOLD)}
+REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
+#: In, 5 mm deep; still until 2 s; gone within 20 ms of that.
+GONE = 2.02
+PRESS = ((0.0, 0, 0, 41), (1.0, 0, 0, 35), (2.0, 0, 0, 35), (2.2, 0, 0, 70), (4.2, 0, 0, 70))
+
+
+def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 13, **known: Any) -> Scene:
+    """Return a scene on a square bed; the way's times in s, its positions in mm."""
+    sensors = known.pop("sensors", None)
+    layout = {"rows": side, "columns": side, "arrangement": known.pop("arrangement", "aligned")}
+    waypoints = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
+    table = {"layout": layout, "control": {"method": method, **known}, "trajectory": {"waypoints": waypoints}}
+    return resolve(table | ({"sensors": sensors} if sensors else {}))
+
+
+@cache
+def pressed(method: str, arrangement: str = "aligned") -> Result:
+    """Return a press under a behaviour."""
+    return run(scene(method, arrangement=arrangement))
+
+
+def heights(result: Result) -> np.ndarray:
+    """Return the heights, (t, n)."""
+    return result.history["height"]
+
+
+def at(result: Result, time: float) -> int:
+    """Return the row of an instant."""
+    return int(np.argmin(np.abs(result.history["time"] - time)))
+
+
+# Elastic
+
+
+def test_an_elastic_bed_is_back_at_rest_after_the_finger_left() -> None:
+    result = pressed("elastic")
+    assert heights(result).min() < REST - 2e-3
+    # Rounding on top of the dead band.
+    assert np.abs(heights(result)[-1] - REST).max() <= DEAD_BAND + 1e-12
+
+
+def test_an_elastic_bed_is_felt_as_a_spring() -> None:
+    result = pressed("elastic")
+    row = at(result, 1.99)
+    force, height = result.history["force"][row], heights(result)[row]
+    # The pulp relaxes, so pins creep up, by 0.1 mm/s at the most, and for c = 5 N s/m that takes 0.5 mN; a
+    # valve worked out for a free pin does 1 - F/F_max of it, half of it at 75 mN: up to 1 mN.
+    assert force == pytest.approx(20.0 * (REST - height), abs=1e-3)
+
+
+def test_a_stiffer_elastic_bed_gives_way_less() -> None:
+    soft, hard = (run(scene("elastic", stiffness=k)) for k in (5.0, 80.0))
+    # 0.95 mm apart; the rest of the 5 mm the pulp gives way, more the longer it relaxes.
+    assert heights(soft)[at(soft, 1.99)].min() < heights(hard)[at(hard, 1.99)].min() - 0.8e-3
+
+
+# Plastic
+
+
+def test_a_plastic_bed_stays_at_the_deepest_press() -> None:
+    result = pressed("plastic")
+    deepest = heights(result)[: at(result, GONE)].min(axis=0)
+    # The valve lags 3 ms: what a pin sinks in that time after its force fell below yield is no press.
+    # At 12 mm/s that is 36 µm, and the dead band comes on top.
+    assert np.abs(heights(result)[-1] - deepest).max() <= 46e-6
+
+
+def test_a_plastic_bed_does_not_move_once_the_finger_left() -> None:
+    result = pressed("plastic")
+    late = heights(result)[at(result, 2.5) :]
+    assert np.ptp(late, axis=0).max() == 0.0
+
+
+def test_a_second_shallower_press_leaves_a_plastic_bed_as_it_is() -> None:
+    again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 37.5), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
+    result = run(scene("plastic", again))
+    before = heights(result)[at(result, 3.0)]
+    assert np.abs(heights(result)[-1] - before).max() <= DEAD_BAND
+
+
+# Viscous
+
+
+@pytest.mark.parametrize("time_constant", [0.3, 1.0])
+@pytest.mark.parametrize("diffusivity", [0.0, 10e-6])
+def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(
+    time_constant: float, diffusivity: float
+) -> None:
+    result = run(scene("viscous", recovery_time=time_constant, diffusivity=diffusivity, side=17))
+    first, last = at(result, 2.1), at(result, 2.1 + time_constant)
+    dent = (REST - heights(result)).sum(axis=1)
+    assert (result.history["time"][last] - result.history["time"][first]) / np.log(
+        dent[first] / dent[last]
+    ) == pytest.approx(time_constant, rel=0.05)
+
+
+def test_a_viscous_dent_draws_cells_along_that_were_never_touched() -> None:
+    result = pressed("viscous")
+    row = at(result, 1.99)
+    untouched = result.history["force"][: row + 1].max(axis=0) == 0.0
+    assert (REST - heights(result)[row])[untouched].max() > 0.5e-3
+
+
+def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
+    # Hardly any recovery: after the finger left, the commanded heights' sum stays as it is.
+    system, way = _system(scene("viscous", recovery_time=1e6, side=17))
+    sums = [
+        (state.row(system.rows.target) - REST).sum()
+        for state in periods(system, way, begin(system), 700)
+        if state.period * PERIOD >= 2.1
+    ]
+    # 1.4 s of 1e6 s, 1.4e-6; rounding.
+    assert sums[-1] == pytest.approx(sums[0], rel=2e-6)
+    assert sums[0] < -20e-3
+
+
+def _system(made: Scene) -> tuple[System, Any]:
+    """Return a scene's system and the finger's way."""
+    return assemble(made), made.trajectory.trajectory()
+
+
+@pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
+def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str) -> None:
+    made = scene("viscous", side=25, arrangement=arrangement)
+    ends = []
+    for factor in (1.0, 4.0):
+        system, way = _system(made)
+        wider = replace(system.controller, margin=factor * system.controller.margin)
+        *_, last = periods(replace(system, controller=wider), way, begin(system), 600)
+        ends.append((last.row(0), last.row(system.rows.target)))
+    (narrow, asked), (wide, asked_wide) = ends
+    # Beyond the border the displacement is below a tenth of the dead band: commanded heights differ by no
+    # more, heights by no more than the dead band as well.
+    assert np.abs(asked - asked_wide).max() <= 0.1 * DEAD_BAND
+    assert np.abs(narrow - wide).max() <= 1.1 * DEAD_BAND
+
+
+def test_a_viscous_bed_ends_at_rest() -> None:
+    result = run(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
+    assert np.abs(heights(result)[-1] - REST).max() <= DEAD_BAND + 1e-12
+    assert set(result.history["mode"][-1].tolist()) == {int(Mode.REST)}
+
+
+def test_a_viscous_bed_that_has_recovered_costs_nothing() -> None:
+    system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
+    *_, last = periods(system, way, begin(system), 1200)
+    assert last.gathered.cells.size == 0
+    assert np.all(last.row(system.rows.target) == REST)
+
+
+# Push and pull
+
+
+def test_a_pushed_pin_gives_way_and_stays() -> None:
+    result = pressed("push_pull")
+    under, left = heights(result)[at(result, 1.99)], heights(result)[-1]
+    assert under.min() < REST - 3e-3
+    # The finger's last push, and the ripple of a pin that is moved: 20 mm/s in 5 ms.
+    assert np.abs(left - under).max() < 0.1e-3
+
+
+def test_a_pin_that_is_not_pushed_stays_at_rest_while_it_listens() -> None:
+    result = run(scene("push_pull", ((0.0, 0, 0, 40.3), (2.0, 0, 0, 40.3))))
+    assert result.history["command"].any()
+    # The ripple: 8 mm/s for 5 ms; and nothing that adds up over 200 cycles.
+    assert np.abs(heights(result) - REST).max() < 40e-6
+
+
+def test_push_pull_runs_alike_whatever_the_force_sensors_say() -> None:
+    @dataclass(frozen=True)
+    class Blind:
+        rows = 0
+
+        def measure(self, own: Any, truth: Any) -> Any:
+            return np.full_like(truth.force, np.nan), truth.height
+
+        def update(self, own: Any, truth: Any) -> None:
+            """Nothing to remember."""
+
+    system, way = _system(scene("push_pull"))
+    blind = replace(system, sensors=Blind())
+    ends = [list(periods(one, way, begin(one), 600))[-1].row(0) for one in (system, blind)]
+    assert np.array_equal(*ends)
+
+
+# Force display
+
+
+@pytest.mark.parametrize("field", ["flat", "wave", "ramp"])
+def test_a_resting_finger_feels_the_field(field: str) -> None:
+    result = run(scene("force_display", field=field, force=0.05, contrast=0.5))
+    row = at(result, 1.99)
+    force, asked = result.history["force"][row], assemble(result.scene).controller.field
+    felt = force > 0.0
+    assert np.count_nonzero(felt) >= 15
+    # The pulp goes on relaxing, and pins creep up after it, by 0.1 mm/s at the most. For c = 5 N s/m that
+    # takes 0.5 mN; a valve worked out for a free pin does 1 - F/F_max of it, half of it at 75 mN: 1 mN, 2 %.
+    assert force[felt] == pytest.approx(asked[felt], abs=1e-3)
+
+
+def test_what_a_resting_finger_feels_less_than_the_field_is_what_moves_the_pins() -> None:
+    result = run(scene("force_display", field="wave"))
+    row = at(result, 1.9)
+    controller = assemble(result.scene).controller
+    force = result.history["force"][row]
+    felt = force > 0.0
+    speed = (heights(result)[row + 5] - heights(result)[row - 5]) / (10 * PERIOD)
+    missing = 5.0 * speed / (1.0 - force / controller.drive.lift)
+    # c dH/dt = F_com - F at the speed of a loaded pin. The valve's lag and the conduit's share of the
+    # pressure drop are left out: 10 % of 0.8 mN.
+    assert (controller.field - force)[felt] == pytest.approx(missing[felt], abs=0.08e-3)
+
+
+def test_the_force_display_is_back_at_rest_after_the_finger_left() -> None:
+    assert np.abs(heights(pressed("force_display"))[-1] - REST).max() <= DEAD_BAND + 1e-12
+
+
+# All of them
+
+
+@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+@pytest.mark.parametrize("method", TOUCHING)
+def test_every_cell_is_in_a_resting_mode_a_second_after_the_finger_left(
+    method: str, arrangement: str
+) -> None:
+    result = pressed(method, arrangement)
+    modes = result.history["mode"]
+    assert set(modes[at(result, 1.5)].tolist()) - RESTING
+    assert set(modes[at(result, GONE + 1.0)].tolist()) <= RESTING
+
+
+@pytest.mark.parametrize("method", BEHAVIOURS)
+def test_no_random_session_leaves_a_cell_in_a_mode_for_ever(method: str) -> None:
+    # A failing one is named by its seed. Gone for the last 1.05 s, as in the test of the two methods; the
+    # display, whose refresh takes longer than the way there, goes to a low shape all rows at once.
+    low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
+    known = low if method == "shape_display" else {}
+    stuck = {}
+    for seed in range(15):
+        chance = np.random.default_rng(seed)
+        times = np.sort(chance.uniform(0.05, 0.9, 5)) + 0.02 * np.arange(5)
+        places = [
+            (float(t), *chance.uniform(-24, 24, 2).tolist(), float(chance.uniform(33, 48))) for t in times
+        ]
+        result = run(scene(method, (*places, (1.02, 0, 0, 90), (2.07, 0, 0, 90)), 15, **known))
+        modes = set(result.history["mode"][-1].tolist())
+        if not modes <= RESTING or not np.isfinite(heights(result)).all():
+            stuck[seed] = sorted(modes - RESTING)
+    assert stuck == {}
+
+
+@pytest.mark.parametrize("method", TOUCHING)
+def test_noisy_sensors_touch_no_cell(method: str) -> None:
+    # A fifth of the force that is felt, and half the dead band.
+    result = run(scene(method, sensors={"force_noise": 1e-3, "height_noise": 5e-6}))
+    assert set(result.history["mode"][-1].tolist()) <= RESTING
+    # 30 µm: the dead band, and four standard deviations of the height when it was left alone.
+    assert heights(result)[-1].max() <= REST + 30e-6
+
+
+@pytest.mark.parametrize("name", SESSIONS)
+def test_each_sample_session_runs_and_comes_to_rest(name: str) -> None:
+    made = load(find(name))
+    result = run(made)
+    assert not result.incomplete
+    assert result.metrics["max_total_force"] > 0.04
+    assert set(result.history["mode"][-1].tolist()) <= RESTING
+
+
+@pytest.mark.parametrize("name", SESSIONS)
+def test_each_sample_session_is_short(name: str) -> None:
+    assert load(SAMPLES / f"{name}.toml").simulation.duration <= 7.0

@@ -1,0 +1,291 @@
+"""The behaviours' laws, on measurements handed to them: what each commands, remembers and refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.modes import Mode
+from digiclay.core.places import Measurement, Orders
+from digiclay.core.scene_table import resolve
+
+BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
+REST = 40e-3
+#: Speed of a free pin at full valve without a conduit, m/s, two digits.
+FREE = 24e-3
+
+
+def control(method: str, **known: Any) -> Any:
+    """Return a behaviour, put together for a bed of 5 x 5 cells, without conduits."""
+    table = {
+        "layout": {"rows": 5, "columns": 5},
+        "conduit": "absent",
+        "control": {"method": method, **known},
+    }
+    return assemble(resolve(table)).controller
+
+
+def seen(
+    behaviour: Any, height: Any = 0.0, force: Any = 0.0, target: Any = 0.0, mode: int = 0
+) -> Measurement:
+    """Return a measurement of the whole 5 x 5 bed: heights above rest in mm, forces in mN."""
+    x, y = np.tile((np.arange(5) - 2.0) * 3e-3, 5), np.repeat((np.arange(5) - 2.0) * 3e-3, 5)
+    full = np.zeros(25)
+    return Measurement(
+        np.array([full + 1.0, x, y, x * x, x * y, y * y]),
+        REST + (full + height) * 1e-3,
+        (full + force) * 1e-3,
+        REST + (full + target) * 1e-3,
+        np.full(25, mode, np.int8),
+        np.zeros((behaviour.rows, 25)),
+    )
+
+
+def middle(value: float) -> np.ndarray:
+    """Return a row of the bed that is 0 but in the middle."""
+    return np.where(np.arange(25) == 12, value, 0.0)
+
+
+def orders(behaviour: Any, measurement: Measurement) -> Orders:
+    """Return what a behaviour makes of a first measurement."""
+    memory, _ = behaviour.attend(behaviour.begin(), measurement)
+    return behaviour.command(memory, measurement)[1]
+
+
+def speeds(behaviour: Any, command: np.ndarray) -> np.ndarray:
+    """Return the speed of a pin without load under some commands: opening squared times the free speed."""
+    return np.sign(command) * command**2 * behaviour.drive.up[-1]
+
+
+# All of them
+
+
+@pytest.mark.parametrize("method", BEHAVIOURS)
+def test_commands_are_openings(method: str) -> None:
+    behaviour = control(method)
+    chance = np.random.default_rng(1)
+    wild = seen(
+        behaviour, chance.uniform(-40, 60, 25), chance.uniform(0, 500, 25), chance.uniform(-40, 60, 25)
+    )
+    command = orders(behaviour, wild).command
+    assert np.all(np.abs(command) <= 1.0)
+
+
+@pytest.mark.parametrize("method", [m for m in BEHAVIOURS if m != "shape_display"])
+def test_an_untouched_bed_at_rest_is_left_alone(method: str) -> None:
+    behaviour = control(method)
+    untouched = seen(behaviour)
+    nobody = Measurement(
+        untouched.place[:, :0], *(untouched.height[:0],) * 3, untouched.mode[:0], untouched.own[:, :0]
+    )
+    memory, disc = behaviour.attend(behaviour.begin(), nobody)
+    given = behaviour.command(memory, untouched)[1]
+    assert disc is None
+    assert not given.command.any()
+    assert set(given.mode.tolist()) == {int(Mode.REST)}
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display", "shape_display"])
+def test_a_cell_pressed_harder_than_its_reservoir_lifts_is_not_opened_to_it(method: str) -> None:
+    # 0.157 N is what 0.5 bar lifts; opening to it would let the pin sink.
+    behaviour = control(method)
+    given = orders(behaviour, seen(behaviour, height=-10.0, force=160.0, target=0.0))
+    assert np.all(given.command <= 0.0)
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
+@pytest.mark.parametrize(("force", "touched"), [(4.9, False), (5.1, True)])
+def test_a_cell_is_touched_from_the_felt_force_on(method: str, force: float, touched: bool) -> None:
+    behaviour = control(method, felt_force=5e-3)
+    assert (orders(behaviour, seen(behaviour, force=force)).mode[0] > Mode.HOLD) == touched
+
+
+# Elastic
+
+
+def test_an_elastic_cell_is_at_rest_where_spring_and_force_balance() -> None:
+    behaviour = control("elastic", stiffness=20.0)
+    # 20 N/m x 3 mm = 60 mN; rounding only.
+    assert orders(behaviour, seen(behaviour, height=-3.0, force=60.0)).command == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_elastic_cell_moves_by_force_over_damping() -> None:
+    behaviour = control("elastic", stiffness=20.0, damping=5.0)
+    given = orders(behaviour, seen(behaviour, height=-1.0, force=60.0)).command
+    # (20 N/m x 1 mm - 60 mN) / 5 N s/m; between 129 openings the speed is off by up to 1/4 of a step squared.
+    assert speeds(behaviour, given) == pytest.approx(-8e-3, abs=2e-5 * FREE)
+
+
+@pytest.mark.parametrize(("mode", "after"), [(Mode.REST, Mode.REST), (Mode.SPRING, Mode.SPRING)])
+def test_an_elastic_cell_once_touched_stays_touched_by_less_force(mode: Mode, after: Mode) -> None:
+    behaviour = control("elastic", felt_force=5e-3)
+    assert orders(behaviour, seen(behaviour, force=2.0, mode=mode)).mode[0] == after
+
+
+# Plastic
+
+
+def test_a_plastic_cell_pressed_below_yield_does_not_move() -> None:
+    behaviour = control("plastic", yield_force=0.03)
+    assert not orders(behaviour, seen(behaviour, force=29.0)).command.any()
+
+
+def test_a_plastic_cell_sinks_by_the_force_above_yield() -> None:
+    behaviour = control("plastic", yield_force=0.03, damping=5.0)
+    given = orders(behaviour, seen(behaviour, force=50.0)).command
+    assert speeds(behaviour, given) == pytest.approx(-4e-3, abs=2e-5 * FREE)  # interpolation, as above
+
+
+def test_a_plastic_cell_keeps_the_height_it_yielded_to() -> None:
+    behaviour = control("plastic")
+    assert orders(behaviour, seen(behaviour, height=-2.0, force=50.0)).target == pytest.approx(REST - 2e-3)
+
+
+def test_a_plastic_cell_never_forgets_a_deeper_press() -> None:
+    behaviour = control("plastic")
+    given = orders(behaviour, seen(behaviour, height=-1.0, force=50.0, target=-2.0))
+    assert given.target == pytest.approx(REST - 2e-3)
+
+
+def test_a_plastic_cell_does_not_push_the_finger_back() -> None:
+    behaviour = control("plastic")
+    given = orders(behaviour, seen(behaviour, height=-2.0, force=10.0, target=-1.9))
+    assert not given.command.any()
+
+
+def test_a_plastic_cell_left_alone_goes_back_to_where_it_yielded() -> None:
+    behaviour = control("plastic")
+    assert np.all(orders(behaviour, seen(behaviour, height=-2.0, target=-1.9)).command > 0.0)
+
+
+# Viscous
+
+
+def test_the_exchange_with_neighbours_keeps_the_sum() -> None:
+    behaviour = control("viscous", recovery_time=1e9)
+    given = orders(behaviour, seen(behaviour, target=middle(-5.0)))
+    # 5 mm go over; rounding, and 5 ms of 1e9 s.
+    assert (given.target - REST).sum() == pytest.approx(-5e-3, rel=1e-10)
+
+
+def test_the_neighbours_of_a_dent_are_drawn_along() -> None:
+    behaviour = control("viscous")
+    sunk = np.flatnonzero(orders(behaviour, seen(behaviour, target=middle(-5.0))).target < REST - 1e-6)
+    assert sunk.tolist() == [7, 11, 12, 13, 17]
+
+
+def test_cells_drawn_along_by_a_pressed_neighbour_show_it() -> None:
+    behaviour = control("viscous")
+    given = orders(behaviour, seen(behaviour, target=middle(-5.0), force=middle(20.0)))
+    assert np.flatnonzero(given.mode == Mode.BLISTER).tolist() == [7, 11, 13, 17]
+
+
+def test_without_diffusivity_a_dent_stays_among_itself() -> None:
+    behaviour = control("viscous", diffusivity=0.0)
+    sunk = np.flatnonzero(orders(behaviour, seen(behaviour, target=middle(-5.0))).target < REST)
+    assert sunk.tolist() == [12]
+
+
+def test_a_viscous_cell_relaxes_exactly_over_a_period() -> None:
+    behaviour = control("viscous", diffusivity=0.0, damping=10.0, recovery_time=0.5)
+    given = orders(behaviour, seen(behaviour, force=50.0, target=-4.0)).target - REST
+    # u' = -F/c - u/τ from -4 mm: equilibrium -F τ/c = -2.5 mm, reached with exp(-T/τ). Rounding.
+    assert given == pytest.approx(-2.5e-3 - 1.5e-3 * np.exp(-0.01), rel=1e-12)
+
+
+def test_the_cells_asked_for_hold_all_displaced_ones() -> None:
+    behaviour = control("viscous")
+    dent = seen(behaviour, target=middle(-5.0), force=middle(20.0))
+    memory, _ = behaviour.attend(behaviour.begin(), dent)
+    memory, _ = behaviour.command(memory, dent)
+    _, (x, y, radius) = behaviour.attend(memory, dent)
+    # The four neighbours, 3 mm away, in a box of 6 x 6 mm, and a margin of two pitches.
+    assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert radius == pytest.approx(np.hypot(3e-3, 3e-3) + 6e-3)
+
+
+# Push and pull
+
+
+def cycle(behaviour: Any, measurement: Measurement) -> Orders:
+    """Return the orders at the end of a cycle of listening."""
+    memory = behaviour.begin()
+    for _ in range(2):
+        memory, _ = behaviour.attend(memory, measurement)
+        memory, given = behaviour.command(memory, measurement)
+    return given
+
+
+def test_push_pull_never_reads_the_force() -> None:
+    behaviour = control("push_pull")
+    blind = seen(behaviour, height=middle(-0.5), force=np.nan)
+    given = cycle(behaviour, blind)
+    for row in (given.target, given.command, blind.own):
+        assert np.all(np.isfinite(row))
+    assert np.flatnonzero(given.mode == Mode.FORCE_FOLLOW).tolist() == [12]
+
+
+@pytest.mark.parametrize(("drift", "touched"), [(-0.09, False), (-0.11, True), (0.09, False), (0.11, True)])
+def test_a_touch_is_a_drift_beyond_the_threshold_either_way(drift: float, touched: bool) -> None:
+    behaviour = control("push_pull", threshold=0.1e-3)
+    given = cycle(behaviour, seen(behaviour, height=middle(drift)))
+    assert (given.mode[12] == Mode.FORCE_FOLLOW) == touched
+
+
+@pytest.mark.parametrize("drift", [-0.5, 0.5])
+def test_a_pin_pushed_or_pulled_takes_its_commanded_height_along(drift: float) -> None:
+    behaviour = control("push_pull", threshold=0.1e-3)
+    given = cycle(behaviour, seen(behaviour, height=middle(drift)))
+    assert given.target[12] - REST == pytest.approx(np.sign(drift) * 0.4e-3)  # all but the threshold
+
+
+def test_a_pin_let_go_stays_where_it_was_let_go() -> None:
+    behaviour = control("push_pull", release_time=0.02)
+    still = seen(behaviour, height=middle(-0.5))
+    memory, target = behaviour.begin(), still.target
+    for _ in range(12):
+        now = Measurement(still.place, still.height, still.force, target, still.mode, still.own)
+        memory, _ = behaviour.attend(memory, now)
+        memory, given = behaviour.command(memory, now)
+        target = given.target
+    assert target[12] == pytest.approx(REST - 0.5e-3)
+    assert given.mode[12] == Mode.HOLD
+
+
+def test_a_listening_pin_goes_down_as_fast_as_up() -> None:
+    behaviour = control("push_pull")
+    up = cycle(behaviour, seen(behaviour)).command
+    down = orders(behaviour, seen(behaviour)).command
+    assert np.all(up > 0.0)
+    assert np.array_equal(up, -down)  # the reservoirs are alike
+
+
+def test_a_listening_pin_s_speeds_are_alike_under_unlike_reservoirs() -> None:
+    table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
+    drive = assemble(resolve(table)).controller.drive
+    up, down = drive.at_speed(np.array([8e-3, -8e-3]))
+    # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the opening.
+    # The conduit and the table's interpolation change it by some percent.
+    assert -down / up == pytest.approx(2.0, rel=0.05)
+
+
+# Force display
+
+
+def test_a_force_display_cell_is_at_rest_under_the_force_of_the_field() -> None:
+    behaviour = control("force_display", field="flat", force=0.05)
+    given = orders(behaviour, seen(behaviour, height=-2.0, force=50.0)).command
+    assert given == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_named_field_varies_by_the_contrast() -> None:
+    field = control("force_display", field="ramp", force=0.05, contrast=0.4).field
+    assert (field.min(), field.max()) == pytest.approx((0.03, 0.07))
+
+
+def test_a_cell_of_the_force_display_rises_to_its_limit_at_most() -> None:
+    behaviour = control("force_display", rise=1e-3)
+    given = orders(behaviour, seen(behaviour, height=1.1, force=10.0)).command
+    assert np.all(given < 0.0)

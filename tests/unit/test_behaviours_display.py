@@ -1,0 +1,51 @@
+"""Shape display: its moves, its patience, its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay.core.assembly import assemble
+from digiclay.core.layout import Layout, grid
+from digiclay.core.places import Measurement
+from digiclay.core.scene_table import resolve
+
+
+def control(**known: Any) -> Any:
+    """Return a display, put together for a bed of 5 x 5 cells."""
+    table = {"layout": {"rows": 5, "columns": 5}, "control": {"method": "shape_display", **known}}
+    return assemble(resolve(table)).controller
+
+
+def test_the_rows_of_a_one_time_refresh_go_one_after_another() -> None:
+    behaviour = control(refresh="one_time")
+    assert [move[:2] for move in behaviour.moves] == [(row, row) for row in range(5)]
+
+
+def test_a_gradual_refresh_goes_through_its_surfaces_row_by_row() -> None:
+    behaviour = control(refresh="gradual", surfaces=2)
+    assert [tuple(move) for move in behaviour.moves] == [(r, r, s) for s in (0.5, 1.0) for r in range(5)]
+
+
+def test_an_approximate_gradual_refresh_moves_all_rows_at_once() -> None:
+    behaviour = control(refresh="approximate_gradual", surfaces=2)
+    assert [tuple(move) for move in behaviour.moves] == [(0, 4, 0.5), (0, 4, 1.0)]
+
+
+def test_a_move_waits_no_longer_than_its_patience() -> None:
+    # Every pin is held down by something; each row is given up in its turn.
+    behaviour = control(shape="pyramid", refresh="one_time", patience=0.05)
+    bed, full = grid(Layout(5, 5)), np.full(25, 40e-3)
+    place, mode = bed.place(np.arange(25)), np.zeros(25, np.int8)
+    stuck = Measurement(place, full, np.zeros(25), full, mode, np.zeros((0, 25)))
+    memory = behaviour.begin()
+    for _ in range(5 * 10 + 1):
+        memory, _ = behaviour.command(memory, stuck)
+    assert memory.move == 5
+
+
+def test_heights_are_read_from_a_file(tmp_path: Path) -> None:
+    heights = np.linspace(30e-3, 50e-3, 25).reshape(5, 5)
+    np.save(tmp_path / "mine.npy", heights)
+    assert np.array_equal(control(shape=str(tmp_path / "mine.npy")).heights, heights.ravel())

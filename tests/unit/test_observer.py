@@ -1,0 +1,226 @@
+"""The force observer: what it makes of a pin's motion, beside the force that is there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.modes import Mode
+from digiclay.core.places import Measurement, Orders, Truth
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.session import run
+from digiclay.core.simulation import begin, periods
+from digiclay.core.state import State
+from digiclay.core.system import System
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Control period, s.
+PERIOD = 5e-3
+#: A finger that goes down onto the only pin and stays.
+PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0, 0, 0.036]}]
+AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
+
+
+@dataclass(frozen=True)
+class Played:
+    """A controller without feedback: the command of a period, for every cell."""
+
+    command_in: Callable[[int], float]
+
+    name = "played"
+    rows = 0
+
+    def begin(self) -> int:
+        """Return the number of periods done."""
+        return 0
+
+    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
+        """Ask for the whole bed."""
+        return memory, (0.0, 0.0, 1.0)
+
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
+        """Command what is played."""
+        count = seen.height.size
+        orders = Orders(seen.target, np.full(count, Mode.HOLD), np.full(count, self.command_in(memory)))
+        return memory + 1, orders
+
+
+def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
+    """Return a bed of one pin, its force observed."""
+    table: dict[str, Any] = {
+        "layout": {"rows": 1, "columns": 1},
+        "control": "absent",
+        "sensors": {"observer": "valve"},
+    }
+    return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
+
+
+def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) -> tuple[Floats, Floats]:
+    """Simulate; return the true forces of the pin and what the sensors read, N, shape (count + 1,)."""
+    system = replace(assemble(known), controller=Played(command_in))
+    true, read = [0.0], [0.0]
+    for state in periods(system, known.trajectory.trajectory(), begin(system), count):
+        true.append(float(state.row(system.rows.force)[0]))
+        read.append(sensed(system, state))
+    return np.array(true), np.array(read)
+
+
+def sensed(system: System, state: State) -> float:
+    """Return the force the sensors read of the pin, N; they get no true force to look at."""
+    own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.sensed]])
+    hidden = Truth(np.arange(1), state.period, np.array([np.nan]), state.row(0), np.zeros(1))
+    return float(system.sensors.measure(own, hidden)[0][0])
+
+
+def pulled_down(period: int) -> float:
+    """Let the pin sink through a valve that is wide open."""
+    return -0.8
+
+
+def down_and_up(period: int) -> float:
+    """Let the pin sink slowly, then rise, always well open."""
+    return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (0.25 if period > 60 else 0.15)
+
+
+def half_way(force: Floats) -> Floats:
+    """Return the mean force of each period from those at its ends."""
+    return np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
+
+
+def well_open(command_in: Callable[[int], float], count: int = 120, least: float = 0.2) -> NDArray[np.bool_]:
+    """Return after which periods the valve was well open from end to end."""
+    command = np.array([0.0, *(command_in(period) for period in range(count))])
+    open_now = (np.abs(command) > least) & (np.abs(np.roll(command, 1)) > least)
+    return open_now & (command * np.roll(command, 1) > 0.0)
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {},
+        {"conduit": "absent"},
+        {"valve_lag": "absent"},
+        {"delay": "absent"},
+        {"delay": {"dead_time": 7.3e-3}},
+        {"delay": {"dead_time": 5e-3}},
+    ],
+)
+def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sections: dict[str, Any]) -> None:
+    true, read = watched(scene(**sections), down_and_up)
+    known = well_open(down_and_up)
+    assert np.ptp(true[known]) > 0.05, "hardly a force to be found"
+    # The finger loads the pin by some 0.1 N in 100 ms: within a period the force changes by up to 10 mN,
+    # and a mean weighted with the conductance lies off the middle by a part of that.
+    assert np.abs(read - half_way(true))[known].max() < 3e-3
+
+
+def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
+    narrow = {"valve": {"orifice_diameter": 0.4e-3, "stroke": 5e-6}, "fluid": {"viscosity": 6.5e-7}}
+    fall = [{"time": 0.0, "position": [0, 0, 0.040]}, {"time": 0.4, "position": [0, 0, 0.010]}]
+    known = scene(fall, **narrow)
+    true, read = watched(known, pulled_down, 75)
+    pressed = slice(30, 68)  # the finger has caught up with the pin, which falls freely at first
+    assert assemble(known).cell.flow.knee / 0.8**2 < 0.5e5, "the flow is laminar"
+    assert true[pressed].min() > 0.02, "the finger hardly presses"
+    # The force's change within a period, as above; the flow's regime is settled to 0.1 mN.
+    assert np.abs(read - half_way(true))[pressed].max() < 3e-3
+
+
+def test_an_unloaded_pin_reads_no_force() -> None:
+    _, read = watched(scene(AWAY), down_and_up)
+    # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
+    assert read.max() < 5e-5
+
+
+def test_a_force_is_never_below_zero() -> None:
+    _, read = watched(scene(AWAY, sensors={"observer": "valve", "height_noise": 1e-4}), down_and_up)
+    assert read.min() == 0.0 < read.max()
+
+
+def test_the_last_estimate_is_held_while_the_valve_is_shut() -> None:
+    true, read = watched(scene(), lambda period: 0.5 if period < 60 else 0.0)
+    # Five time constants of the valve, and the dead time, after period 60 it is shut.
+    assert true[-1] - true[64] > 0.05, "the force does not change"
+    assert read[64] > 0.05
+    assert np.unique(read[64:]).size == 1
+
+
+def test_at_an_end_stop_the_last_estimate_is_held() -> None:
+    high = {"actuator": {"rest_height": 99e-3}}
+    away = [{"time": 0.0, "position": [0, 0, 0.15]}, {"time": 0.6, "position": [0, 0, 0.15]}]
+    _, read = watched(scene(away, **high), lambda period: 0.8)
+    # It rises the millimetre in 15 periods. An open valve and no motion would otherwise mean that
+    # the finger holds the high reservoir, 157 mN.
+    assert read.max() < 1e-3
+
+
+def test_the_first_period_already_tells_the_force() -> None:
+    true, read = watched(scene(), lambda period: 0.5, 1)
+    # The pin gives way by a tenth of a millimetre in it, and the force with that.
+    assert true[1] > 0.02
+    assert abs(read[1] - true[1]) < 0.2 * true[1]
+
+
+def test_a_coarse_height_costs_no_more_than_a_step_of_flow() -> None:
+    step, least = 1e-6, 0.4
+    exact = watched(scene(), down_and_up)[1]
+    coarse = watched(scene(sensors={"observer": "valve", "height_step": step}), down_and_up)[1]
+    cell = assemble(scene()).cell
+    conductance = float(cell.flow.laminar_conductance(np.array([least]))[0])
+    # Two heights, each half a step off, in one period: F is off by A (A ΔH/T) / α.
+    bound = cell.actuator.area**2 * step / (PERIOD * conductance)
+    error = np.abs(coarse - exact)[well_open(down_and_up, least=least)]
+    assert 0.05 * bound < error.max() <= bound
+
+
+def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
+    noise = 1e-7
+    exact = watched(scene(), lambda period: 0.4)[1]
+    noisy = watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
+    cell = assemble(scene()).cell
+    conductance = float(cell.flow.laminar_conductance(np.array([0.4]))[0])
+    expected = math.sqrt(2.0) * cell.actuator.area**2 * noise / (PERIOD * conductance)
+    # Some hundred readings: their standard deviation is known to 7 %, and neighbours share a height.
+    assert abs(np.std((noisy - exact)[10:]) / expected - 1.0) < 0.3
+
+
+def test_late_readings_are_the_estimates_of_before() -> None:
+    prompt = watched(scene(), down_and_up)[1]
+    late = watched(scene(sensors={"observer": "valve", "delay": 3}), down_and_up)[1]
+    np.testing.assert_array_equal(late[3:], prompt[:-3])
+
+
+@pytest.mark.parametrize("gap", [(13,), (13, 14, 15, 16, 17)])
+def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_had(
+    gap: Sequence[int],
+) -> None:
+    sensors = assemble(scene(sensors={"observer": "valve", "height_noise": 1e-6, "delay": 2})).sensors
+    # Ten periods are 25 time constants of the valve: less than 1e-9 open, it counts as shut.
+    command, results = [0.0, 0.5, 0.5, *[0.0] * 15, -0.5, -0.5, -0.5, 0.0, 0.0], []
+    for skipped in ((), gap):
+        own, level, after = np.zeros((sensors.rows, 1)), 40e-3, []
+        for period, now in enumerate(command[1:], 1):
+            level += 1e-5 * now
+            seen = Truth(np.arange(1), period, np.zeros(1), np.array([level]), np.array([now]))
+            if period not in skipped:
+                sensors.update(own, seen)
+            if period > max(gap):
+                after.append(own.copy())
+        results.append(np.array(after))
+    np.testing.assert_array_equal(results[1], results[0])
+
+
+def test_a_bed_at_rest_does_not_feel_the_finger() -> None:
+    # Its valves are shut, and stay shut: there is nothing to tell the force from.
+    history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
+    assert history is not None
+    assert history["total_force"].max() > 1.0
+    assert np.ptp(history["height"]) == 0.0

@@ -1,0 +1,271 @@
+"""Sensor models: noise, quantisation and delay, and what a session makes of them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.absent import PerfectSensors
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import ParameterError, SceneError
+from digiclay.core.places import Sensors, Truth
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.scene_table import resolve, text
+from digiclay.core.sensors import Delayed, Noisy, Quantised, Sensing, normals
+from digiclay.core.session import run
+from digiclay.core.simulation import begin, periods
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+CELLS = 500
+PERIODS = 400
+COUNT = CELLS * PERIODS
+#: Five standard errors: a sound generator fails such a check once in a million seeds.
+SURE = 5.0
+
+
+def scene(*settings: str, name: str = "slow_press") -> Scene:
+    """Return a sample scene with settings such as ``sensors.delay=2``."""
+    return load(find(name), [Setting(*setting.split("=", 1)) for setting in settings])
+
+
+def heights(*settings: str, name: str = "slow_press") -> Floats:
+    """Run a sample scene; return the history of its heights, m."""
+    history = run(scene(*settings, name=name)).history
+    assert history is not None
+    return np.asarray(history["height"])
+
+
+def truth(period: int, force: Sequence[float], height: Sequence[float]) -> Truth:
+    """Return what there is of cells 0, 1, ..."""
+    count = len(force)
+    return Truth(np.arange(count), period, np.array(force), np.array(height), np.zeros(count))
+
+
+def field(seed: int = 3) -> tuple[Floats, Floats]:
+    """Return both kinds of noise, (PERIODS, CELLS) each."""
+    both = np.array([normals(seed, period, np.arange(CELLS)) for period in range(PERIODS)])
+    return both[:, 0], both[:, 1]
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_noise_has_mean_zero(kind: int) -> None:
+    assert abs(field()[kind].mean()) < SURE / np.sqrt(COUNT)
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_noise_has_standard_deviation_one(kind: int) -> None:
+    # The standard error of a variance of normal numbers is sqrt(2 / n).
+    assert abs(field()[kind].var() - 1.0) < SURE * np.sqrt(2.0 / COUNT)
+
+
+@pytest.mark.parametrize(("moment", "normal", "spread"), [(3, 0.0, 15.0), (4, 3.0, 96.0)])
+def test_noise_has_the_higher_moments_of_a_normal_distribution(
+    moment: int, normal: float, spread: float
+) -> None:
+    # Variance of x³ and of x⁴: 15, and 105 - 9.
+    assert abs((field()[0] ** moment).mean() - normal) < SURE * np.sqrt(spread / COUNT)
+
+
+@pytest.mark.parametrize(("periods_apart", "cells_apart"), [(0, 1), (0, 25), (1, 0), (1, 1), (2, 0)])
+def test_noise_of_other_cells_and_periods_is_independent(periods_apart: int, cells_apart: int) -> None:
+    noise = field()[0]
+    other = np.roll(noise, (periods_apart, cells_apart), (0, 1))
+    # The mean of n products of independent normal numbers has standard error 1 / sqrt(n).
+    assert abs((noise * other).mean()) < SURE / np.sqrt(COUNT)
+
+
+def test_noise_of_force_and_height_are_independent() -> None:
+    force, height = field()
+    assert abs((force * height).mean()) < SURE / np.sqrt(COUNT)
+    # Box and Muller's radius is shared: the squares must be independent too; each has variance 2.
+    assert abs(((force**2 - 1.0) * (height**2 - 1.0)).mean()) < SURE * 2.0 / np.sqrt(COUNT)
+
+
+def test_noise_of_other_seeds_is_independent() -> None:
+    assert abs((field(3)[0] * field(4)[0]).mean()) < SURE / np.sqrt(COUNT)
+
+
+def test_noise_of_a_cell_does_not_depend_on_which_others_are_read() -> None:
+    some = np.array([7, 400, 3])
+    np.testing.assert_array_equal(normals(1, 9, some), np.array(normals(1, 9, np.arange(CELLS)))[:, some])
+
+
+def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
+    sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), truth(4, [0.1, 0.2], [0.04, 0.05])
+    first, second = normals(8, 4, seen.cells)
+    force, height = sensors.measure(np.empty((0, 2)), seen)
+    np.testing.assert_array_equal(force, seen.force + 2e-3 * first)
+    np.testing.assert_array_equal(height, seen.height + 5e-6 * second)
+
+
+def test_readings_are_the_nearest_whole_steps() -> None:
+    sensors, seen = Quantised(PerfectSensors(), 0.25, 0.125), truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
+    force, height = sensors.measure(np.empty((0, 3)), seen)
+    # Steps that are powers of two: not even a rounding error is allowed.
+    assert force.tolist() == [0.25, 0.5, 0.0]
+    assert height.tolist() == [0.25, 0.0, 1.0]
+
+
+def test_a_step_of_zero_rounds_nothing() -> None:
+    seen = truth(0, [0.3], [0.31])
+    assert Quantised(PerfectSensors(), 0.0, 0.125).measure(np.empty((0, 1)), seen)[0] is seen.force
+
+
+def test_noise_is_quantised_too() -> None:
+    system = assemble(scene("sensors.force_noise=5 mN", "sensors.force_step=1 mN"))
+    force, _ = system.sensors.measure(np.empty((0, 9)), truth(1, [0.02] * 9, [0.04] * 9))
+    np.testing.assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
+    assert np.unique(force).size > 3
+
+
+def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] = ()) -> Floats:
+    """Return what is read of cell 0, (t, 2), where it takes no part in some periods."""
+    own, read = np.zeros((sensors.rows, 1)), []
+    for seen in truths:
+        if seen.period and seen.period not in skipped:
+            sensors.update(own, seen)
+        read.append([float(one[0]) for one in sensors.measure(own, seen)])
+    return np.array(read)
+
+
+RAMP = [truth(i, [0.1 * i], [40e-3 + 1e-3 * i]) for i in range(9)]
+
+
+@pytest.mark.parametrize("late", [1, 2, 5])
+def test_readings_are_late_by_whole_periods(late: int) -> None:
+    read = readings(Delayed(PerfectSensors(), late, 40e-3), RAMP)
+    expected = [[seen.force[0], seen.height[0]] for seen in RAMP]
+    assert read[late:].tolist() == expected[:-late]
+
+
+def test_before_the_first_reading_arrives_there_is_that_of_the_start() -> None:
+    read = readings(Delayed(PerfectSensors(), 4, 40e-3), RAMP)
+    assert read[:4].tolist() == [[0.0, 40e-3]] * 4
+
+
+@pytest.mark.parametrize("late", [1, 3])
+@pytest.mark.parametrize("gap", [(6,), (6, 7), (6, 7, 8), (6, 7, 8, 9, 10, 11, 12), (1, 2), (1, 6, 9)])
+def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(
+    late: int, gap: Sequence[int]
+) -> None:
+    level, truths = 40e-3, []
+    for i in range(20):
+        level += 0.0 if i in gap or i == 0 else 1e-3 * i
+        truths.append(truth(i, [0.0], [level]))
+    sensors = Delayed(Noisy(PerfectSensors(), 1e-3, 1e-5, 2), late, 40e-3)
+    np.testing.assert_array_equal(readings(sensors, truths, gap), readings(sensors, truths))
+
+
+def test_measuring_changes_nothing() -> None:
+    sensors = Delayed(PerfectSensors(), 2, 40e-3)
+    own = np.arange(float(sensors.rows))[:, None]
+    before = own.copy()
+    sensors.measure(own, RAMP[5])
+    np.testing.assert_array_equal(own, before)
+
+
+ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
+
+
+def test_the_same_seed_gives_the_same_session_bit_for_bit() -> None:
+    np.testing.assert_array_equal(heights(*ALL), heights(*ALL))
+
+
+def test_another_seed_gives_another_session() -> None:
+    assert np.abs(heights(*ALL) - heights(*ALL, "sensors.seed=1")).max() > 1e-6
+
+
+def test_a_session_taken_up_again_in_the_middle_ends_the_same() -> None:
+    noisy = scene(*ALL)
+    system, path = assemble(noisy), noisy.trajectory.trajectory()
+    whole, halfway = begin(system), None
+    for whole in periods(system, path, whole, 400):  # noqa: B020
+        if whole.period == 207:
+            halfway = whole.copy()
+    assert halfway is not None
+    for again in periods(system, path, halfway, 400 - 207):
+        end = again
+    np.testing.assert_array_equal(end.row(0), whole.row(0))
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+def test_a_session_with_coarse_sensors_stays_finite_and_within_the_stroke(method: str) -> None:
+    rough = ("force_noise=5 mN", "height_noise=0.2 mm", "force_step=5 mN", "height_step=0.1 mm", "delay=3")
+    history = heights(f"control.method={method}", *(f"sensors.{setting}" for setting in rough))
+    assert np.isfinite(history).all()
+    assert 0.0 <= history.min() < history.max() <= 100e-3
+
+
+def test_coarse_height_sensors_change_the_session() -> None:
+    assert np.abs(heights("sensors.height_step=0.5 mm") - heights()).max() > 1e-4
+
+
+def test_perfect_sensing_gives_the_session_without_sensors() -> None:
+    np.testing.assert_array_equal(heights("sensors.delay=0"), heights())
+
+
+@pytest.mark.parametrize(("setting", "rows"), [("seed=1", 0), ("force_noise=1 mN", 0), ("delay=2", 9)])
+def test_only_a_delay_costs_state_rows(setting: str, rows: int) -> None:
+    assert assemble(scene(f"sensors.{setting}")).sensors.rows == rows
+
+
+def test_sensors_are_absent_by_default_and_cost_no_row() -> None:
+    plain = scene()
+    assert (plain.sensors, assemble(plain).rows.sensors) == (None, 0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "modules"),
+    [("", ""), ("sensors.delay=1", "sensors"), ("sensors.observer=valve", "observer sensors")],
+)
+def test_only_the_sensor_models_asked_for_are_imported(setting: str, modules: str) -> None:
+    script = (
+        "import sys\n"
+        "from digiclay.core.scene_file import Setting, find, load\n"
+        "from digiclay.core.session import run\n"
+        "run(load(find('slow_press'), [Setting(*one.split('=', 1)) for one in sys.argv[1:]]))\n"
+        "print(*sorted({'observer', 'sensors'} & {m.removeprefix('digiclay.core.') for m in sys.modules}))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "simulation.duration=0.1", *filter(None, [setting])],
+        cwd=Path(__file__).parents[2] / "addon", capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout.strip() == modules
+
+
+@pytest.mark.parametrize("settings", [(), ALL, ("sensors.observer=valve",)])
+def test_a_scene_with_sensors_reads_back_as_it_was_written(settings: tuple[str, ...]) -> None:
+    import tomllib
+
+    written = scene(*settings)
+    assert resolve(tomllib.loads(text(written))) == written
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("force_noise=-1 mN", "--set: sensors.force_noise must be at least 0 N (got '-1 mN')."),
+        ("delay=1.5", "--set: sensors.delay must be a whole number (got 1.5)."),
+        ("observer=kalman", "--set: sensors.observer must be one of none, valve (got 'kalman')."),
+        ("force_nois=1", "--set: sensors.force_nois must be a known key (got 1). Did you mean"),
+        ("height_step=1e-15", "--set: sensors.height_step must be 0 m, or at least 1e-12 m (got 1e-15 m)."),
+    ],
+)
+def test_a_wrong_setting_is_told_in_one_line(setting: str, said: str) -> None:
+    with pytest.raises(SceneError) as error:
+        scene(f"sensors.{setting}")
+    assert str(error.value).startswith(said)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["force_noise", "force_step"])
+def test_an_observer_leaves_no_force_sensor_to_be_inexact(name: str) -> None:
+    with pytest.raises(ParameterError, match=f"{name} must be 0 N with observer = 'valve'"):
+        Sensing(observer="valve", **{name: 1e-3})

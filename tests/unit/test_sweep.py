@@ -1,0 +1,237 @@
+"""Sweeps: what varies, what is kept, going on after a stop, the table and the pictures."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from digiclay.cli import main
+from digiclay.core.errors import ParameterError
+from digiclay.core.metrics import METRICS
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.session import run
+from digiclay.core.sweep import FIGURES, figure, points
+from digiclay.core.sweep_axis import Axis, axis
+
+ADDON = Path(__file__).parents[2] / "addon"
+GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd", "--quiet"]
+SCENE = """\
+[layout]
+rows = 11
+columns = 11
+
+[trajectory]
+waypoints = [
+  { time = 0.0, position = [0, 0, 0.041] },
+  { time = 0.05, position = [0, 0, 0.037] },
+  { time = 0.1, position = [0, 0, 0.05] },
+]
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def rows(folder: str) -> list[dict[str, str]]:
+    """Return the lines of a sweep's table."""
+    with (Path(folder) / "sweep.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def kept(folder: str) -> dict[str, Any]:
+    """Return the files of the finished points, by name."""
+    found = sorted(Path(folder).glob("points/*"))
+    return {path.name: json.loads(path.read_text(encoding="utf-8")) for path in found}
+
+
+@pytest.mark.parametrize(
+    ("said", "words", "logarithmic"),
+    [
+        ("a.b=1:10:4", ("1", "4", "7", "10"), False),
+        ("a.b=0.1:0.3:3", ("0.1", "0.2", "0.3"), False),
+        ("a.b=3:1:3", ("3", "2", "1"), False),
+        ("a.b=1:100:3:log", ("1", "10", "100"), True),
+        ("a.b=2 mm:4 mm:3", ("2 mm", "3 mm", "4 mm"), False),
+        ("a.b=cone, gaussian", ("cone", "gaussian"), False),
+        ("preset=paper", ("paper",), False),
+    ],
+)
+def test_what_varies_is_read_from_a_line(said: str, words: tuple[str, ...], logarithmic: bool) -> None:
+    assert axis(said) == Axis(said.partition("=")[0], words, logarithmic)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ("a.b", "--vary must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C (got 'a.b')."),
+        ("a.b=1:2", "--vary a.b must be START:STOP:COUNT or START:STOP:COUNT:log (got '1:2')."),
+        ("a.b=1:x:3", "--vary a.b must have a number at START and STOP (got '1:x:3')."),
+        ("a.b=1:2:1", "--vary a.b must have a whole number from 2 to 10000 at COUNT (got '1:2:1')."),
+        ("a.b=0:2:3:log", "--vary a.b must have numbers above 0 at START and STOP for a logarithmic scale"),
+        ("a.b=1:inf:3", "--vary a.b must have two different finite numbers at START and STOP"),
+        ("a.b=1 mm:2 m:3", "--vary a.b must have the same unit at START and STOP (got '1 mm:2 m:3')."),
+        ("a.b=1,,2", "--vary a.b must have a value between commas (got '1,,2')."),
+        ("a.b=1,2,1", "--vary a.b must not name a value twice (got '1,2,1')."),
+    ],
+)
+def test_what_cannot_vary_is_told_with_key_rule_and_value(said: str, message: str) -> None:
+    with pytest.raises(ParameterError) as error:
+        axis(said)
+    assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--vary", "control.force_gian=1,2"], "--vary: control.force_gian must be a known key (got 1)."),
+        (["--vary", "control.force_gain=-1,2"], "--vary: control.force_gain must be at least 0 1/N (got -1"),
+        (["--vary", "layout.rows=11,11.5"], "--vary: layout.rows must be a whole number (got 11.5)."),
+        (["--vary", "seed=1:2:6000", "--vary", "b=1,2"], "--vary must come to 10000 points at most"),
+        (
+            ["--vary", "layout.rows=11,13", "--vary", "layout.rows=15"],
+            "--vary layout.rows must be given once",
+        ),
+        (
+            ["--vary", "layout.rows=11,13", "--set", "layout.rows=15"],
+            "--vary layout.rows must not be given to",
+        ),
+        (
+            ["--vary", "layout.rows=11,13", "--metric", "rdf"],
+            "--metric must be a known metric (got 'rdf'). Did",
+        ),
+        (
+            ["--vary", "control.method=a", "--method", "a"],
+            "--vary control.method must not be given to --method",
+        ),
+        (
+            ["--vary", "layout.rows=11,13", "--workers", "0"],
+            "digiclay sweep: argument --workers: must be a whole",
+        ),
+        (
+            ["--vary", "layout.rows=11,13", "--set", "recorder=absent"],
+            "A sweep needs a recorder, and the scene",
+        ),
+    ],
+)
+def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
+    arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep", "my.toml", "--out", "out", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(message)
+    assert (err.count("\n"), (here / "out").exists()) == (1, False)
+
+
+def test_the_points_are_all_combinations_and_the_last_axis_varies_fastest() -> None:
+    found = points(find("my.toml"), [], [axis("control.force_gain=1,2"), axis("layout.rows=11:15:3")])
+    assert [point.words for point in found] == [(g, r) for g in "12" for r in ("11", "13", "15")]
+    assert [point.scene.layout.rows for point in found if point.scene] == [11, 13, 15] * 2
+
+
+def test_lag_stands_for_its_mean() -> None:
+    assert figure("lag") == "lag_mean"
+
+
+def test_every_metric_of_a_run_can_be_asked_for() -> None:
+    assert FIGURES.keys() >= METRICS.keys()
+
+
+def test_a_point_is_the_run_with_that_setting() -> None:
+    assert main([*GAINS, "--out", "out"]) == 0
+    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5")]))
+    assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
+
+
+def test_the_table_names_axes_and_metrics_with_their_units() -> None:
+    main([*GAINS, "--out", "out", "--metric", "rfd,lag,contact_share"])
+    assert list(rows("out")[0]) == [
+        "control.force_gain (1/N)", "rfd (N)", "lag_mean (m)", "contact_share (1)", "error",
+    ]  # fmt: skip
+    assert [line["control.force_gain (1/N)"] for line in rows("out")] == ["2.0", "5.0"]
+
+
+def test_the_table_is_in_si_units() -> None:
+    main(["sweep", "my.toml", "--quiet", "--vary", "layout.pitch=3 mm:3.5 mm:2", "--out", "out"])
+    assert [line["layout.pitch (m)"] for line in rows("out")] == ["0.003", "0.0035"]
+
+
+def test_one_worker_and_two_come_to_the_same_bit_for_bit(here: Path) -> None:
+    for count in "12":
+        assert main([*GAINS, "--out", count, "--workers", count]) == 0
+    assert (here / "1" / "sweep.csv").read_bytes() == (here / "2" / "sweep.csv").read_bytes()
+
+
+FAILING = ["sweep", "my.toml", "--vary", "simulation.duration=0.1,1e6,0.05", "--out", "out"]
+
+
+def test_a_point_that_fails_is_recorded_and_the_others_go_on(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(FAILING) == 0
+    assert [bool(line["rfd (N)"]) for line in rows("out")] == [True, False, True]
+    assert rows("out")[1]["error"].startswith("recorder.every must be at least")
+    assert "1 of them failed" in capsys.readouterr().out
+
+
+def test_values_that_do_not_go_together_are_a_failed_point() -> None:
+    triggers = ["--vary", "control.blister_trigger=0.01,0.03", "--vary", "control.spring_trigger=0.02,0.06"]
+    assert main(["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "out"]) == 0
+    assert [line["error"] for line in rows("out")][:2] == ["", ""]
+    assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("out")[2]["error"]
+
+
+def test_a_sweep_in_which_every_point_fails_ends_with_the_first_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["sweep", "my.toml", "--vary", "simulation.duration=1e6,9e5", "--out", "out"]) == 2
+    assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
+
+
+def test_what_is_done_is_not_done_again(here: Path) -> None:
+    main([*GAINS, "--out", "out"])
+    file = here / "out" / "points" / "000000.json"
+    file.write_text(json.dumps({"figures": {"rfd": 42.0}}), encoding="utf-8")
+    assert main([*GAINS, "--out", "out"]) == 0
+    assert rows("out")[0]["rfd (N)"] == "42.0"
+
+
+def test_a_point_whose_file_cannot_be_read_is_done_again(here: Path) -> None:
+    main([*GAINS, "--out", "out"])
+    before = rows("out")
+    (here / "out" / "points" / "000001.json").write_text('{"figures"', encoding="utf-8")
+    assert main([*GAINS, "--out", "out"]) == 0
+    assert rows("out") == before
+
+
+def test_another_metric_can_be_had_of_a_finished_sweep() -> None:
+    main([*GAINS, "--out", "out"])
+    before = kept("out")
+    assert main([*GAINS, "--out", "out", "--metric", "highest"]) == 0
+    assert float(rows("out")[0]["highest (m)"]) > 0.03
+    assert kept("out") == before
+
+
+@pytest.mark.parametrize(
+    "change", [["--vary", "layout.rows=11,13"], ["--set", "layout.rows=13"], ["--stepper", "runge_kutta_4"]]
+)
+def test_a_folder_with_another_sweep_is_refused_in_one_line(
+    change: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main([*GAINS, "--out", "out"])
+    before = kept("out")
+    assert main([*GAINS, "--out", "out", *change]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("out holds another sweep (2 points over control.force_gain, digiclay ")
+    assert (err.count("\n"), kept("out")) == (1, before)
+
+
+def test_a_folder_with_other_things_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*GAINS, "--out", str(here)]) == 2
+    assert "holds other things than a sweep" in capsys.readouterr().err
+    assert sorted(path.name for path in here.iterdir()) == ["my.toml"]
