@@ -61,3 +61,10 @@ def test_the_middle_of_the_bed_is_left_as_it_was(session: Result) -> None:
 def test_the_force_stays_near_its_set_point_while_shaping(session: Result) -> None:
     # A rise of 6 mm/s takes a force 0.1 N below the set point (K_f = 5 1/N); the rest is less.
     assert session.metrics["rfd_shaping"] < 0.1
+
+
+def test_a_lift_off_leaves_no_lump(session: Result) -> None:
+    heights = array(session, "height").reshape(-1, 25, 25)
+    # The finger leaves the valley's end at 25.5 s; pins end where it was last felt, but for a servo's lag.
+    before = heights[int(25.49 / 5e-3), 19, 19]
+    assert abs(heights[-1, 19, 19] - before) < 0.5 * MM

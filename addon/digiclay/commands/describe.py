@@ -25,8 +25,8 @@ examples:
 PLACES = (
     ("finger", "fingertip"), ("contact", "contact"), ("relaxation", "relaxation"), ("actuator", "actuator"),
     ("supply", "supply"), ("fluid", "fluid"), ("valve", "valve"), ("conduit", "conduit"),
-    ("valve lag", "valve_lag"), ("dead time", "delay"), ("sensors", "sensors"), ("controller", "control"), ("blister", "blister"),
-    ("recorder", "recorder"),
+    ("valve lag", "valve_lag"), ("dead time", "delay"), ("sensors", "sensors"), ("controller", "control"),
+    ("blister", "blister"), ("recorder", "recorder"),
 )  # fmt: skip
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s")}

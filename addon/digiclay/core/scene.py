@@ -214,7 +214,8 @@ class Scene:
         if self.layout.pitch < self.actuator.bore:
             rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
             raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
-        longest_side = max(self.layout.columns * self.layout.pitch, self.layout.rows * self.layout.row_spacing)
+        plan = self.layout
+        longest_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
         if self.blister and self.blister.radius > longest_side * (1.0 + 1e-9):
             rule = f"must be at most the bed's longer side, {longest_side:g} m, or it has no edge"
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")

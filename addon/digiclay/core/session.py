@@ -70,17 +70,14 @@ class Result:
         if "height_error" in self.metrics:
             height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
             errors = f", height error <= {height:.2g} µm, force error <= {force:.2g} mN"
-        return f"{simulated:.1f} s simulated in {self.run_time:.2g} s ({factor:.3g} x real time){felt}{errors}{end}"
+        speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
+        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}"
 
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
-        known = {
-            "height_error": errors.height,
-            "force_error": errors.force,
-            "total_force_error": errors.total_force,
-        }
-        units = {**self.metrics["units"], "height_error": "m", "force_error": "N", "total_force_error": "N"}
-        return replace(self, metrics={**self.metrics, **known, "units": units})
+        judged = {f"{name}_error": value for name, value in asdict(errors).items()}
+        units = {name: "m" if name.startswith("height") else "N" for name in judged}
+        return replace(self, metrics={**self.metrics, **judged, "units": {**self.metrics["units"], **units}})
 
 
 def fits(scene: Scene, system: System) -> None:
