@@ -1,0 +1,147 @@
+"""``digiclay compare``: several control methods on the same input, their metrics side by side."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import ParameterError, SceneError
+from ..core.methods import METHODS
+from ..core.metrics_speed import Criterion, Drag, Lift, largest_speed
+from ..core.metrics_trial import TRIAL_METRICS, Trial, trial
+from ..core.quantity import nearest
+from ..core.run_folder import may_be_written, written
+from ..core.scene import Scene
+from ..core.scene_file import Setting, find, load
+from .arguments import add_scene
+from .export import refuse_without
+from .progress import Bar
+from .stop import Stop
+
+__all__ = ["READ", "add", "table"]
+
+EXAMPLES = """\
+examples:
+  digiclay compare ridge_mound_valley
+  digiclay compare slow_press --methods virtual_master,cell_states --speed --out both
+
+The folder holds compare.png and metrics.json; what a metric means stands in docs/metrics.md.
+"""
+#: Units people read: factor and name.
+READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
+#: Metrics of `--speed`: unit and meaning.
+SPEEDS: dict[str, tuple[str, str]] = {
+    "largest_drag_speed": ("m/s", "fastest straight level drag of a ridge that is followed"),
+    "largest_lift_speed": ("m/s", "fastest lift straight up that is followed"),
+}
+Metrics = dict[str, float | None]
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "compare", help="run control methods on the same input",
+        description="Run control methods on the same input, and set their metrics side by side.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    add_scene(parser)
+    parser.add_argument(
+        "--methods", metavar="M,...", type=_methods, default=("virtual_master", "cell_states"),
+        help="default virtual_master,cell_states",
+    )  # fmt: skip
+    parser.add_argument("--speed", action="store_true", help="also the largest speeds that are followed")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default SCENE_compare, here")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def _methods(text: str) -> tuple[str, ...]:
+    """Read a list of methods."""
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise argparse.ArgumentTypeError(f"must name at least one method (got {text!r})")
+    for name in names:
+        if name not in METHODS:
+            close = nearest(name, list(METHODS))
+            asked = f"; did you mean {close}" if close else ""
+            raise argparse.ArgumentTypeError(f"must be among {', '.join(METHODS)} (got {name!r}{asked})")
+    return names
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Run every method, print the table, write the folder."""
+    if arguments.method is not None:
+        raise SceneError("--method names one method: compare takes --methods.")
+    path = find(arguments.scene)
+    out: Path = arguments.out or Path(
+        f"{path.parent.name if path.name == 'scene.toml' else path.stem}_compare"
+    )
+    may_be_written(out, overwrite=arguments.overwrite)
+    refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
+    from ..paper.figures_compare import comparison
+    from ..plots import _save
+
+    scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
+    found: dict[str, Metrics] = {}
+    forces: dict[str, tuple[Any, Any, float | None]] = {}
+    with Stop() as stop, written(out, overwrite=arguments.overwrite) as folder:
+        for method, scene in scenes.items():
+            done = _run(scene, method, stop, quiet=arguments.quiet)
+            found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
+            forces[method] = done.history["time"], done.history["total_force"], scene.set_point
+        units = {name: unit for name, (unit, _) in {**TRIAL_METRICS, **SPEEDS}.items()}
+        known = {"scene": scene.name, "methods": found, "units": units}
+        said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
+        _save(comparison(found, forces, scene.name), folder / "compare.png")
+    if not arguments.quiet:
+        print("\n".join(table(found)))
+        if arguments.speed:
+            print(f"Followed: {Criterion()}.")
+        print(f"written to {out}")
+    return 0
+
+
+def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
+    """Return the scene with one method, and the settings of the command line."""
+    settings = [*arguments.settings, Setting("control.method", method, "--methods")]
+    if arguments.stepper is not None:
+        settings.append(Setting("simulation.stepper", arguments.stepper, "--stepper"))
+    return load(path, settings)
+
+
+def _run(scene: Scene, method: str, stop: Stop, *, quiet: bool) -> Trial:
+    """Run one method under a progress bar."""
+    with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
+        return trial(scene, progress=None if quiet else bar, stopped=stop)
+
+
+def _speeds(scene: Scene) -> Metrics:
+    """Measure the largest speeds; None where the slowest is too fast, or the bed too small."""
+    found: Metrics = {}
+    for name, way in zip(SPEEDS, (Drag(), Lift()), strict=True):
+        try:
+            found[name] = largest_speed(scene, way, Criterion())
+        except ParameterError:
+            found[name] = None
+    return found
+
+
+def table(found: dict[str, Metrics]) -> Iterator[str]:
+    """Give the lines of the table: a metric a line, a method a column, units people read."""
+    known, columns = {**TRIAL_METRICS, **SPEEDS}, list(found)
+    names = [name for name in known if name in found[columns[0]]]
+    rows = [["", "", *columns]]
+    for name in names:
+        factor, unit = READ.get(known[name][0], (1.0, known[name][0]))
+        values = (found[method][name] for method in columns)
+        rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
+    wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for name, unit, *cells in rows:
+        right = "  ".join(cell.rjust(size) for cell, size in zip(cells, wide[2:], strict=True))
+        yield f"{name.ljust(wide[0])}  {unit.ljust(wide[1])}  {right}".rstrip()

@@ -1,0 +1,89 @@
+"""``digiclay paper``: the counterparts of the paper's figures, and its claims beside what is measured."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..core.run_folder import may_be_written, written
+from .export import refuse_without
+from .stop import Stop
+
+__all__ = ["add"]
+
+EXAMPLES = """\
+examples:
+  digiclay paper                           into ./paper, in a minute or two
+  digiclay paper --out results --overwrite
+
+The folder holds paper.md (start there), the figures, and metrics.json with every number.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "paper", help="reproduce the paper's results",
+        description="Reproduce the paper's figures, and set its claims beside what is measured.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("paper"), help="default ./paper")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
+    parser.add_argument("--quick", action="store_true", help="coarse: few speeds and gains, for a first look")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Simulate, draw, write, and tell how the claims came out."""
+    may_be_written(arguments.out, overwrite=arguments.overwrite)
+    refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
+    from ..paper.trials import FULL, QUICK
+    from ..paper.work import produce
+
+    with (
+        Stop() as stop,
+        Stages(sys.stderr, stop, quiet=arguments.quiet) as told,
+        written(arguments.out, overwrite=arguments.overwrite) as folder,
+    ):
+        verdicts = produce(folder, QUICK if arguments.quick else FULL, told)
+    if not arguments.quiet:
+        print("\n".join(verdicts))
+        print(f"written to {arguments.out}: start with {arguments.out / 'paper.md'}")
+    return 0
+
+
+class Stages:
+    """Tells on a terminal what is being done, on one line; elsewhere nothing. Stops when asked to.
+
+    Parameters
+    ----------
+    stream : TextIO
+    stop : Stop
+        Asked before each stage.
+    quiet : bool
+    """
+
+    def __init__(self, stream: TextIO, stop: Stop, *, quiet: bool) -> None:
+        self._stream, self._stop = stream, stop
+        self._shown = stream.isatty() and not quiet
+        self._started = time.monotonic()
+
+    def __enter__(self) -> Stages:
+        return self
+
+    def __call__(self, stage: str) -> None:
+        """Tell the next stage."""
+        if self._stop():
+            raise KeyboardInterrupt
+        if self._shown:
+            self._stream.write(f"\r{time.monotonic() - self._started:4.0f} s  {stage}\033[K")
+            self._stream.flush()
+
+    def __exit__(self, *raised: object) -> None:
+        if self._shown:
+            self._stream.write("\r\033[K")
+            self._stream.flush()

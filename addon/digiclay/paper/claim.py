@@ -1,0 +1,39 @@
+"""One claim of the paper, and what the modules of claims share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .scenes import METHODS, NAMES
+from .trials import Results
+
+__all__ = ["MM", "ONE", "SHORT", "TWO", "Claim", "speed", "times", "verdict"]
+
+MM = 1e3
+ONE, TWO = METHODS
+SHORT = {name: NAMES[name].split(",")[0] for name in METHODS}
+HOLDS, PARTLY, DIFFERS = "holds", "holds in part", "differs"
+
+
+class Claim(NamedTuple):
+    """One row of the page: what the paper says, what was measured, whether it holds, and why if not."""
+
+    printed: str
+    measured: str
+    verdict: str
+    why: str = ""
+
+
+def verdict(holds: list[bool]) -> str:
+    """Say whether all, some or none of what a claim comes to was seen."""
+    return HOLDS if all(holds) else PARTLY if any(holds) else DIFFERS
+
+
+def speed(found: float | None) -> str:
+    """Write a largest speed, m/s."""
+    return "below the slowest tried" if found is None else f"{found * MM:.1f} mm/s"
+
+
+def times(results: Results) -> str:
+    """Say how much slower than by itself the session was run; nothing if it was not."""
+    return f" {results.slow:g} times as long" if results.slow > 1.0 else ""

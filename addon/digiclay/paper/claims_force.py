@@ -1,0 +1,168 @@
+"""Claims on deviations of height and force, and on oscillation."""
+
+from __future__ import annotations
+
+import math
+
+from . import scenes
+from .claim import MM, ONE, SHORT, TWO, Claim, times, verdict
+from .scenes import METHODS, PRESSED
+from .trials import PAPER_SPEED, Results, Swing, onset_among
+
+__all__ = ["deviations", "onset", "reference_force", "trade"]
+
+#: What counts as much greater, as a ratio.
+MUCH = 1.5
+#: A response is quicker that takes less than this share of the time.
+QUICKER = 0.9
+
+
+def _ratio(results: Results, name: str) -> float | None:
+    one, two = (results.session[method].metrics[name] for method in METHODS)
+    return None if one is None or two is None or one == 0.0 else two / one
+
+
+DEVIATIONS = {
+    "height_deviation": ("height under the finger, standard deviation over time", MM, "mm"),
+    "ridge_error": ("what is left behind over the finger's path, rms", MM, "mm"),
+    "ridge_unevenness": ("the same, standard deviation", MM, "mm"),
+    "force_deviation": ("total force, standard deviation over time", 1.0, "N"),
+    "rfd_shaping": ("total force from its set point while shaping, rms", 1.0, "N"),
+}
+
+
+def deviations(results: Results) -> Claim:
+    told, ratios = [], []
+    for name, (meaning, factor, unit) in DEVIATIONS.items():
+        one, two = (results.session[method].metrics[name] for method in METHODS)
+        ratio = _ratio(results, name)
+        if one is None or two is None or ratio is None:
+            told.append(f"{meaning}: nothing to compute from")
+            continue
+        ratios.append(ratio)
+        told.append(f"{meaning}: {one * factor:.3g} and {two * factor:.3g} {unit}, ratio {ratio:.1f}")
+    known = results.session[TWO]
+    control = known.scene.control
+    each = getattr(control, "force_setpoint", 0.0)
+    why = (
+        f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {known.followers:.1f} cells follow it on "
+        f"average: they ask for {known.followers * each:.2f} N together, and their number changes as the "
+        "finger passes from cell to cell."
+    )
+    return Claim(
+        "Method II's deviations of height and force are much greater",
+        f"Method I and II on the session{times(results)}: " + "; ".join(told),
+        verdict([ratio > MUCH for ratio in ratios] or [False]),
+        why,
+    )
+
+
+def reference_force(results: Results) -> Claim:
+    told = []
+    for method in METHODS:
+        known = results.session[method].metrics
+        drag = results.simple[method, "a ridge 15 mm high"]
+        told.append(
+            f"{SHORT[method]}: {_newton(known['rfd'])} in contact, "
+            f"{_newton(known['rfd_shaping'])} while shaping, "
+            f"{drag.rfd:.3f} N dragging a ridge at {PAPER_SPEED * MM:g} mm/s"
+        )
+    ratio = _ratio(results, "rfd")
+    return Claim(
+        "RFD of both methods, Method I's being the smaller",
+        f"Session{times(results)}, set point {_newton(results.session[ONE].metrics['set_point'])}: "
+        + "; ".join(told),
+        verdict([ratio is not None and ratio > 1.0]),
+        "The paper's own values are not among what this project has of it, so ours stand alone.",
+    )
+
+
+def _newton(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f} N"
+
+
+def _seconds(time: float | None) -> str:
+    return "never" if time is None else f"{time:.2f} s"
+
+
+def _gain(gain: float) -> str:
+    return "none seen" if gain == math.inf else f"K_f = {gain:g} 1/N"
+
+
+def _row(results: Results, position_gain: float) -> list[Swing]:
+    return sorted(one for one in results.swings if one.position_gain == position_gain)
+
+
+def _gains(results: Results) -> list[float]:
+    return sorted({one.position_gain for one in results.swings})
+
+
+def onset(results: Results) -> Claim:
+    """Where the oscillation sets in, at each K_p, and with a quicker device."""
+    rows = {f"K_p = {gain:g} 1/m": _row(results, gain) for gain in _gains(results)}
+    told = [f"{label}: {_sets_in(row)}" for label, row in rows.items()]
+    used = results.printed[ONE].scene.control
+    position_gain, gain = getattr(used, "position_gain", 0.0), getattr(used, "force_gain", 0.0)
+    first = results.onset(position_gain)[1]
+    beyond = first is not None and gain >= first
+    why = (
+        f"The session's own gains, K_p = {position_gain:g} 1/m and K_f = {gain:g} 1/N, are "
+        f"{'beyond' if beyond else 'below'} the onset. Flow goes with the square of the opening, so a small "
+        "error hardly moves a pin: only a transient starts the cycle."
+    )
+    if results.quicker:
+        free = scenes.free_speed(results.printed[ONE].scene)
+        why += (
+            f" The device decides where: with pins of {results.quicker_speed * MM:.1f} instead of "
+            f"{free * MM:.1f} mm/s without load, slower valves and a longer dead time, at K_p = "
+            f"{results.quicker[0].position_gain:g} 1/m: {_sets_in(results.quicker)}."
+        )
+    return Claim(
+        "The virtual master makes a second-order loop that oscillates at high gain",
+        f"Holding still after a quick press of {PRESSED * MM:g} mm, a cycle that goes on sets in "
+        + "; ".join(told),
+        verdict([onset_among(row)[1] is not None for row in rows.values()]),
+        why,
+    )
+
+
+def _sets_in(swings: list[Swing]) -> str:
+    """Tell between which gains the oscillation sets in, and what it is like then."""
+    calm, first = onset_among(swings)
+    if first is None:
+        return f"none up to K_f = {calm or 0.0:g} 1/N"
+    amplitude = {one.gain: one.amplitude for one in swings}
+    one = next(one for one in swings if one.gain == first)
+    pace = "" if one.frequency is None else f", {one.frequency:.0f} Hz"
+    below = "at" if calm is None else f"above {calm:g} ({amplitude[calm]:.3f} N left), at"
+    return f"{below} {first:g} 1/N (amplitude {one.amplitude:.3f} N{pace})"
+
+
+def trade(results: Results) -> Claim:
+    told, holds = [], []
+    for position_gain in _gains(results):
+        row = _row(results, position_gain)
+        calm = [one for one in row if one.settling is not None]
+        if not calm:
+            told.append(f"K_p = {position_gain:g} 1/m: never settles")
+            holds.append(False)
+            continue
+        best = min(calm, key=lambda one: one.settling or 0.0)
+        ends = "and goes on for ever beyond" if len(calm) < len(row) else "the highest tried"
+        told.append(
+            f"K_p = {position_gain:g} 1/m: {calm[0].settling:.2f} s at K_f = {calm[0].gain:g}, "
+            f"{best.settling:.2f} s at {best.gain:g}, {calm[-1].settling:.2f} s at {calm[-1].gain:g} 1/N, "
+            f"{ends}"
+        )
+        quicker = (best.settling or 0.0) < QUICKER * (calm[0].settling or 0.0)
+        holds += [len(calm) < len(row), quicker]
+    slowest = [row[0].settling for row in (_row(results, known) for known in _gains(results))]
+    onsets = [results.onset(position_gain)[1] or math.inf for position_gain in _gains(results)]
+    return Claim(
+        "Proportional gains trade oscillation for speed of response",
+        "Time until the force stays within 10 % of its set point: " + "; ".join(told),
+        verdict([*holds, sorted(onsets, reverse=True) == onsets]),
+        f"From the lowest to the highest K_p, the time to settle at the lowest K_f goes from "
+        f"{_seconds(slowest[0])} to {_seconds(slowest[-1])}, and the onset from "
+        f"{_gain(onsets[0])} to {_gain(onsets[-1])}.",
+    )

@@ -1,0 +1,110 @@
+"""Comparing methods: one input, a column each, and one line for each mistake."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands.compare import table
+from digiclay.core.metrics_trial import TRIAL_METRICS
+from digiclay.paper.figures_compare import PANELS, comparison
+
+SCENE = """\
+[layout]
+rows = 11
+columns = 11
+
+[trajectory]
+waypoints = [
+  { time = 0.0, position = [0, 0, 0.041] },
+  { time = 0.3, position = [0, 0, 0.035] },
+  { time = 0.5, position = [0, 0, 0.035] },
+]
+"""
+BOTH = ["virtual_master", "cell_states"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "my.toml"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == BOTH
+    printed = {line.split()[0]: line.split()[-2:] for line in lines[1:-1]}
+    assert list(printed) == list(TRIAL_METRICS)
+    assert [name for name, values in printed.items() if len(values) != 2] == []
+
+
+def test_the_columns_of_the_table_are_aligned() -> None:
+    found = {name: dict.fromkeys(TRIAL_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
+    assert len({len(line) for line in table(found)}) == 1
+
+
+def test_lengths_are_printed_in_millimetres() -> None:
+    found = {"one": dict.fromkeys(TRIAL_METRICS) | {"lag_max": 0.0025}}
+    row = next(line for line in table(found) if line.startswith("lag_max"))
+    assert row.split() == ["lag_max", "mm", "2.5"]
+
+
+def test_what_was_not_found_is_a_dash() -> None:
+    row = next(line for line in table({"one": dict.fromkeys(TRIAL_METRICS)}) if line.startswith("rfd "))
+    assert row.split() == ["rfd", "N", "–"]
+
+
+def test_the_folder_holds_the_picture_and_every_number(here: Path) -> None:
+    main(["compare", "my.toml", "--quiet"])
+    folder = here / "my_compare"
+    assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert list(known["methods"]) == BOTH
+    assert list(known["methods"]["cell_states"]) == list(TRIAL_METRICS)
+
+
+def test_the_methods_see_the_same_input(here: Path) -> None:
+    main(["compare", "my.toml", "--quiet", "--methods", "cell_states,virtual_master"])
+    known = json.loads((here / "my_compare" / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
+    # Other controllers, other forces: neither was run twice.
+    assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]
+
+
+def test_a_setting_reaches_every_method(here: Path) -> None:
+    main(["compare", "my.toml", "--quiet", "--set", "control.force_setpoint=0.03"])
+    known = json.loads((here / "my_compare" / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    assert (known["virtual_master"]["set_point"], known["cell_states"]["set_point"]) == (0.03, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--methods", "cell_stats"], "did you mean cell_states"),
+        (["--methods", ","], "must name at least one method"),
+        (["--method", "cell_states"], "compare takes --methods"),
+        (["--out", "my.toml"], "my.toml is a file"),
+        (["--set", "control.spring_trigger=1"], "control.spring_trigger must be a known key"),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(
+    arguments: list[str], said: str, here: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code = main(["compare", "my.toml", *arguments])
+    err = capfd.readouterr().err
+    assert (code, err.count("\n"), said in err) == (2, 1, True), err
+    assert [path.name for path in here.iterdir()] == ["my.toml"]
+
+
+def test_every_panel_has_a_bar_for_every_method() -> None:
+    found = {name: dict.fromkeys(TRIAL_METRICS, 1.0) for name in (*BOTH, "third")}
+    forces = {name: ([0.0, 1.0], [0.0, 0.4], 0.4) for name in found}
+    figure = comparison(found, forces, "scene")
+    panels = {axes.get_label(): axes for axes in figure.axes}
+    assert {key: len(panels[key].patches) for key, _, _ in PANELS} == {key: 3 for key, _, _ in PANELS}
+    assert len(panels["force"].get_legend().get_texts()) == 3

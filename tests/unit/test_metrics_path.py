@@ -1,0 +1,77 @@
+"""What the finger leaves behind over its path, on surfaces made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from digiclay.core.metrics_path import ridge_errors, surface_under
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: 21 pins along x, 3 mm apart; the finger goes over all of them in 201 rows, 50 mm up.
+PLACE = np.column_stack([np.linspace(-30e-3, 30e-3, 21), np.zeros(21)])
+TIP = np.zeros((201, 7))
+TIP[:, 0], TIP[:, 2], TIP[:, 3] = np.linspace(-30e-3, 30e-3, 201), 50e-3, 1.0
+ALL = np.ones(201, dtype=bool)
+
+
+def errors(final: Floats, rows: NDArray[np.bool_] = ALL, tip: Floats = TIP, away: float = 11e-3) -> Floats:
+    """The ridge errors in mm."""
+    return ridge_errors(PLACE, final, tip, rows, away) * 1e3
+
+
+def test_a_ridge_at_the_path_has_no_error() -> None:
+    np.testing.assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
+
+
+def test_a_ridge_over_the_path_has_its_height_over_it() -> None:
+    np.testing.assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
+
+
+def test_each_pin_is_judged_by_the_height_the_finger_had_there() -> None:
+    climbing = TIP.copy()
+    climbing[:, 2] += 0.1 * climbing[:, 0]
+    final = 50e-3 + 0.1 * PLACE[:, 0]
+    # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm higher.
+    np.testing.assert_allclose(errors(final, tip=climbing), -0.15, atol=0.031)
+
+
+def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
+    # Of the 21 pins the last four are less than 11 mm before the end of the way.
+    final = np.where(PLACE[:, 0] > 18.5e-3, 90e-3, 50e-3)
+    found = errors(final)
+    assert (len(found), found.max()) == (17, 0.0)
+
+
+def test_a_press_without_travel_leaves_no_ridge() -> None:
+    still = np.tile(TIP[100], (50, 1))
+    assert ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
+
+
+def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
+    # Shaping stops in the middle, and goes on 12 mm later.
+    rows = ALL.copy()
+    rows[100:140] = False
+    counted = ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
+    # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
+    assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
+
+
+def test_no_rows_leave_nothing() -> None:
+    assert errors(np.full(21, 50e-3), rows=~ALL).size == 0
+
+
+def test_many_rows_are_looked_at_in_parts_alike() -> None:
+    # 2001 rows are eight parts.
+    fine = np.repeat(TIP, 10, axis=0)
+    np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
+
+
+def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
+    height, force = np.array([[52e-3, 56e-3]]), np.array([[0.3, 0.1]])
+    assert surface_under(height, force, TIP[:1]) * 1e3 == pytest.approx([3.0], rel=1e-9)
+
+
+def test_rows_without_contact_have_no_surface_under_the_finger() -> None:
+    assert surface_under(np.ones((2, 2)), np.zeros((2, 2)), TIP[:2]).size == 0

@@ -1,0 +1,138 @@
+"""The bisection on the finger's speed, on made-up limits and on the real thing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.errors import ParameterError
+from digiclay.core.metrics_speed import Criterion, Drag, Follows, Lift, followed, largest, largest_speed
+from digiclay.core.metrics_trial import TRIAL_METRICS, Trial, trial
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+
+
+def device(method: str = "virtual_master", **layout: object) -> Scene:
+    """Return the default device with a method."""
+    return resolve({"control": {"method": method}, "layout": layout})
+
+
+def test_the_bisection_finds_a_limit_to_its_resolution() -> None:
+    found = largest(lambda value: value <= 17.3, 2.0, 40.0, 0.1)
+    assert found is not None
+    assert 17.2 <= found <= 17.3
+
+
+def test_the_bisection_returns_a_value_that_held() -> None:
+    tried: list[float] = []
+
+    def holds(value: float) -> bool:
+        tried.append(value)
+        return value <= 11.0
+
+    assert largest(holds, 2.0, 40.0, 1.0) in [value for value in tried if value <= 11.0]
+
+
+def test_the_bisection_halves_what_is_left() -> None:
+    tried: list[float] = []
+    largest(lambda value: bool(tried.append(value)) or value <= 11.0, 0.0, 32.0, 1.0)
+    # Both ends, then log2(32) halvings.
+    assert len(tried) == 7
+
+
+def test_a_limit_below_the_range_is_none() -> None:
+    assert largest(lambda value: False, 2.0, 40.0, 0.1) is None
+
+
+def test_a_limit_beyond_the_range_is_its_end() -> None:
+    assert largest(lambda value: True, 2.0, 40.0, 0.1) == 40.0
+
+
+GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"losses": 1}, {"loss_share": 0.01}, {"lag": 5e-3}, {"rfd": 0.6}, {"lag": float("inf")}]
+)
+def test_each_part_of_the_criterion_can_fail_a_finger(bad: dict[str, float]) -> None:
+    assert GOOD.meets(Criterion())
+    assert not replace(GOOD, **bad).meets(Criterion())
+
+
+def test_the_criterion_says_its_limits() -> None:
+    said = str(Criterion(lag=2e-3, deviation=0.3))
+    assert "2 mm" in said
+    assert "0.3 N" in said
+
+
+def test_a_drag_goes_straight_and_level_at_its_speed() -> None:
+    path, start, end = Drag().path(12e-3, 40e-3)
+    poses = path.trajectory().poses(np.linspace(start, end, 11))
+    np.testing.assert_allclose(np.diff(poses[:, 0]) / np.diff(np.linspace(start, end, 11)), 12e-3, rtol=1e-9)
+    assert np.ptp(poses[:, 1:3]) == pytest.approx(poses[0, 2], rel=1e-12)  # y is 0, z does not change
+
+
+def test_a_drag_at_the_depth_of_the_first_press_is_a_path_as_well() -> None:
+    Drag(press=4e-3, height=-4e-3).path(12e-3, 40e-3)[0].trajectory()
+
+
+def test_a_lift_is_as_fast_as_it_says_at_its_fastest() -> None:
+    path, start, end = Lift().path(8e-3, 40e-3)
+    moments = np.linspace(start, end, 2001)
+    speed = np.gradient(path.trajectory().poses(moments)[:, 2], moments)
+    assert speed.max() == pytest.approx(8e-3, rel=1e-3)  # differences over 1/2000 of the way
+
+
+def test_a_bed_narrower_than_the_drag_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"^layout\.columns must make the bed at least as wide"):
+        followed(device(columns=9), Drag(), 10e-3)
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+def test_both_methods_follow_a_drag_at_15_mm_a_second_and_have_a_limit(method: str) -> None:
+    found = largest_speed(device(method), Drag(), Criterion(), low=15e-3, high=40e-3, resolution=20e-3)
+    assert found is not None
+    assert 15e-3 <= found < 40e-3
+
+
+def test_a_finger_that_is_lost_is_counted_with_its_time() -> None:
+    # No pin rises at 40 mm/s; the finger leaves at 2 s and is given up 50 ms later.
+    judged, done = followed(device(), Lift(), 40e-3)
+    assert judged.losses == done.losses == 1
+    assert done.loss_times is not None
+    assert 2.05 < done.loss_times[0] < 2.6
+
+
+@pytest.fixture(scope="module")
+def press() -> Trial:
+    """A press in the middle of a small bed."""
+    return trial(device(rows=11, columns=11))
+
+
+def test_a_trial_gives_every_metric(press: Trial) -> None:
+    assert list(press.metrics) == list(TRIAL_METRICS)
+
+
+def test_a_trial_is_the_session_bit_for_bit(press: Trial) -> None:
+    from digiclay.core.session import run
+
+    history = run(press.scene).history
+    assert history is not None
+    assert [name for name in history if not np.array_equal(history[name], press.history[name])] == []
+
+
+def test_a_part_of_a_trial_keeps_the_rows_between_two_times(press: Trial) -> None:
+    part = press.between(0.5, 1.0)
+    assert (part["time"][0], part["time"][-1], len(part["height"])) == (0.5, 1.0, 101)
+
+
+def test_a_method_that_counts_no_losses_has_none() -> None:
+    bare = trial(resolve({"control": "absent", "layout": {"rows": 5, "columns": 5}}))
+    assert bare.losses is None
+    assert bare.metrics["losses"] is None
+
+
+def test_a_trial_that_is_asked_to_stop_does() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        trial(device(rows=11, columns=11), stopped=lambda: True)
