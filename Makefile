@@ -24,7 +24,7 @@ demo: ## run the paper's session and leave its results and pictures in demo/
 test: ## run all tests but those of the matrix and of the window
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 280 -- tests --ignore=tests/blender --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests" 400 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 240 -- tests/blender || status=1; \
 	echo; cat .reports/test.txt; exit $$status
 

@@ -17,6 +17,11 @@ SCENE = """\
 rows = 3
 columns = 4
 
+[blister]
+radius = 0.005
+edge_radius = 0.008
+flat_radius = 0.002
+
 [trajectory]
 waypoints = [
   { time = 0.0, position = [0, 0, 0.041] },
@@ -100,7 +105,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "duration": (["run", "my.toml", "--set", "simulation.duration=-1"], "must be at least 0 s (got -1 s)"),
     "cells": (["run", "my.toml", "--set", "layout.columns=0"], "layout.columns must be at least 1 (got 0)"),
     "setting": (["run", "my.toml", "--set", "nothing"], "must be KEY=VALUE (got 'nothing')"),
-    "stepper": (["run", "my.toml", "--stepper", "euler"], "--stepper: simulation.stepper must be one of"),
+    "stepper": (["run", "my.toml", "--stepper", "leapfrog"], "--stepper: simulation.stepper must be one of"),
     "method": (["run", "my.toml", "--method", "hand"], "--method: control.method must be one of"),
     "memory": (
         ["run", "my.toml", "--set", "simulation.duration=1e6", "--set", "layout.rows=10000"],
@@ -207,7 +212,7 @@ def test_a_history_of_another_scene_is_told_as_such(here: Path, capfd: pytest.Ca
 def test_describe_tells_what_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
     main(["describe", "my.toml", "--set", "conduit=absent"])
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert [line[0] for line in lines if line[1:] == ["left", "out"]] == ["conduit"]
+    assert [line[0] for line in lines if line[1:] == ["left", "out"]] == ["conduit", "sensors"]
 
 
 def test_describe_counts_cells_periods_and_bytes(capsys: pytest.CaptureFixture[str]) -> None:

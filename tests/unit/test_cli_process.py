@@ -20,6 +20,11 @@ SCENE = """\
 rows = 3
 columns = 4
 
+[blister]
+radius = 0.005
+edge_radius = 0.008
+flat_radius = 0.002
+
 [trajectory]
 waypoints = [
   { time = 0.0, position = [0, 0, 0.041] },

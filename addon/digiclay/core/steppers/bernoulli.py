@@ -177,9 +177,11 @@ def _under_finger(
         way -= slip[s]
         way /= m
         way += free[s]
-        height += way
-        np.maximum(height, zero, height)
+        way += height
+        np.maximum(way, zero, height)
         np.minimum(height, stroke, height)
+        # The mean found above is that of a pin that no end stop holds.
+        idle |= way != height
         np.multiply(m, height, exponent)
         exponent -= floor[s + 1]
         grown = _grown(exponent, zero, most)
