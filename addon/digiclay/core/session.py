@@ -129,9 +129,10 @@ def run(
     if recording:
         recording.finish(state)
         history = _history(scene, system, trajectory, recording)
-    return Result(
-        scene, history, state.period, took, _metrics(scene, history, state.period, took, versions or {})
-    )
+    metrics = _metrics(scene, history, state.period, took, versions or {})
+    # Methods that track a finger count how often it was lost; the others have nothing to lose.
+    metrics["losses"] = getattr(state.memory, "losses", None)
+    return Result(scene, history, state.period, took, metrics)
 
 
 def _history(scene: Scene, system: System, trajectory: Trajectory, recording: Recording) -> History:

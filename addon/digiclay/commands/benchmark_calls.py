@@ -1,0 +1,190 @@
+"""Counting numpy's calls: arrays that take down what is done with them.
+
+A control period's cost is the number of numpy calls in it, and not seconds on a shared
+machine: the count is the same wherever it is taken.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import statistics
+import timeit
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..core import simulation
+from ..core.assembly import assemble
+from ..core.scene import Scene
+from ..core.system import System
+from ..core.trajectory import Trajectory
+from .benchmark_report import table
+
+__all__ = ["Counted", "Ledger", "floor", "period_calls", "report"]
+
+#: Methods of arrays that make an array; reductions reach `__array_ufunc__` by themselves.
+METHODS = ("take", "copy", "repeat", "reshape", "__getitem__", "__setitem__")
+
+
+class Ledger:
+    """Calls taken down: how often each, and one example to time.
+
+    Attributes
+    ----------
+    calls : Counter
+        By name and shapes.
+    examples : dict
+        For each of them a function without arguments that makes the same call.
+    """
+
+    def __init__(self) -> None:
+        self.calls: Counter[tuple[Any, ...]] = Counter()
+        self.examples: dict[tuple[Any, ...], Callable[[], Any]] = {}
+
+    def note(
+        self, name: str, call: Callable[..., Any], arguments: tuple[Any, ...], known: dict[str, Any]
+    ) -> None:
+        """Take down a call."""
+        kinds = (one.shape if isinstance(one, np.ndarray) else type(one).__name__ for one in arguments)
+        key = (name, *kinds)
+        self.calls[key] += 1
+        if key not in self.examples:
+            own = [one.copy() if isinstance(one, np.ndarray) else one for one in arguments]
+            self.examples[key] = lambda: call(*own, **known)
+
+
+class Counted(np.ndarray[Any, Any]):
+    """An array that notes every call with it in `ledger`; what comes of a call is one too."""
+
+    ledger = Ledger()
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **known: Any) -> Any:
+        call, arguments = getattr(ufunc, method), _plain(inputs)
+        name = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}"
+        if out is not None:
+            known["out"] = _plain(out)
+        Counted.ledger.note(name, call, arguments, known)
+        result = call(*arguments, **known)
+        return out[0] if out is not None else _counted(result)
+
+    def __array_function__(self, function: Any, types: Any, arguments: Any, known: Any) -> Any:
+        plain = _plain(arguments)
+        Counted.ledger.note(function.__name__, function, plain, _plain(known))
+        return _counted(function(*plain, **_plain(known)))
+
+
+def _method(name: str) -> Callable[..., Any]:
+    """Return a method of `Counted` that notes the call."""
+    original = getattr(np.ndarray, name)
+
+    def noted(self: Any, *arguments: Any, **known: Any) -> Any:
+        plain, inner = self.view(np.ndarray), _plain(arguments)
+        Counted.ledger.note(name, original, (plain, *inner), _plain(known))
+        return _counted(original(plain, *inner, **_plain(known)))
+
+    return noted
+
+
+for _name in METHODS:
+    setattr(Counted, _name, _method(_name))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with every `Counted` in it as a plain array on the same memory."""
+    if isinstance(value, Counted):
+        return value.view(np.ndarray)
+    if isinstance(value, (tuple, list)):
+        return type(value)(_plain(one) for one in value)
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return value
+
+
+def _counted(value: Any) -> Any:
+    """Return a result with every array in it as `Counted`."""
+    if isinstance(value, np.ndarray):
+        return value.view(Counted)
+    if isinstance(value, (tuple, list)):
+        return type(value)(_counted(one) for one in value)
+    return value
+
+
+def _fields_counted(value: Any) -> Any:
+    """Return a dataclass with its arrays as `Counted`, also in dataclasses and tuples within."""
+    if isinstance(value, np.ndarray):
+        return value.view(Counted)
+    if isinstance(value, tuple) and not hasattr(value, "_fields"):
+        return tuple(_fields_counted(one) for one in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [field.name for field in dataclasses.fields(value) if field.name not in ("cell", "segments")]
+        return dataclasses.replace(value, **{name: _fields_counted(getattr(value, name)) for name in names})
+    return value
+
+
+@contextmanager
+def _counting() -> Iterator[None]:
+    """Let the simulation work on `Counted` arrays for as long as the block lasts."""
+    gather, approaches = simulation.taking_part, simulation.approaches
+
+    def gathered(*arguments: Any) -> Any:
+        state = gather(*arguments)
+        held = state.gathered
+        counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
+        return dataclasses.replace(state, gathered=dataclasses.replace(held, **counted))
+
+    def coming(*arguments: Any) -> list[Any]:
+        return [one and _fields_counted(one) for one in approaches(*arguments)]
+
+    try:
+        simulation.taking_part, simulation.approaches = gathered, coming  # type: ignore[assignment]
+        yield
+    finally:
+        simulation.taking_part, simulation.approaches = gather, approaches
+
+
+def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[list[int], Ledger]:
+    """Return how many numpy calls each of the first `count` control periods makes, and which.
+
+    What a change of the gathered cells and the finger's poses take is not counted: both
+    are done once for many periods.
+    """
+    system = dataclasses.replace(system, plan=_fields_counted(system.plan))
+    Counted.ledger = ledger = Ledger()
+    calls, before = [], 0
+    with _counting():
+        for _ in simulation.periods(system, trajectory, simulation.begin(system), count):
+            total = ledger.calls.total()
+            calls.append(total - before)
+            before = total
+    return calls, ledger
+
+
+def floor(ledger: Ledger) -> dict[tuple[Any, ...], float]:
+    """Return what one call of each kind takes by itself, s: the least of some repeats."""
+    with np.errstate(all="ignore"):
+        return {
+            key: min(timeit.repeat(call, number=50, repeat=5)) / 50 for key, call in ledger.examples.items()
+        }
+
+
+def report(scene: Scene) -> Iterator[str]:
+    """Give the lines of the table: calls a period by name, and what they alone take."""
+    count = min(scene.periods, 2000)
+    calls, ledger = period_calls(assemble(scene), scene.trajectory.trajectory(), count)
+    alone = floor(ledger)
+    number: Counter[str] = Counter()
+    spent: Counter[str] = Counter()
+    for key, times in ledger.calls.items():
+        number[key[0]] += times
+        spent[key[0]] += times * alone[key]
+    yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"
+    rows = [
+        [name, f"{number[name] / count:.1f}", f"{spent[name] / count * 1e6:.1f}"]
+        for name, _ in spent.most_common()
+        if number[name] >= 0.05 * count
+    ]
+    rows.append(["all", f"{number.total() / count:.1f}", f"{spent.total() / count * 1e6:.1f}"])
+    yield from table(("call", "a period", "alone, µs"), rows)

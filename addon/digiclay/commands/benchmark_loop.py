@@ -1,0 +1,115 @@
+"""The closed-form step in a Python loop over the cells: what a plain program would take."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from ..core.closed_form import crossed
+from ..core.fingertip import JOIN
+from ..core.physics import GAUSS
+from ..core.simulation import begin
+from .benchmark_peers import ROOT, Line
+from .benchmark_problems import Measured, Problem
+
+__all__ = ["Scalar", "loop"]
+
+
+def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
+    """Integrate the first periods cell by cell in plain Python; return the CPU time, s, too.
+
+    Only the cells that take part are gone through, as for the solvers.
+    """
+    line = Line(known)
+    system, grid = line.system, line.system.grid
+    count, dead = round(system.period / step), known.scene.delay.dead_time if known.scene.delay else 0.0
+    tau = line.cell.lag.time_constant
+    own = Scalar(line, step)
+    state = begin(system).rows[: system.rows.physics].T.tolist()
+    ageing = [math.exp(-rate * system.period) for rate in own.speeds]
+    xs, ys, heights, forces = grid.x.tolist(), grid.y.tolist(), [], []
+    nothing = [0.0] * grid.count
+    started = time.process_time()
+    for row, (cells, k) in enumerate(known.sets[:periods]):
+        start = row * system.period
+        old, new = known.commands[row - 1].tolist() if row else nothing, known.commands[row].tolist()
+        poses = [line.finger(start + i * step) for i in range(count + 1)]
+        total, touched = 0.0, set(cells[:k].tolist())
+        for i in range(grid.count):
+            if i not in touched:
+                state[i][1:4] = [z * a for z, a in zip(state[i][1:4], ageing, strict=True)]
+        for i in cells.tolist():
+            y, near = state[i], i in touched
+            unders = [own.underside(pose, xs[i], ys[i]) for pose in poses] if near else []
+            for s in range(count):
+                command = new[i] if s * step >= dead - 1e-12 else old[i]
+                openings = [command + (y[4] - command) * math.exp(-node * step / tau) for node in GAUSS]
+                y[4] = command + (y[4] - command) * math.exp(-step / tau)
+                own.step(y, openings, unders[s : s + 2])
+            if near:
+                total += own.force(y, unders[-1])
+        heights.append([y[0] for y in state])
+        forces.append(total)
+    return Measured(np.array(heights), np.array(forces)), time.process_time() - started
+
+
+class Scalar:
+    """The closed-form step of one cell, in Python's own numbers."""
+
+    def __init__(self, line: Line, step: float) -> None:
+        cell, contact, pulp = line.cell, line.contact, line.pulp
+        self.tip, self.h = line.tip, step
+        self.high, self.low, self.stroke = cell.supply.high, cell.supply.low, cell.actuator.stroke
+        self.laminar, self.resistance = cell.flow.laminar, cell.flow.resistance
+        self.area, self.m = cell.actuator.area, contact.exponent
+        self.unit = contact.stiffness / contact.exponent
+        self.share = contact.share
+        self.speeds, self.weights = pulp.rates[:, 0].tolist(), pulp.shares.tolist()
+        self.halfway, self.transition = pulp.halfway(step).tolist(), pulp.transition(step).tolist()
+        self.stiff = contact.share * contact.stiffness / self.area
+
+    def underside(self, pose: tuple[float, float, float], x: float, y: float) -> float:
+        """Return the finger's underside over one cell, m."""
+        inward = 1.0 - ((x - pose[0]) / self.tip.length) ** 2 - ((y - pose[1]) / self.tip.width) ** 2
+        kept = max(inward, 1.0 - JOIN)
+        return pose[2] + self.tip.height * (1.0 - math.sqrt(kept) - (inward - kept) * 0.5 / ROOT)
+
+    def tension(self, height: float, under: float) -> float:
+        """Return T in units of b/m."""
+        return math.expm1(min(max(self.m * (height - under), 0.0), 500.0))
+
+    def force(self, y: list[float], under: float) -> float:
+        """Return the force, N."""
+        relaxed = sum(w * z for w, z in zip(self.weights, y[1:4], strict=True))
+        return self.share * max(self.unit * self.tension(y[0], under) - relaxed, 0.0)
+
+    def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
+        """Move a cell on by a step, in place."""
+        mobility = free = 0.0
+        for opening in openings:
+            lift = opening * opening
+            g = 0.5 * self.h * lift / (1.0 / self.laminar + self.resistance * lift) / self.area
+            mobility += g
+            free += g * (self.high if opening > 0.0 else self.low)
+        if not unders:
+            y[0] = min(max(y[0] + free, 0.0), self.stroke)
+            return
+        z = [one / self.unit for one in y[1:4]]
+        first = self.tension(y[0], unders[0])
+        relaxed = 1.0 + sum(a * b for a, b in zip(self.halfway, [*z, first], strict=True))
+        decay, slip = self.stiff * mobility + 1e-200, self.m * (free - unders[1] + unders[0])
+        growth, exponent = slip + decay * relaxed + 1e-200, self.m * (y[0] - unders[0])
+        if first + 1.0 > relaxed:
+            relief = math.log1p(decay * (first + 1.0) * math.expm1(growth) / growth)
+            way, mean = growth - relief, relief / decay - 1.0
+        else:
+            way, mean = slip, -1.0
+        if (exponent + way <= math.log(relaxed)) != (first + 1.0 <= relaxed):
+            told = crossed(*(np.array([v]) for v in (exponent, slip, decay, relaxed)))
+            way, mean = float(told[0][0]), float(told[1][0]) - 1.0
+        y[0] = min(max(y[0] + free + (way - slip) / self.m, 0.0), self.stroke)
+        last = self.tension(y[0], unders[1])
+        work = [*z, first, mean if mean > -1.0 else 0.5 * (first + last), last]
+        y[1:4] = [self.unit * sum(a * b for a, b in zip(row, work, strict=True)) for row in self.transition]

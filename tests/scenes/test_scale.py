@@ -1,0 +1,40 @@
+"""A control period takes the same work on a bed of any size."""
+
+from __future__ import annotations
+
+from digiclay.commands.benchmark_calls import period_calls
+from digiclay.commands.benchmark_scale import bytes_of, gathered_cells, scene
+from digiclay.core.assembly import assemble
+from digiclay.core.simulation import begin
+
+#: Sides of the beds: 625 and 40,401 pins; both have a pin in the middle.
+SMALL, LARGE = 25, 201
+
+
+def test_as_many_cells_take_part_on_40000_pins_as_on_625() -> None:
+    small = gathered_cells(SMALL)
+    assert max(small) > 100
+    assert gathered_cells(LARGE) == small
+
+
+def test_a_period_on_40000_pins_takes_the_numpy_calls_of_one_on_625() -> None:
+    def calls(side: int) -> list[int]:
+        known = scene(side)
+        return period_calls(assemble(known), known.trajectory.trajectory(), 120)[0]
+
+    small = calls(SMALL)
+    assert min(small) >= 0
+    assert max(small) > 100
+    assert calls(LARGE) == small
+
+
+def test_a_pin_takes_at_most_200_bytes() -> None:
+    system = assemble(scene(LARGE))
+    assert bytes_of(system, begin(system)) <= 200 * LARGE * LARGE
+
+
+def test_the_bytes_of_a_pin_are_those_of_its_rows_place_mode_and_age() -> None:
+    # Nine rows and the age as float64, x and y, and one byte of mode; what is left over is a few kilobytes.
+    system = assemble(scene(LARGE))
+    own = (9 + 1 + 2) * 8 + 1
+    assert 0 <= bytes_of(system, begin(system)) - own * LARGE * LARGE < 20_000

@@ -1,0 +1,85 @@
+"""Over all stiff and extreme cases the default stepper does not blow up, and is right where it can be."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from digiclay.commands import benchmark_stiff_runs as stiff
+from digiclay.commands.benchmark_cases import CASES, EASY
+from numpy.typing import NDArray
+
+#: Numpy calls a period may cost more than the easy case.
+MOST = 10.0
+WELL = [name for name, case in CASES.items() if not case.why]
+
+
+@pytest.fixture(scope="module")
+def commands() -> dict[str, NDArray[np.float64]]:
+    """The recorded commands of every case."""
+    with stiff.strict():
+        return {name: stiff.commands_of(case) for name, case in CASES.items()}
+
+
+@pytest.mark.parametrize("step", stiff.STEPS)
+@pytest.mark.parametrize("name", CASES)
+def test_the_default_stepper_does_not_blow_up_under_recorded_commands(
+    name: str, step: float, commands: dict[str, NDArray[np.float64]]
+) -> None:
+    # No warning, all finite, heights within the stroke, no negative force: `replayed` asserts it.
+    with stiff.strict():
+        heights = stiff.replayed(CASES[name], commands[name], "bernoulli", step, stiff.period_of(step))
+    assert np.isfinite(heights).all()
+
+
+@pytest.mark.parametrize("step", stiff.STEPS)
+@pytest.mark.parametrize("name", CASES)
+def test_the_default_stepper_does_not_blow_up_under_its_own_controller(name: str, step: float) -> None:
+    with stiff.strict():
+        heights = stiff.live(CASES[name], "bernoulli", step)
+    assert np.isfinite(heights).all()
+
+
+@pytest.mark.parametrize("name", WELL)
+def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(
+    name: str, commands: dict[str, NDArray[np.float64]]
+) -> None:
+    case = CASES[name]
+    exact, off = stiff.reference(case, commands[name], stiff.ROUGH)
+    errors = [stiff.outcome(case, commands[name], exact, "bernoulli", step).error for step in stiff.STEPS]
+    floor = max(off, 1e-12)
+    assert all(finer <= max(coarser, floor) for finer, coarser in pairwise(errors)), errors
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_no_case_takes_ten_times_the_calls_of_the_easy_one(
+    name: str, commands: dict[str, NDArray[np.float64]]
+) -> None:
+    easy = stiff.calls_of(CASES[EASY], commands[EASY])
+    assert 0.0 < stiff.calls_of(CASES[name], commands[name]) < MOST * easy
+
+
+def test_the_deep_press_reaches_what_it_is_there_for(commands: dict[str, NDArray[np.float64]]) -> None:
+    # e^(m x) = 1e12 is a force of f_d b/m 1e12 = 4e10 N on a pin.
+    name = "press to e^(m x) = 1e12"
+    assert stiff.largest_force(CASES[name], commands[name]) > 0.34 * 250.0 / 2000.0 * 1e12
+
+
+def test_the_cases_move_their_pins(commands: dict[str, NDArray[np.float64]]) -> None:
+    still = [name for name in CASES if not np.abs(commands[name]).max() > 0.0]
+    assert still == []
+
+
+def test_openings_of_a_billionth_stay_that_small(commands: dict[str, NDArray[np.float64]]) -> None:
+    assert 1e-9 < np.abs(commands["openings of 1e-9"]).max() < 1e-7
+
+
+def test_a_pin_pressed_onto_an_end_stop_is_integrated_as_exactly_as_any(
+    commands: dict[str, NDArray[np.float64]],
+) -> None:
+    # 0.9 µm at 1 ms, as in the easy case; 44 µm where the mean force is that of a pin that goes on.
+    name = "all at the lower end stop"
+    exact = stiff.replayed(CASES[name], commands[name], "runge_kutta_4", 1e-4, stiff.PERIOD)
+    assert exact.min() == 0.0
+    assert stiff.outcome(CASES[name], commands[name], exact, "bernoulli", 1e-3).error < 3e-6

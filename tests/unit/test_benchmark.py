@@ -1,0 +1,169 @@
+"""What the benchmarks share, and the arithmetic of their tables."""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.commands import benchmark_peers as peers
+from digiclay.commands import benchmark_precision as precision
+from digiclay.commands.benchmark_calls import Counted, Ledger, floor
+from digiclay.commands.benchmark_loop import loop
+from digiclay.commands.benchmark_problems import PROBLEMS, Work, problem, solved
+from digiclay.commands.benchmark_report import Steps, kept, made_with, table
+from digiclay.commands.benchmark_terms import LONGER, TERMS, without
+from digiclay.core.errors import OutputError
+
+from tests.assemble import sample
+
+ONE = "one cell, load step"
+
+
+@pytest.fixture
+def ledger() -> Iterator[Ledger]:
+    """A ledger of its own, in place of the class's."""
+    former, Counted.ledger = Counted.ledger, Ledger()
+    yield Counted.ledger
+    Counted.ledger = former
+
+
+def test_every_kind_of_call_is_counted_once(ledger: Ledger) -> None:
+    a = np.ones(3).view(Counted)
+    b = a + 1.0  # add
+    np.exp(b, b)  # exp
+    b *= 2.0  # multiply
+    np.dot(b, a)  # dot
+    b.max()  # maximum.reduce
+    b[1:]  # __getitem__
+    b[0] = 1.0  # __setitem__
+    assert ledger.calls.total() == 7
+
+
+def test_counting_does_not_change_a_result(ledger: Ledger) -> None:
+    a = np.linspace(0.0, 1.0, 5)
+    counted = np.exp(a.view(Counted) * 2.0)[1:]
+    assert (type(counted), counted.tolist()) == (Counted, np.exp(a * 2.0)[1:].tolist())
+
+
+def test_every_counted_call_can_be_timed_by_itself(ledger: Ledger) -> None:
+    a = np.ones(3).view(Counted)
+    np.add(a, a, a)
+    a[1:]
+    alone = floor(ledger)
+    assert set(alone) == set(ledger.calls)
+    assert min(alone.values()) > 0.0
+
+
+def test_a_table_is_aligned() -> None:
+    lines = list(table(("case", "µm"), [["a", "1"], ["long name", "1234"]]))
+    assert lines == [
+        "  case         µm",
+        "  ---------  ----",
+        "  a             1",
+        "  long name  1234",
+    ]
+
+
+def test_results_name_versions_and_no_path(tmp_path: Path) -> None:
+    kept(tmp_path / "new", "what", made_with(), ("a", "b"), [(1, 2.5)])
+    assert (tmp_path / "new" / "what.csv").read_text(encoding="utf-8") == "a,b\n1,2.5\n"
+    said = (tmp_path / "new" / "what.md").read_text(encoding="utf-8")
+    assert f"numpy {np.__version__}" in said
+    assert not re.search(r"(^|\s)/\w", said)
+
+
+def test_results_that_cannot_be_written_are_told_of_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(OutputError, match="Cannot write into"):
+        kept(tmp_path / "file", "what", "", ("a",), [])
+
+
+def test_the_bar_draws_nothing_where_nobody_sees_it() -> None:
+    stream = io.StringIO()
+    with Steps(stream, "stiff", 2) as bar:
+        bar()
+    assert stream.getvalue() == ""
+
+
+def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
+    def run(method: str, error: float, seconds: float, *, peer: bool) -> Work:
+        return Work("p", method, 0.0, error, 0.0, seconds, 0, peer)
+
+    work = [
+        run("bernoulli", 1e-5, 1.0, peer=False), run("bernoulli", 1e-7, 3.0, peer=False),
+        run("LSODA", 1e-7, 60.0, peer=True), run("Python loop", 1e-9, 9.0, peer=True),
+    ]  # fmt: skip
+    ratios = [precision.best_ratio(work, level) for level in (1e-5, 1e-6, 1e-8)]
+    assert ratios == [60.0, 20.0, None]
+
+
+@pytest.mark.parametrize("name", [ONE, "pressed and held"])
+def test_scipys_physics_are_ours(name: str) -> None:
+    # LSODA at 1e-8 and Richardson's form at 0.1 ms are each within 1 nm of the exact solution.
+    known = problem(name)
+    simulation = replace(known.scene.simulation, stepper="richardson", physics_step=1e-4)
+    mine = solved(replace(known.scene, simulation=simulation), known.commands)
+    theirs, _, evaluations = peers.peer(known, peers.SOLVERS["LSODA"], 1e-8)
+    assert mine.against(theirs)[0] < 2e-9
+    assert evaluations > known.scene.periods
+
+
+def test_the_python_loop_is_the_closed_form_step() -> None:
+    # Same formulas, same steps: rounding only.
+    known = problem(ONE)
+    looped, _ = loop(known, 1e-3, known.scene.periods)
+    assert solved(known.scene, known.commands).against(looped)[0] < 1e-12
+
+
+def test_every_problem_has_contact_and_moving_pins() -> None:
+    idle = []
+    for name in PROBLEMS:
+        known = problem(name)
+        found = solved(known.scene, known.commands)
+        if found.forces.max() <= 0.1 or np.ptp(found.heights) <= 0.1e-3:
+            idle.append(name)
+    assert idle == []
+
+
+def test_without_scipy_the_benchmark_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+    assert "pip install" in peers.missing()
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_a_term_left_out_is_absent_and_nothing_else_changes(term: str) -> None:
+    scene = sample("tap")
+    less = without(scene, term)
+    section = TERMS[term]
+    if getattr(scene, section) is None:
+        assert less is None
+    else:
+        assert less is not None
+        assert replace(less, **{section: getattr(scene, section)}) == scene
+
+
+def test_the_longer_step_is_the_control_period() -> None:
+    less = without(sample("tap"), LONGER)
+    assert less is not None
+    assert less.simulation.physics_step == less.simulation.control_period
+    assert without(less, LONGER) is None
+
+
+def test_terms_gives_a_line_for_every_term(capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["benchmark", "terms", "tap", "--quick", "--quiet"])
+    out = capsys.readouterr().out
+    named = ("the full scene", "without conduit", "without relaxation", "all of these")
+    assert (code, [name for name in named if name not in out]) == (0, [])
+
+
+@pytest.mark.parametrize("kind", ["stiff", "precision", "scale", "terms"])
+def test_every_benchmark_shows_an_example(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out = main(["benchmark", kind, "--help"]), capsys.readouterr().out
+    assert (code, f"  digiclay benchmark {kind}" in out.partition("examples:")[2]) == (0, True)
