@@ -12,11 +12,14 @@ from ..delay import Queue
 from ..physics import Cell, rates
 from ..places import Segment
 
-__all__ = ["ExplicitPlan", "Rates", "marched"]
+__all__ = ["Explicit", "ExplicitPlan", "Rates"]
 
 Floats = NDArray[np.float64]
 #: Rates of a block of cells, from its rows and from the number of the stepper's node.
 Rates = Callable[[Floats, int], Floats]
+
+#: A step that ends so many strokes from the middle is no error but a blow-up.
+BEYOND = 1.5
 
 
 @dataclass(frozen=True)
@@ -28,32 +31,42 @@ class ExplicitPlan:
     segments: tuple[Segment, ...]
 
 
-def marched(
-    plan: ExplicitPlan, driven: Floats, under: Floats, increment: Callable[[Rates, Floats, float], Floats]
-) -> None:
-    """Move a block of cells on by one control period, in place; see `places.Stepper`.
-
-    Parameters
-    ----------
-    increment : callable
-        The method: from the rates, the rows and the length of a step to how far the rows go.
+@dataclass(frozen=True)
+class Explicit:
+    """A method that marches through the segments of a period; each says how far one step goes.
 
     Notes
     -----
-    A method that has left its region of stability runs to infinity within a period; that is
-    found by the check for finite numbers at its end, which says when and where.
+    A method that has left its region of stability throws pins far beyond their stops; the
+    stops would hide it. Such a cell is given up as infinite, which the check for finite
+    numbers at the end of the period finds, and says when and where.
     """
-    cell = plan.cell
-    y, commands = driven[: cell.rows], driven[cell.rows :]
-    for part in plan.segments:
-        command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
 
-        def rates_at(
-            rows: Floats, node: int, command: Floats = command, instants: Floats = instants
-        ) -> Floats:
-            return rates(cell, rows, instants[node], command)
+    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
+        """Work out once what all periods share."""
+        return ExplicitPlan(cell, queue, segments)
 
-        with np.errstate(over="ignore", invalid="ignore"):
-            y += increment(rates_at, y, part.length)
-        np.clip(y[0], 0.0, cell.actuator.stroke, out=y[0])
-    cell.lag.settle(y[cell.lag_rows])
+    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+        """Return how far the rows go in one step, s long."""
+        raise NotImplementedError
+
+    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+        cell, stroke = plan.cell, plan.cell.actuator.stroke
+        y, commands = driven[: cell.rows], driven[cell.rows :]
+        for part in plan.segments:
+            command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
+
+            def rates_at(
+                rows: Floats, node: int, command: Floats = command, instants: Floats = instants
+            ) -> Floats:
+                return rates(cell, rows, instants[node], command)
+
+            with np.errstate(over="ignore", invalid="ignore"):
+                y += self.increment(rates_at, y, part.length)
+                thrown = ~(np.abs(y[0] - 0.5 * stroke) < BEYOND * stroke)
+            np.clip(y[0], 0.0, stroke, out=y[0])
+            if thrown.any():
+                y[0][thrown] = np.inf
+                return
+        cell.lag.settle(y[cell.lag_rows])

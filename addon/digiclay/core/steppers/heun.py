@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..delay import Queue
-from ..physics import Cell
-from ..places import Segment
-from .explicit import ExplicitPlan, Rates, marched
+from .explicit import Explicit, Rates
 
 __all__ = ["Heun"]
 
@@ -18,23 +15,14 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Heun:
+class Heun(Explicit):
     """Explicit, order 2."""
 
     name = "heun"
     order = 2
     nodes = (0.0, 1.0)
 
-    def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
-        """Work out once what all periods share."""
-        return ExplicitPlan(cell, queue, segments)
-
-    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> None:
-        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
-        marched(plan, driven, under, _increment)
-
-
-def _increment(rates: Rates, y: Floats, step: float) -> Floats:
-    """Return how far the rows go in one step."""
-    first = rates(y, 0)
-    return (0.5 * step) * (first + rates(y + step * first, 1))
+    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+        """Return how far the rows go in one step, s long."""
+        first = rates(y, 0)
+        return (0.5 * step) * (first + rates(y + step * first, 1))
