@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,13 +17,13 @@ from numpy.typing import NDArray
 from ..actuator import Actuator
 from ..errors import ParameterError
 from ..layout import ON_THE_SIDE
-from ..methods import ControlParameters
 from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
 from .bench import Bench
 from .blister import Blister
-from .servo import Servo, locked_under_overload
+from .servo import locked_under_overload
+from .tracking import Tracking
 from .transitions import BY_FORCE, BY_PLACE, changed
 from .travel import Heading, ahead_of, square_distance, turned
 
@@ -63,7 +62,7 @@ class Patch(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CellStates(ControlParameters):
+class CellStates(Tracking):
     """Gains and thresholds of Method II, all of them per cell."""
 
     force_setpoint: float = quantity(0.04, "force held under the finger", unit="N", symbol="F_ref", above=0.0)
@@ -84,10 +83,6 @@ class CellStates(ControlParameters):
         50e-3, "time after which a critical cell is given up", unit="s", symbol="t_crit", at_least=0.0
     )
     spring_stiffness: float = quantity(20.0, "virtual spring", unit="N/m", symbol="k_VS", above=0.0)
-    position_gain: float = quantity(
-        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
-    )
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
     force_gain: float = quantity(15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0)
     rise: float = quantity(
         1e-3,
@@ -103,12 +98,6 @@ class CellStates(ControlParameters):
         symbol="r_VM",
         source="P",
         above=0.0,
-    )
-    travel: float = quantity(
-        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
-    )
-    behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
     )
 
     @property
@@ -152,11 +141,6 @@ class CellStatesControl:
     name = "cell_states"
     #: A cell remembers how many periods it has been critical.
     rows = 1
-
-    @cached_property
-    def servo(self) -> Servo:
-        """The cells' height control."""
-        return Servo(self.parameters.position_gain, self.parameters.dead_band)
 
     def begin(self) -> Patch:
         """Return the memory before a session."""
@@ -252,7 +236,9 @@ class CellStatesControl:
         """Return valve commands: force control under the finger, springs and profile elsewhere."""
         known = self.parameters
         springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
-        command = self.servo.command(target - springs * seen.force / known.spring_stiffness, seen.height)
+        command = self.parameters.servo.command(
+            target - springs * seen.force / known.spring_stiffness, seen.height
+        )
         follow = known.force_gain * (known.force_setpoint - seen.force)
         np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
         return locked_under_overload(command, seen.force, self.lift)

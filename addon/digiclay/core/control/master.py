@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
-from ..methods import ControlParameters
 from ..quantity import quantity
+from .tracking import Tracking
 from .travel import Heading
 
 __all__ = ["Master", "Phase", "VirtualMaster"]
@@ -59,7 +59,7 @@ class Master(NamedTuple):
 
 
 @dataclass(frozen=True)
-class VirtualMaster(ControlParameters):
+class VirtualMaster(Tracking):
     """Gains and thresholds of Method I."""
 
     force_setpoint: float = quantity(
@@ -72,10 +72,6 @@ class VirtualMaster(ControlParameters):
     spring_stiffness: float = quantity(
         200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
     )
-    position_gain: float = quantity(
-        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
-    )
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
     force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
     radius: float = quantity(
         8e-3,
@@ -84,12 +80,6 @@ class VirtualMaster(ControlParameters):
         symbol="r_VM",
         source="P",
         above=0.0,
-    )
-    travel: float = quantity(
-        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
-    )
-    behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
     )
     release_force: float = quantity(
         0.02, "force that frees a frozen cell", unit="N", symbol="F_free", above=0.0

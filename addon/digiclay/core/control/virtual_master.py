@@ -8,7 +8,6 @@ effort into the master's height; the cells around follow the blister's profile.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from .bench import Bench
 from .blister import Blister
 from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
-from .servo import Servo, locked_under_overload
+from .servo import locked_under_overload
 from .travel import Heading, ahead_of, square_distance, turned
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
@@ -62,11 +61,6 @@ class VirtualMasterControl:
 
     name = "virtual_master"
     rows = 0
-
-    @cached_property
-    def servo(self) -> Servo:
-        """The cells' height control."""
-        return Servo(self.parameters.position_gain, self.parameters.dead_band)
 
     def begin(self) -> Master:
         """Return the memory before a session."""
@@ -147,7 +141,9 @@ class VirtualMasterControl:
         target, mode = seen.target, self._left_alone(seen.target)
         if memory.phase is not Phase.IDLE:
             memory, target = self._created(memory, seen, mode)
-        command = locked_under_overload(self.servo.command(target, seen.height), seen.force, self.lift)
+        command = locked_under_overload(
+            self.parameters.servo.command(target, seen.height), seen.force, self.lift
+        )
         return memory, Orders(target, mode, command)
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
