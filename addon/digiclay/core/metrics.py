@@ -192,7 +192,9 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")
     touching = in_contact(total)
-    behind, weight = lag(position, force, history["fingertip"]), weights(time)[in_contact(force.sum(axis=1))]
+    # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
+    behind = np.round(lag(position, force, history["fingertip"]), 12)
+    weight = weights(time)[in_contact(force.sum(axis=1))]
     formed, area = height[-1] - height[0], cell_area(position)
     rows = shaping(total, history["mode"])
     beyond, settled = _followed(time, total, float(set_point), first_touch(total))
