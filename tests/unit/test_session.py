@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -237,8 +239,22 @@ def test_a_file_in_the_way_is_told_before_any_work(tmp_path: Path) -> None:
         may_be_written(tmp_path / "file" / "run", overwrite=False)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_leave_to_write_is_told_before_any_work(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
+@pytest.fixture
+def locked() -> Iterator[Path]:
+    """Give a folder this process may not write to; root, who may write anywhere, is nobody meanwhile."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, root = Path(name), os.geteuid() == 0
+        folder.chmod(0o555)
+        if root:
+            os.seteuid(65534)
+        try:
+            yield folder
+        finally:
+            if root:
+                os.seteuid(0)
+            folder.chmod(0o700)
+
+
+def test_a_folder_without_leave_to_write_is_told_before_any_work(locked: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written to"):
-        may_be_written(tmp_path / "run", overwrite=False)
+        may_be_written(locked / "run", overwrite=False)

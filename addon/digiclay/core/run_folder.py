@@ -45,7 +45,8 @@ def may_be_written(out: Path, *, overwrite: bool) -> None:
     above = out.resolve().parent
     while not above.exists():
         above = above.parent
-    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
+    as_who_we_act = os.access in os.supports_effective_ids
+    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK, effective_ids=as_who_we_act):
         raise OutputError(f"{out} cannot be made: {above} cannot be written to.")
 
 
