@@ -57,6 +57,13 @@ class Motion:
         return poses
 
 
+def fitting(layout: Layout) -> Blister:
+    """Return the default blister, made smaller where it would be wider than the bed."""
+    share = min(1.0, max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 30e-3)
+    usual = Blister()
+    return Blister(usual.radius * share, usual.edge_radius * share, usual.flat_radius * share)
+
+
 def make_system(
     layout: Layout | None = None,
     *,
@@ -80,7 +87,7 @@ def make_system(
     assert parts.keys() <= given.keys(), f"no such part: {parts.keys() - given.keys()}"
     scene = Scene(
         **{**given, **parts}, layout=layout or Layout(), delay=Delay(dead_time), control=master,
-        blister=(blister or Blister()) if master else None, simulation=Simulation(period, step, stepper),
+        blister=(blister or fitting(layout or Layout())) if master else None, simulation=Simulation(period, step, stepper),
         recorder=None, trajectory=Path.press(40e-3),
     )  # fmt: skip
     system = assemble(scene)

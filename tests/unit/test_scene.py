@@ -162,6 +162,14 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         "control.method must be one of virtual_master, cell_states, elastic, plastic, viscous, "
         "push_pull, force_display, shape_display (got 'hand').",
     ),
+    "blister wider than the bed": (
+        {"blister": {"radius": 0.038, "edge_radius": 0.041}},
+        "blister.radius must be at most half the bed's longer side, 0.0375 m (got 0.038 m).",
+    ),
+    "edge inside the blister": (
+        {"blister": {"edge_radius": 0.014}},
+        "blister.edge_radius must be above the radius, 0.015 m (got 0.014 m).",
+    ),
     "no section": ({"layout": 3}, "layout must be a section, [layout] (got 3)."),
     "part that must be there": (
         {"valve": "absent"},

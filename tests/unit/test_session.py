@@ -19,7 +19,7 @@ from digiclay.core.scene_table import resolve
 from digiclay.core.session import Result, run, save
 
 WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
-SMALL = {"radius": 9e-3, "edge_radius": 12e-3}
+SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
 TABLE: dict[str, Any] = {
     "layout": {"rows": 3, "columns": 4},
     "blister": SMALL,

@@ -215,9 +215,9 @@ class Scene:
             rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
             raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
         plan = self.layout
-        longest_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
-        if self.blister and self.blister.radius > longest_side * (1.0 + 1e-9):
-            rule = f"must be at most the bed's longer side, {longest_side:g} m, or it has no edge"
+        longer_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
+        if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
+            rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
         lasts = self.trajectory.trajectory().duration
         if self.simulation.duration == 0.0:
