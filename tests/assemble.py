@@ -85,9 +85,10 @@ def make_system(
         "valve_lag": ValveLag(), "fingertip": Fingertip(), "contact": Contact(), "relaxation": Relaxation(),
     }  # fmt: skip
     assert parts.keys() <= given.keys(), f"no such part: {parts.keys() - given.keys()}"
+    bed = layout or Layout()
     scene = Scene(
-        **{**given, **parts}, layout=layout or Layout(), delay=Delay(dead_time), control=master,
-        blister=(blister or fitting(layout or Layout())) if master else None, simulation=Simulation(period, step, stepper),
+        **{**given, **parts}, layout=bed, delay=Delay(dead_time), control=master,
+        blister=(blister or fitting(bed)) if master else None, simulation=Simulation(period, step, stepper),
         recorder=None, trajectory=Path.press(40e-3),
     )  # fmt: skip
     system = assemble(scene)
