@@ -88,7 +88,8 @@ def test_a_bed_is_not_added_in_edit_mode() -> None:
 @pytest.mark.usefixtures("extension")
 def test_an_imported_run_shows_the_row_asked_for(tmp_path: Path, formed: Instant) -> None:
     heights = np.stack([formed.height, formed.height[::-1]])
-    (tmp_path / "scene.toml").write_text('[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n')
+    scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n'
+    (tmp_path / "scene.toml").write_text(scene)
     np.savez(
         tmp_path / "history.npz",
         time=np.array([0.0, 0.005]),
