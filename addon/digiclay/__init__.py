@@ -12,14 +12,14 @@ __version__ = "0.1.0"
 
 
 def register() -> None:
-    """Add the extension's operators and menu entries; Blender calls this when it is enabled."""
-    from . import operators
+    """Add the extension's properties, operators and panels; Blender calls this when it is enabled."""
+    from . import registration
 
-    operators.register()
+    registration.register()
 
 
 def unregister() -> None:
     """Take back all that `register` added."""
-    from . import operators
+    from . import registration
 
-    operators.unregister()
+    registration.unregister()

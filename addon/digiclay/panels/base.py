@@ -1,0 +1,36 @@
+"""What the panels share: where they stand, and which bed they are about."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import view
+
+__all__ = ["CATEGORY", "Panel", "bed_of"]
+
+CATEGORY = "Digital Clay"
+
+
+class Panel:
+    """Mixin of a sub-panel: in the 3D view's sidebar, shown while a part of a bed is active.
+
+    A panel derives from this and from `bpy.types.Panel`, has a `bl_label`, a `bl_idname` that
+    starts with ``DIGICLAY_PT_`` and a `bl_order`, and draws only: it never changes anything.
+    """
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Show the panel when there is a bed it can be about."""
+        return bed_of(context) is not None
+
+
+def bed_of(context: Any) -> Any | None:
+    """Return the bed the active object is or belongs to, be it fingertip, housing or a part of those."""
+    thing = getattr(context, "object", None)
+    while thing is not None and not view.is_bed(thing):
+        thing = thing.parent
+    return thing

@@ -1,0 +1,34 @@
+"""What the extension adds to Blender, in the order it is added; taken back in the opposite order."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from . import operators, panels
+
+__all__ = ["MODULES", "register", "unregister"]
+
+#: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
+MODULES: tuple[ModuleType, ...] = (
+    operators,
+    panels,
+)
+
+
+def register() -> None:
+    """Register every module; when one fails, take back those before it, so that nothing half-done stays."""
+    done: list[ModuleType] = []
+    try:
+        for module in MODULES:
+            module.register()
+            done.append(module)
+    except BaseException:
+        for module in reversed(done):
+            module.unregister()
+        raise
+
+
+def unregister() -> None:
+    """Undo `register` in the opposite order."""
+    for module in reversed(MODULES):
+        module.unregister()
