@@ -21,7 +21,7 @@ from .node_tree import pins_on_points
 __all__ = ["BED", "FINGERTIP", "build", "fingertip_of", "is_bed", "material", "show", "underside"]
 
 #: Marks the objects of the device; names are the user's to change.
-ROLE = "digiclay"
+ROLE = "digiclay_role"
 BED, FINGERTIP, HOUSING, PIN = "bed", "fingertip", "housing", "pin"
 
 #: sRGB of what is no pin.

@@ -23,7 +23,7 @@ def drawn_pins(bed: Any) -> tuple[np.ndarray, list[str]]:
     for item in graph.object_instances:
         if item.is_instance and item.parent.original == bed:
             tops.append(np.array(item.matrix_world.translation) / bridge.SCALE)
-            materials.append(item.object.material_slots[0].material["digiclay"])
+            materials.append(item.object.material_slots[0].material[view.ROLE])
     return np.array(tops), materials
 
 
@@ -47,7 +47,7 @@ def test_every_pin_drawn_wears_the_material_of_its_mode(bed: Any, formed: Instan
 
 def test_the_modes_have_as_many_materials_each_in_its_colour(bed: Any) -> None:
     for mode in Mode:
-        (material,) = (m for m in bpy.data.materials if m.get("digiclay") == mode.name.lower())
+        (material,) = (m for m in bpy.data.materials if m.get(view.ROLE) == mode.name.lower())
         wanted = bridge.linear(COLOURS[mode])
         shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         # Both are stored as float32 numbers up to 1.
@@ -120,7 +120,7 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Ins
         if item.is_instance and item.parent.original == bed
     ]
     assert len(feet) == 48
-    housing = next(child for child in bed.children if child["digiclay"] == view.HOUSING)
+    housing = next(child for child in bed.children if child[view.ROLE] == view.HOUSING)
     deck = housing.data.vertices[-1].co.z  # the housing is drawn from its underside to the deck inside
     # float32 on lengths below one unit.
     np.testing.assert_allclose(feet, deck, rtol=0, atol=1e-6)
