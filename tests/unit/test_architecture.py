@@ -21,7 +21,7 @@ CORE = PACKAGE / "core"
 LEVELS = (
     "errors modes closed_form control.travel metrics_signal",
     "quantity run_folder surface control.transitions metrics_path sweep_axis",
-    "layout fluid delay supply actuator contact relaxation fingertip "
+    "layout fluid delay supply actuator contact relaxation fingertip part_table pictures "
     "methods export metrics control.servo control.blister",
     "places valve valve_lag state trajectory control.tracking",
     "absent conduit touch recorder sensors",
@@ -32,7 +32,7 @@ LEVELS = (
     "assembly gathering steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
-    "simulation",
+    "simulation jobs",
     "accuracy",
     "session metrics_trial",
     "metrics_speed sweep",

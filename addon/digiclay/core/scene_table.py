@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .errors import ParameterError
 from .methods import METHODS
-from .quantity import Parameters, nearest, parse, quantities
+from .part_table import cut, read_part, refuse_unknown, shown
+from .quantity import quantities
 from .scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, Path, Scene, Waypoint, parameters
 
 __all__ = ["ABSENT", "PRESETS", "resolve", "text"]
@@ -46,7 +46,7 @@ def resolve(table: Table, name: str = "") -> Scene:
     ParameterError
         Its owner is the section.
     """
-    _known("", table, TOP_LEVEL)
+    refuse_unknown("", table, TOP_LEVEL)
     texts: dict[str, Any] = {
         key: _text(key, table.get(key, default))
         for key, default in zip(TEXTS, (name, "", "paper"), strict=True)
@@ -73,29 +73,17 @@ def resolve(table: Table, name: str = "") -> Scene:
             defaults |= METHODS[method].blister or {}
         if section == "contact" and parts["layout"].arrangement == "hexagonal":
             defaults["share"] = HEXAGONAL_SHARE
-        parts[section] = _part(section, parameters(section, method), defaults, own)
+        parts[section] = read_part(section, parameters(section, method), defaults, own)
     path = _path(table.get("trajectory", {}), parts["actuator"].rest_height)
     return Scene(**parts, **texts, trajectory=path, method=method)
-
-
-def _known(section: str, table: Table, names: Sequence[str]) -> None:
-    """Refuse keys that mean nothing."""
-    for key, value in table.items():
-        if key in names:
-            continue
-        owner = section and f"{section}."
-        close = nearest(key, list(names))
-        asked = f"Did you mean {owner}{close}?" if close else f"Known here: {', '.join(names)}."
-        shown = key if re.fullmatch(r"[\w-]+", key) else repr(key)
-        raise ParameterError(f"{owner}{shown}", "", "must be a known key", _shown(value), asked)
 
 
 def _text(key: str, value: Any) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
-        raise ParameterError(key, "", "must be a text", _shown(value))
+        raise ParameterError(key, "", "must be a text", shown(value))
     if not all(letter.isprintable() or (letter in "\n\t" and key == "description") for letter in value):
-        raise ParameterError(key, "", "must be printable", _shown(value))
+        raise ParameterError(key, "", "must be printable", shown(value))
     return value
 
 
@@ -106,14 +94,14 @@ def _section(section: str, value: Any) -> dict[str, Any] | None:
     if isinstance(value, dict):
         return dict(value)
     rule = f"must be a section, [{section}]" + (f', or "{ABSENT}"' if section in OPTIONAL else "")
-    raise ParameterError(section, "", rule, _shown(value))
+    raise ParameterError(section, "", rule, shown(value))
 
 
 def _method(control: dict[str, Any] | None) -> str:
     """Take the method out of the control's section."""
     method = (control or {}).pop("method", "virtual_master")
     if not isinstance(method, str) or method not in METHODS:
-        raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", _shown(method))
+        raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", shown(method))
     return method
 
 
@@ -121,42 +109,16 @@ def _forms_one(method: str, own: dict[str, Any]) -> bool:
     """Tell whether a method forms a blister; refuse a section [blister] where it does not."""
     if METHODS[method].blister is None and own:
         raise ParameterError(
-            "blister", "", f"must be left out: the method {method} forms no blister", _shown(own)
+            "blister", "", f"must be left out: the method {method} forms no blister", shown(own)
         )
     return METHODS[method].blister is not None
-
-
-def _part(section: str, kind: type[Parameters], defaults: Table, own: Table) -> Parameters:
-    """Build a part from what a section says."""
-    known = quantities(kind)
-    _known(section, own, (*known, "method") if section == "control" else tuple(known))
-    given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}
-    try:
-        return kind(**{**defaults, **given})
-    except ParameterError as error:
-        rule = error.rule.replace(f"{error.owner}.", f"{section}.")
-        said = own.get(error.field)
-        value = _shown(said) if isinstance(said, str) else _cut(error.value)
-        raise ParameterError(section, error.field, rule, value, error.hint) from None
-
-
-def _measured(section: str, key: str, value: Any, unit: str) -> Any:
-    """Turn quantities written with a unit into SI, also within a list."""
-    if isinstance(value, list):
-        return [_measured(section, key, item, unit) for item in value]
-    if not isinstance(value, str) or not unit:
-        return value
-    try:
-        return parse(value, unit)
-    except ValueError as error:
-        raise ParameterError(section, key, str(error), _shown(value)) from None
 
 
 def _path(table: Any, rest_height: float) -> Path:
     """Read the section of the finger's path."""
     if not isinstance(table, dict):
-        raise ParameterError("trajectory", "", "must be a section, [trajectory]", _shown(table))
-    _known("trajectory", table, ("interpolation", "waypoints"))
+        raise ParameterError("trajectory", "", "must be a section, [trajectory]", shown(table))
+    refuse_unknown("trajectory", table, ("interpolation", "waypoints"))
     kind = table.get("interpolation", "smooth")
     if "waypoints" not in table:
         path = dataclasses.replace(Path.press(rest_height), interpolation=kind)
@@ -164,38 +126,24 @@ def _path(table: Any, rest_height: float) -> Path:
         rows = table["waypoints"]
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
-            raise ParameterError("trajectory", "waypoints", rule, _shown(rows))
+            raise ParameterError("trajectory", "waypoints", rule, shown(rows))
         path = Path(
             kind, tuple(_waypoint(f"trajectory.waypoints #{i}", row) for i, row in enumerate(rows, 1))
         )
     try:
         path.trajectory()
     except ParameterError as error:
-        raise ParameterError("trajectory", error.field, error.rule, _cut(error.value)) from None
+        raise ParameterError("trajectory", error.field, error.rule, cut(error.value)) from None
     return path
 
 
 def _waypoint(owner: str, row: Table) -> Waypoint:
     """Read one waypoint; where it is and when has no sensible default."""
-    _known(owner, row, tuple(quantities(Waypoint)))
+    refuse_unknown(owner, row, tuple(quantities(Waypoint)))
     for key in ("time", "position"):
         if key not in row:
             raise ParameterError(owner, key, "must be given", "none")
-    point = _part(owner, Waypoint, {}, row)
-    assert isinstance(point, Waypoint)
-    return point
-
-
-def _shown(value: Any) -> str:
-    """Write a value from a file on one short line."""
-    if isinstance(value, dict):
-        return "a section" if value else "an empty section"
-    return _cut(repr(value))
-
-
-def _cut(text: str) -> str:
-    """Shorten a text that would not fit on a line."""
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return read_part(owner, Waypoint, {}, row)
 
 
 def text(scene: Scene) -> str:

@@ -1,0 +1,65 @@
+"""Tables of TOML files, read into a part's parameters; what is wrong is told in one line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from .errors import ParameterError
+from .quantity import Parameters, nearest, parse, quantities
+
+__all__ = ["cut", "read_part", "refuse_unknown", "shown"]
+
+Table = Mapping[str, Any]
+Part = TypeVar("Part", bound=Parameters)
+
+
+def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
+    """Refuse keys that mean nothing."""
+    for key, value in table.items():
+        if key in names:
+            continue
+        owner = section and f"{section}."
+        close = nearest(key, list(names))
+        asked = f"Did you mean {owner}{close}?" if close else f"Known here: {', '.join(names)}."
+        name = key if re.fullmatch(r"[\w-]+", key) else repr(key)
+        raise ParameterError(f"{owner}{name}", "", "must be a known key", shown(value), asked)
+
+
+def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
+    """Build a part from what a section says."""
+    known = quantities(kind)
+    refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
+    given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}
+    try:
+        return kind(**{**defaults, **given})
+    except ParameterError as error:
+        rule = error.rule.replace(f"{error.owner}.", f"{section}.")
+        said = own.get(error.field)
+        value = shown(said) if isinstance(said, str) else cut(error.value)
+        raise ParameterError(section, error.field, rule, value, error.hint) from None
+
+
+def _measured(section: str, key: str, value: Any, unit: str) -> Any:
+    """Turn quantities written with a unit into SI, also within a list."""
+    if isinstance(value, list):
+        return [_measured(section, key, item, unit) for item in value]
+    if not isinstance(value, str) or not unit:
+        return value
+    try:
+        return parse(value, unit)
+    except ValueError as error:
+        raise ParameterError(section, key, str(error), shown(value)) from None
+
+
+def shown(value: Any) -> str:
+    """Write a value from a file on one short line."""
+    if isinstance(value, dict):
+        return "a section" if value else "an empty section"
+    return cut(repr(value))
+
+
+def cut(text: str) -> str:
+    """Shorten a text that would not fit on a line."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
