@@ -8,16 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compat import bpy
+from .core.errors import DigiclayError
 from .core.fingertip import Fingertip
 from .device_shapes import Shape
 
-__all__ = ["SCALE", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells", "write_cells"]
+__all__ = [
+    "SCALE", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells", "resize_fingertip",
+    "uniform", "write_cells",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
 #: Blender units per metre of the device: a millimetre is drawn as a hundredth of a unit,
 #: which suits Blender's default clipping, snapping and lights.
 SCALE = 10.0
+
+#: Scales that differ by less, of 1, count as equal: matrices are float32, and parents multiply.
+UNEVEN = 1e-3
+#: A bed scaled to less than this can be neither seen nor inverted.
+SMALLEST_SCALE = 1e-6
+
+#: Where an empty keeps the semi-axes of its finger, m.
+AXES = "digiclay_axes"
 
 #: Attributes of a bed's mesh, one value a pin: type in Blender, name of its value, type of the array.
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
@@ -79,36 +91,86 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
     return cells
 
 
-def place_fingertip(ball: Any, at: Floats, finger: Fingertip) -> None:
-    """Put a unit sphere where the fingertip is; location, rotation and scale are its pose and semi-axes.
+def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
+    """Put the fingertip to a pose, and give its ellipsoid the size of the finger.
 
     Parameters
     ----------
-    ball : bpy.types.Object
-        In the space of its bed.
+    tip : bpy.types.Object
+        The empty, in the space of its bed.
     at : ndarray (7,)
         Lowest point, m, and quaternion w, x, y, z.
     finger : Fingertip
     """
-    ball.rotation_mode = "QUATERNION"
-    ball.rotation_quaternion = at[3:]
-    ball.location = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
-    ball.scale = np.array([finger.length, finger.width, finger.height]) * SCALE
+    tip.matrix_parent_inverse.identity()
+    tip.rotation_mode = "QUATERNION"
+    tip.rotation_quaternion = at[3:]
+    tip.location = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
+    tip.scale = (1.0, 1.0, 1.0)
+    resize_fingertip(tip, finger)
 
 
-def pose(ball: Any) -> Floats:
+def resize_fingertip(tip: Any, finger: Fingertip) -> None:
+    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it."""
+    axes = np.array([finger.length, finger.width, finger.height])
+    tip[AXES] = axes.tolist()
+    tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
+    for ball in tip.children:
+        if ball.type == "MESH":
+            ball.scale = axes * SCALE
+
+
+def pose(tip: Any) -> Floats:
     """Return the pose (7,) of a fingertip in the space of its bed: lowest point, m, and quaternion.
 
-    Reads `matrix_world`, which is live while the user drags the fingertip.
+    Reads `matrix_world`, which is live while the user drags the fingertip by whatever means.
+    Only where it is and how it is turned count; its scale does not.
+
+    Parameters
+    ----------
+    tip : bpy.types.Object
+        The empty, child of its bed; it is the ellipsoid's centre.
+
+    Raises
+    ------
+    DigiclayError
+        When the bed is not uniformly scaled.
     """
-    bed = ball.parent
-    local = ball.matrix_world if bed is None else bed.matrix_world.inverted() @ ball.matrix_world
-    centre, turn, scale = local.decompose()
-    rotation = np.array(turn.to_matrix())
-    # N = R diag(a²) Rᵀ; the lowest point is centre - N z / sqrt(z N z).
-    down = rotation @ (np.array(scale) ** 2 * rotation[2])
-    lowest = np.array(centre) - down / np.sqrt(down[2])
-    return np.array([*(lowest / SCALE), *turn.normalized()])
+    bed = tip.parent
+    uniform(bed)
+    local = bed.matrix_world.inverted() @ tip.matrix_world
+    centre, turn, _ = local.decompose()
+    quaternion = np.array(turn.normalized())
+    # The centre of a finger whose lowest point is the origin, taken away again.
+    above = Fingertip(*tip[AXES]).outline(np.array([[0.0, 0.0, 0.0, *quaternion]]))[0, :3]
+    return np.array([*(np.array(centre) / SCALE - above), *quaternion])
+
+
+def uniform(bed: Any) -> float:
+    """Return how much larger than its drawing unit a bed stands in the world.
+
+    Raises
+    ------
+    DigiclayError
+        When the bed, or what it is parented to, is scaled differently along its axes, sheared,
+        mirrored, or scaled to nothing: lengths in it would mean nothing.
+    """
+    matrix = np.array(bed.matrix_world, np.float64)[:3, :3]
+    scales = np.linalg.norm(matrix, axis=0)
+    largest = float(scales.max())
+    shown = " x ".join(f"{scale:.4g}" for scale in scales)
+    name = f"The scale of {bed.name}, that of its parents included,"
+    remedy = "Set it with Object > Apply or in the sidebar's Item tab."
+    if not np.isfinite(matrix).all() or scales.min() <= SMALLEST_SCALE:
+        raise DigiclayError(f"{name} must be above 0 along x, y and z (got {shown}). {remedy}")
+    angles = matrix.T @ matrix / np.outer(scales, scales) - np.eye(3)
+    if np.abs(angles).max() > UNEVEN:
+        raise DigiclayError(f"{name} must not shear it (got {shown}, sheared). {remedy}")
+    if np.ptp(scales) > UNEVEN * largest:
+        raise DigiclayError(f"{name} must be the same along x, y and z (got {shown}). {remedy}")
+    if np.linalg.det(matrix) < 0.0:
+        raise DigiclayError(f"{name} must not mirror it (got {shown}, mirrored). {remedy}")
+    return largest
 
 
 def linear(colour: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:

@@ -21,7 +21,7 @@ except ModuleNotFoundError as error:
 except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
-__all__ = ["bpy", "has_denoiser", "quiet", "scratch", "shader_nodes"]
+__all__ = ["bpy", "has_denoiser", "node_setting", "quiet", "scratch", "set_node_setting", "shader_nodes"]
 
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
@@ -35,6 +35,24 @@ def shader_nodes(owner: Any) -> Any:
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree
+
+
+def node_setting(modifier: Any, name: str) -> Any:
+    """Return what a geometry nodes modifier sets an input of its tree to."""
+    identifier = modifier.node_group.interface.items_tree[name].identifier
+    if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier[identifier]
+
+
+def set_node_setting(modifier: Any, name: str, value: Any) -> None:
+    """Set an input of a geometry nodes modifier's tree, for the object that has the modifier."""
+    identifier = modifier.node_group.interface.items_tree[name].identifier
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+    modifier.id_data.update_tag()  # Blender does not notice by itself
 
 
 def has_denoiser() -> bool:

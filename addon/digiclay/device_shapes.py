@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Shape", "ball", "housing", "loft", "rod"]
+__all__ = ["Shape", "arrow", "ball", "housing", "loft", "rod"]
 
 Floats = NDArray[np.float64]
 #: Vertices (k, 3) and faces (tuples of vertex indices, counter-clockwise from outside).
@@ -73,6 +73,12 @@ def ball(segments: int = 64) -> Shape:
     """Return the unit sphere."""
     turns = np.linspace(-math.pi / 2, math.pi / 2, segments // 2 + 1)[1:-1]
     return _revolve([(0.0, -1.0), *((math.cos(t), math.sin(t)) for t in turns), (0.0, 1.0)], segments)
+
+
+def arrow(radius: float, segments: int = 16) -> Shape:
+    """Return an arrow of length 1 that points down and ends at the origin, its head of a radius."""
+    shaft = 0.4 * radius
+    return _revolve([(0.0, 0.0), (radius, 0.3), (shaft, 0.3), (shaft, 1.0), (0.0, 1.0)], segments)
 
 
 def housing(half: tuple[float, float], wall: float, bottom: float, deck: float, rim: float) -> Shape:

@@ -4,75 +4,69 @@ from __future__ import annotations
 
 from typing import Any
 
+from . import node_arrows, node_heat
 from .compat import bpy
+from .nodes import attribute, node, number, switch
 
-__all__ = ["pins_on_points"]
+__all__ = ["bed_nodes"]
 
 #: Pins pushed below the deck keep this much of their length, rather than turning upside down.
 LEAST_STRETCH = 0.02
 
 
-def pins_on_points(pins: Any, deck: float, length: float) -> Any:
-    """Make the node group that puts the pin of its mode on every vertex.
+def bed_nodes(by_mode: Any, by_force: Any, arrow: Any, deck: float, length: float, unit: float) -> Any:
+    """Make the node group that puts a pin on every vertex, and an arrow where arrows are on.
 
     Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
     rod, from a flat one on a low pin to a round one on a high pin.
 
     Parameters
     ----------
-    pins : bpy.types.Collection
-        One pin a mode, their names in the order of the codes; tops at their origins.
+    by_mode, by_force : bpy.types.Collection
+        One pin a mode and one a level of force, their names in the order of the codes; tops at
+        their origins.
+    arrow : bpy.types.Object
+        An arrow of length 1 that points down and ends at the origin.
     deck : float
         Height the rods reach down to, Blender units.
     length : float
-        Length of the pins in the collection, Blender units.
+        Length of the pins in the collections, Blender units.
+    unit : float
+        Blender units of a millimetre of the device.
     """
     tree = bpy.data.node_groups.new("Digital Clay Pins", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    points = _node(tree, "NodeGroupInput", 3, 1)
-    result = _node(tree, "NodeGroupOutput", 5, 1)
-    instances = _node(tree, "GeometryNodeInstanceOnPoints", 4, 1)
-    instances.inputs["Pick Instance"].default_value = True
-    tree.links.new(points.outputs["Geometry"], instances.inputs["Points"])
-    tree.links.new(instances.outputs["Instances"], result.inputs["Geometry"])
-
-    choice = _node(tree, "GeometryNodeCollectionInfo", 3, 0)
-    choice.inputs["Collection"].default_value = pins
+    node_heat.add_settings(tree)
+    node_arrows.add_settings(tree)
+    settings = node(tree, "NodeGroupInput", -1, 0)
+    result = node(tree, "NodeGroupOutput", 7, 0)
+    force_on, top = settings.outputs[node_heat.COLOUR_BY_FORCE], settings.outputs[node_heat.TOP_FORCE]
+    hot, level = node_heat.pins_by_force(tree, by_force, top, 3)
+    choice = node(tree, "GeometryNodeCollectionInfo", 2, 0)
+    choice.inputs["Collection"].default_value = by_mode
     choice.inputs["Separate Children"].default_value = True
-    tree.links.new(choice.outputs["Instances"], instances.inputs["Instance"])
-
-    mode = _node(tree, "GeometryNodeInputNamedAttribute", 3, -1)
-    mode.data_type = "INT"
-    mode.inputs["Name"].default_value = "mode"
-    tree.links.new(mode.outputs["Attribute"], instances.inputs["Instance Index"])
-
-    tree.links.new(_stretch(tree, deck, length).outputs["Vector"], instances.inputs["Scale"])
+    mode = attribute(tree, "mode", "INT", 2, 1)
+    instances = node(tree, "GeometryNodeInstanceOnPoints", 5, 0)
+    instances.inputs["Pick Instance"].default_value = True
+    shapes = switch(tree, "GEOMETRY", 4, 0, force_on, choice.outputs["Instances"], hot)
+    index = switch(tree, "INT", 4, 1, force_on, mode, level)
+    tree.links.new(settings.outputs["Geometry"], instances.inputs["Points"])
+    tree.links.new(shapes, instances.inputs["Instance"])
+    tree.links.new(index, instances.inputs["Instance Index"])
+    tree.links.new(_stretch(tree, deck, length), instances.inputs["Scale"])
+    drawn = node_arrows.arrows_on_points(tree, arrow, settings, instances.outputs["Instances"], unit, 7)
+    tree.links.new(drawn, result.inputs["Geometry"])
     return tree
 
 
 def _stretch(tree: Any, deck: float, length: float) -> Any:
     """Add the nodes that give (1, 1, (z - deck) / length) at every vertex."""
-    place = _node(tree, "GeometryNodeInputPosition", -1, 0)
-    parts = _node(tree, "ShaderNodeSeparateXYZ", 0, 0)
-    line = _node(tree, "ShaderNodeMath", 1, 0)
-    line.operation = "MULTIPLY_ADD"
-    line.inputs[1].default_value = 1.0 / length
-    line.inputs[2].default_value = -deck / length
-    least = _node(tree, "ShaderNodeMath", 2, 0)
-    least.operation = "MAXIMUM"
-    least.inputs[1].default_value = LEAST_STRETCH
-    stretch = _node(tree, "ShaderNodeCombineXYZ", 3, 2)
-    stretch.inputs["X"].default_value = stretch.inputs["Y"].default_value = 1.0
+    place = node(tree, "GeometryNodeInputPosition", 0, -2)
+    parts = node(tree, "ShaderNodeSeparateXYZ", 1, -2)
     tree.links.new(place.outputs["Position"], parts.inputs["Vector"])
-    tree.links.new(parts.outputs["Z"], line.inputs[0])
-    tree.links.new(line.outputs["Value"], least.inputs[0])
-    tree.links.new(least.outputs["Value"], stretch.inputs["Z"])
-    return stretch
-
-
-def _node(tree: Any, kind: str, column: int, row: int) -> Any:
-    """Add a node at a place of a coarse grid, so that whoever opens the tree can read it."""
-    node = tree.nodes.new(kind)
-    node.location = (220.0 * column, -180.0 * row)
-    return node
+    line = number(tree, "MULTIPLY_ADD", 2, -2, parts.outputs["Z"], 1.0 / length, -deck / length)
+    stretch = node(tree, "ShaderNodeCombineXYZ", 4, -2)
+    stretch.inputs["X"].default_value = stretch.inputs["Y"].default_value = 1.0
+    tree.links.new(number(tree, "MAXIMUM", 3, -2, line, LEAST_STRETCH), stretch.inputs["Z"])
+    return stretch.outputs["Vector"]

@@ -72,11 +72,16 @@ def outline(bed: Any) -> Floats:
     The bed stands at the origin; `matrix_basis` is right without an update of the scene.
     """
     clouds = []
-    for part in (bed, *bed.children):
+    for part in (bed, *bed.children_recursive):
+        if part.type != "MESH":
+            continue
         flat = np.empty(3 * len(part.data.vertices), np.float32)
         part.data.vertices.foreach_get("co", flat)
-        matrix = np.array(part.matrix_basis)
-        clouds.append(flat.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+        cloud = flat.reshape(-1, 3)
+        while part is not None:
+            matrix = np.array(part.matrix_basis)
+            cloud, part = cloud @ matrix[:3, :3].T + matrix[:3, 3], part.parent
+        clouds.append(cloud)
     return np.concatenate(clouds)
 
 

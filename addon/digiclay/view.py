@@ -1,8 +1,11 @@
 """The device in Blender: a bed of instanced pins, its housing and the fingertip.
 
 A bed is one mesh with a vertex a pin. Geometry nodes put a pin on every vertex and pick,
-by the integer attribute ``mode``, the one that wears the mode's material: this shows in
-Solid view too, and redraws 10 000 pins in a millisecond.
+by the integer attribute ``mode`` or by the force, the one that wears the right material:
+this shows in Solid view too, and redraws 10 000 pins in a millisecond.
+
+What is asked to be shown stands in the settings of the bed's modifier, an object's own:
+copies of a bed keep theirs, undo and files carry them.
 """
 
 from __future__ import annotations
@@ -11,26 +14,28 @@ from typing import Any
 
 import numpy as np
 
-from . import bridge, device_shapes
+from . import bridge, parts
 from .bridge import SCALE
-from .compat import bpy, shader_nodes
-from .core.modes import COLOURS, Mode
+from .compat import node_setting, set_node_setting
+from .core.errors import DigiclayError
+from .core.state import State
+from .core.system import System
 from .instant import Instant
-from .node_tree import pins_on_points
+from .node_arrows import ARROW_LENGTH, ARROWS
+from .node_heat import COLOUR_BY_FORCE, TOP_FORCE
+from .node_tree import bed_nodes
+from .parts import BED, ELLIPSOID, FINGERTIP, HOUSING, ROLE, material
 
-__all__ = ["BED", "FINGERTIP", "build", "fingertip_of", "is_bed", "material", "show", "underside"]
+__all__ = [
+    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
+    "arrows_shown", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed", "material",
+    "scale_arrows", "scale_colours", "show", "show_arrows", "show_state", "underside", "wants_force",
+]  # fmt: skip
 
-#: Marks the objects of the device; names are the user's to change.
-ROLE = "digiclay_role"
-BED, FINGERTIP, HOUSING, PIN = "bed", "fingertip", "housing", "pin"
-
-#: sRGB of what is no pin.
-SKIN = (0.91, 0.60, 0.47)
-CASE = (0.13, 0.14, 0.16)
-#: Space between the outermost pins and the wall, and the wall's thickness, in pitches.
-GAP, WALL = 0.85, 1.7
-#: Above this many pins they are drawn with fewer faces.
-MANY = 4000
+#: What the colour of a pin can tell.
+COLOURINGS = ("mode", "force")
+#: Name of the bed's modifier.
+MODIFIER = "Pins"
 
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
@@ -57,23 +62,84 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     rim = float(np.median(instant.height)) - 1.2 * instant.pitch
     # The deck is so deep that no pin is stretched much more than another: it shows on their caps.
     deck = min(lowest, rim) - 2.5 * instant.pitch
-    bed = _object(bridge.points("Digital Clay", len(instant.height)), BED, collection)
-    modifier = bed.modifiers.new("Pins", "NODES")
+    cells = bridge.points("Digital Clay", len(instant.height))
+    bed = parts.marked(cells, cells.name, BED, collection)
+    modifier = bed.modifiers.new(MODIFIER, "NODES")
     length = float(np.median(instant.height)) - deck
-    modifier.node_group = pins_on_points(_pins(instant, length), deck * SCALE, length * SCALE)
-    child = _object(_housing(instant, deck, rim), HOUSING, collection, parent=bed)
-    child.hide_select = True
-    _object(_fingertip(), FINGERTIP, collection, parent=bed)
-    show(bed, instant)
+    modifier.node_group = bed_nodes(
+        *parts.pins(instant, length), parts.arrow(instant.pitch), deck * SCALE, length * SCALE, SCALE * 1e-3
+    )
+    case = parts.housing(instant, deck, rim)
+    parts.marked(case, case.name, HOUSING, collection, parent=bed).hide_select = True
+    parts.fingertip(collection, bed)
+    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    _place_fingertip(bed, instant)
     return bed
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed."""
-    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
-    fingertip = fingertip_of(bed)
-    if fingertip is not None:
-        bridge.place_fingertip(fingertip, instant.fingertip, instant.finger)
+    """Show another instant of the same bed, its fingertip's pose included."""
+    shown = {"mode": instant.mode, "force": instant.force} if wants_force(bed) else {"mode": instant.mode}
+    bridge.write_cells(bed.data, instant.position, instant.height, **shown)
+    _place_fingertip(bed, instant)
+
+
+def show_state(bed: Any, system: System, state: State) -> None:
+    """Show the pins of a running session; the fingertip is the user's and stays where it is.
+
+    Forces are gathered and written only while something drawn tells them.
+    """
+    shown = {"mode": state.mode()}
+    if wants_force(bed):
+        shown["force"] = state.row(system.rows.force)
+    bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
+
+
+def colour_by(bed: Any, what: str) -> None:
+    """Colour the pins by what they do ("mode") or by the force on them ("force").
+
+    Raises
+    ------
+    DigiclayError
+        On another word, or when the bed's modifier is gone.
+    """
+    if what not in COLOURINGS:
+        raise DigiclayError(f"view.colour_by must be one of {', '.join(COLOURINGS)} (got {what!r}).")
+    set_node_setting(_modifier(bed), COLOUR_BY_FORCE, what == "force")
+
+
+def coloured_by(bed: Any) -> str:
+    """Return what the colour of the pins tells: "mode" or "force"."""
+    return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
+
+
+def scale_colours(bed: Any, top: float) -> None:
+    """Set the force from which on a pin has the last colour, N."""
+    set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
+
+
+def show_arrows(bed: Any, on: bool) -> None:
+    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
+    set_node_setting(_modifier(bed), ARROWS, bool(on))
+    tip = fingertip_of(bed)
+    ball = parts.ellipsoid(tip) if tip is not None else None
+    if ball is not None:
+        ball.material_slots[0].material = parts.skin(clear=bool(on))
+
+
+def arrows_shown(bed: Any) -> bool:
+    """Tell whether the bed's forces are drawn as arrows."""
+    return bool(node_setting(_modifier(bed), ARROWS))
+
+
+def scale_arrows(bed: Any, length: float) -> None:
+    """Set the length of the arrow of 1 N, m of the device."""
+    set_node_setting(_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
+
+
+def wants_force(bed: Any) -> bool:
+    """Tell whether anything drawn needs the force on each pin."""
+    return _modifier_of(bed) is not None and (arrows_shown(bed) or coloured_by(bed) == "force")
 
 
 def is_bed(thing: Any) -> bool:
@@ -92,63 +158,33 @@ def underside(bed: Any) -> float:
     return min(float(vertex.co.z) for vertex in case.data.vertices)
 
 
-def material(name: str, colour: tuple[float, float, float], roughness: float) -> Any:
-    """Return the material of a part, as the user may have changed it, or make it."""
-    found = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
-    if found is not None:
-        return found
-    made = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
-    made[ROLE] = name
-    made.diffuse_color = bridge.linear(colour)
-    made.roughness = roughness
-    shader = next(node for node in shader_nodes(made).nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = bridge.linear(colour)
-    shader.inputs["Roughness"].default_value = roughness
-    return made
+def _place_fingertip(bed: Any, instant: Instant) -> None:
+    """Put the fingertip, where there is one, to its pose in an instant."""
+    tip = fingertip_of(bed)
+    if tip is not None:
+        bridge.place_fingertip(tip, instant.fingertip, instant.finger)
 
 
-def _object(mesh: Any, role: str, collection: Any, parent: Any | None = None) -> Any:
-    """Make an object of a mesh, marked with its role."""
-    made = bpy.data.objects.new(mesh.name, mesh)
-    made[ROLE] = role
-    made.parent = parent
-    collection.objects.link(made)
-    return made
+def _modifier_of(bed: Any) -> Any | None:
+    """Return the modifier that draws the pins, or None when the user has removed or changed it."""
+    for modifier in bed.modifiers:
+        tree = modifier.node_group if modifier.type == "NODES" else None
+        if tree is not None and COLOUR_BY_FORCE in tree.interface.items_tree:
+            return modifier
+    return None
 
 
-def _pins(instant: Instant, length: float) -> Any:
-    """Make one pin a mode, in a collection that stands in no scene.
-
-    The node that reads the collection sorts it by name: hence the code in front.
-    """
-    segments = 28 if len(instant.height) <= MANY else 12
-    shape = device_shapes.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
-    mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
-    mesh.materials.append(None)
-    pins = bpy.data.collections.new("Digital Clay Pins")
-    for mode in Mode:
-        pin = bpy.data.objects.new(f"{mode:02d} {mode.name.lower()}", mesh)
-        pin[ROLE] = PIN
-        pin.material_slots[0].link = "OBJECT"
-        pin.material_slots[0].material = material(mode.name.lower(), COLOURS[mode], roughness=0.45)
-        pins.objects.link(pin)
-    return pins
+def _modifier(bed: Any) -> Any:
+    """Return the modifier that draws the pins, or refuse a bed without."""
+    found = _modifier_of(bed)
+    if found is None:
+        rule = "must have the geometry nodes modifier that draws its pins (got none)"
+        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
+    return found
 
 
-def _housing(instant: Instant, deck: float, rim: float) -> Any:
-    """Make the case about the pins of an instant; floor inside and upper edge in m."""
-    reach = np.abs(instant.position).max(axis=0) + instant.actuator.bore / 2 + GAP * instant.pitch
-    half = float(reach[0]) * SCALE, float(reach[1]) * SCALE
-    wall = WALL * instant.pitch * SCALE
-    bottom = deck * SCALE - wall / 2
-    shape = device_shapes.housing(half, wall, bottom, deck * SCALE, rim * SCALE)
-    mesh = bridge.mesh("Digital Clay Housing", shape)
-    mesh.materials.append(material("housing", CASE, roughness=0.55))
-    return mesh
-
-
-def _fingertip() -> Any:
-    """Make the fingertip, a unit sphere; the object's scale gives the semi-axes."""
-    mesh = bridge.mesh("Digital Clay Fingertip", device_shapes.ball())
-    mesh.materials.append(material("fingertip", SKIN, roughness=0.4))
-    return mesh
+def _positive(name: str, value: float, unit: str) -> float:
+    """Return a finite number above 0, or refuse it."""
+    if not (np.isfinite(value) and value > 0.0):
+        raise DigiclayError(f"Display.{name} must be above 0 {unit} (got {value:g} {unit}).")
+    return float(value)

@@ -7,9 +7,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, view
+from digiclay import bridge, heat, view
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import DigiclayError
 from digiclay.core.fingertip import Fingertip
 from digiclay.core.modes import COLOURS, Mode
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import begin
 from digiclay.instant import Instant
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
@@ -92,7 +96,8 @@ def test_a_tilted_fingertip_touches_down_at_its_lowest_point(bed: Any, formed: I
     fingertip = view.fingertip_of(bed)
     bridge.place_fingertip(fingertip, at, formed.finger)
     bpy.context.view_layer.update()
-    skin = [fingertip.matrix_world @ vertex.co for vertex in fingertip.data.vertices]
+    (ball,) = fingertip.children
+    skin = [ball.matrix_world @ vertex.co for vertex in ball.data.vertices]
     lowest = np.array(min(skin, key=lambda point: point.z)) / bridge.SCALE
     # The skin is a mesh of 64 facets round: its lowest vertex is within a facet (10 mm * pi / 64)
     # of the lowest point, and above it by no more than the facet's sagitta.
@@ -125,3 +130,162 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Ins
     # float32 on lengths below one unit.
     np.testing.assert_allclose(feet, deck, rtol=0, atol=1e-6)
     assert deck / bridge.SCALE < formed.height.min()
+
+
+def of_the_pins(bed: Any) -> list[str]:
+    """Name the material of every instance drawn for a bed, arrows included."""
+    return drawn_pins(bed)[1]
+
+
+def test_the_fingertip_is_an_empty_and_the_ellipsoid_in_it_cannot_be_picked_by_mistake(bed: Any) -> None:
+    tip = view.fingertip_of(bed)
+    (ball,) = tip.children
+    assert (tip.type, tip.hide_select) == ("EMPTY", False)
+    assert (ball.type, ball.hide_select) == ("MESH", True)
+    finger = Fingertip()
+    wanted = np.array([finger.length, finger.width, finger.height]) * bridge.SCALE
+    np.testing.assert_allclose(ball.scale, wanted, rtol=2.0**-23)
+
+
+def test_scaling_the_fingertip_by_hand_does_not_move_what_touches(bed: Any, formed: Instant) -> None:
+    tip = view.fingertip_of(bed)
+    tip.scale = (3.0, 1.0, 0.5)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(bridge.pose(tip), formed.fingertip, rtol=0, atol=FLOAT32)
+
+
+def test_a_uniformly_scaled_bed_reads_the_same_pose(bed: Any, formed: Instant) -> None:
+    bed.scale = (2.5, 2.5, 2.5)
+    bed.rotation_euler = (0.2, -0.4, 0.9)
+    bpy.context.view_layer.update()
+    assert bridge.uniform(bed) == pytest.approx(2.5, rel=1e-6)  # float32
+    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), formed.fingertip, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("scale", "said"),
+    [
+        ((1.0, 1.0, 1.1), r"the same along x, y and z \(got 1 x 1 x 1\.1\)"),
+        ((0.0, 0.0, 0.0), r"above 0 along x, y and z \(got 0 x 0 x 0\)"),
+        ((-1.0, -1.0, -1.0), "must not mirror it"),
+    ],
+)
+def test_a_bed_that_is_not_uniformly_scaled_is_refused_with_the_reason(
+    bed: Any, scale: tuple[float, float, float], said: str
+) -> None:
+    bed.scale = scale
+    bpy.context.view_layer.update()
+    with pytest.raises(DigiclayError, match=said):
+        bridge.pose(view.fingertip_of(bed))
+
+
+def test_a_bed_sheared_by_its_parent_is_refused(bed: Any) -> None:
+    parent = bpy.data.objects["Cube"]
+    bed.parent = parent
+    parent.scale = (1.0, 2.0, 1.0)
+    bed.rotation_euler = (0.0, 0.0, 0.7853981)
+    bpy.context.view_layer.update()
+    with pytest.raises(DigiclayError, match="sheared"):
+        bridge.uniform(bed)
+
+
+def test_every_pin_wears_the_colour_of_its_level_of_force(bed: Any, formed: Instant) -> None:
+    view.colour_by(bed, "force")
+    assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force)]
+    assert len(set(heat.level(formed.force))) == 13
+    view.scale_colours(bed, 2.0)
+    assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force, 2.0)]
+    view.colour_by(bed, "mode")
+    assert of_the_pins(bed) == [Mode(int(code)).name.lower() for code in formed.mode]
+
+
+def arrows(bed: Any) -> np.ndarray:
+    """Return tip (3) and length of every arrow drawn, m."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    found = [
+        [
+            *np.array(item.matrix_world.translation) / bridge.SCALE,
+            item.matrix_world.to_scale().z / bridge.SCALE,
+        ]
+        for item in graph.object_instances
+        if item.is_instance
+        and item.parent.original == bed
+        and item.object.material_slots[0].material["digiclay"] == "force_arrow"
+    ]
+    return np.array(found).reshape(-1, 4)
+
+
+def test_arrows_stand_on_the_pressed_pins_as_long_as_their_force(bed: Any, formed: Instant) -> None:
+    assert len(arrows(bed)) == 0
+    view.show_arrows(bed, True)
+    view.scale_arrows(bed, 0.050)
+    drawn, pressed = arrows(bed), formed.force > 0.0
+    assert len(drawn) == pressed.sum() == 47
+    wanted = np.column_stack([formed.position, formed.height, 0.050 * formed.force])[pressed]
+    np.testing.assert_allclose(drawn, wanted, rtol=1e-6, atol=FLOAT32)
+    assert len(drawn_pins(bed)[0]) == 48 + 47
+    view.show_arrows(bed, False)
+    assert len(drawn_pins(bed)[0]) == 48
+
+
+def test_one_sees_through_the_fingertip_while_arrows_are_on(bed: Any) -> None:
+    (ball,) = view.fingertip_of(bed).children
+    for on, name in ((True, "fingertip_clear"), (False, "fingertip")):
+        view.show_arrows(bed, on)
+        assert ball.material_slots[0].material["digiclay"] == name
+
+
+def test_a_copy_of_a_bed_keeps_its_own_colours_and_arrows(bed: Any) -> None:
+    other = bed.copy()
+    bpy.context.collection.objects.link(other)
+    view.colour_by(other, "force")
+    view.show_arrows(other, True)
+    assert (view.coloured_by(bed), view.arrows_shown(bed)) == ("mode", False)
+    assert (view.coloured_by(other), view.arrows_shown(other)) == ("force", True)
+
+
+def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> None:
+    scene = resolve({"layout": {"rows": 6, "columns": 8}, "control": "absent"})
+    system = assemble(scene)
+    state = begin(system)
+    state.rows[system.rows.force] = 0.5
+    before = bridge.read_cells(bed.data)["force"]
+    view.show_state(bed, system, state)
+    np.testing.assert_array_equal(bridge.read_cells(bed.data)["force"], before)
+    for switch_on in (lambda: view.show_arrows(bed, True), lambda: view.colour_by(bed, "force")):
+        view.show_arrows(bed, False)
+        switch_on()
+        state.rows[system.rows.force] += 0.1
+        view.show_state(bed, system, state)
+        forces = bridge.read_cells(bed.data)["force"]
+        np.testing.assert_allclose(forces, state.row(system.rows.force), rtol=2.0**-23)
+
+
+def test_a_running_session_moves_the_pins_and_leaves_the_fingertip_to_the_user(bed: Any) -> None:
+    system = assemble(resolve({"layout": {"rows": 6, "columns": 8}, "control": "absent"}))
+    tip = view.fingertip_of(bed)
+    tip.location.x += 1.0
+    view.show_state(bed, system, begin(system))
+    tops, _ = drawn_pins(bed)
+    np.testing.assert_allclose(tops[:, 2], system.cell.actuator.rest_height, rtol=0, atol=FLOAT32)
+    assert tip.location.x > 0.9
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_scale_of_the_display_that_draws_nothing_is_refused(bed: Any, value: float) -> None:
+    with pytest.raises(DigiclayError, match="must be above 0"):
+        view.scale_arrows(bed, value)
+    with pytest.raises(DigiclayError, match="must be above 0"):
+        view.scale_colours(bed, value)
+
+
+def test_another_colouring_is_refused_with_the_known_ones(bed: Any) -> None:
+    with pytest.raises(DigiclayError, match="mode, force"):
+        view.colour_by(bed, "height")
+
+
+def test_a_bed_whose_nodes_were_removed_is_refused_by_name_and_shows_no_forces(bed: Any) -> None:
+    bed.modifiers.clear()
+    assert not view.wants_force(bed)
+    with pytest.raises(DigiclayError, match="Digital Clay must have the geometry nodes modifier"):
+        view.colour_by(bed, "force")

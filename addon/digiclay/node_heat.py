@@ -1,0 +1,49 @@
+"""The part of a bed's geometry nodes that colours the pins by the force on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import heat
+from .nodes import attribute, node, number, socket
+
+__all__ = ["COLOUR_BY_FORCE", "TOP_FORCE", "add_settings", "pins_by_force"]
+
+#: Names of the settings.
+COLOUR_BY_FORCE, TOP_FORCE = "Colour by Force", "Top Colour at (N)"
+
+
+def add_settings(tree: Any) -> None:
+    """Add what each bed may choose for itself."""
+    socket(tree, COLOUR_BY_FORCE, "NodeSocketBool", False, "Colour the pins by force, not by mode")
+    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "From this force on a pin has the last colour, in N")
+
+
+def pins_by_force(tree: Any, pins: Any, top: Any, row: float) -> tuple[Any, Any]:
+    """Add the nodes that choose a pin by the force on it.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    pins : bpy.types.Collection
+        One pin a level of `heat.level`, their names in that order.
+    top : bpy.types.NodeSocket
+        Force of the last level, N.
+    row : float
+        Where in the tree they stand.
+
+    Returns
+    -------
+    instances, index : bpy.types.NodeSocket
+        The pins to choose from, and which one each vertex gets; as `heat.level` works it out.
+    """
+    force = attribute(tree, "force", "FLOAT", 0, row + 1)
+    per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLOURS)), top)
+    levels = number(tree, "CEIL", 2, row + 1, number(tree, "MULTIPLY", 1, row + 1, force, per_newton))
+    within = node(tree, "ShaderNodeClamp", 3, row + 1)
+    within.inputs["Max"].default_value = len(heat.COLOURS)
+    tree.links.new(levels, within.inputs["Value"])
+    choice = node(tree, "GeometryNodeCollectionInfo", 3, row)
+    choice.inputs["Collection"].default_value = pins
+    choice.inputs["Separate Children"].default_value = True
+    return choice.outputs["Instances"], within.outputs["Result"]
