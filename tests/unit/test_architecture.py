@@ -21,10 +21,10 @@ CORE = PACKAGE / "core"
 LEVELS = (
     "errors modes closed_form control.travel metrics_signal",
     "quantity run_folder surface control.transitions metrics_path sweep_axis",
-    "layout fluid delay supply actuator contact relaxation fingertip part_table pictures "
+    "layout fluid delay supply actuator contact relaxation fingertip part_table "
     "methods export metrics control.servo control.blister",
-    "places valve valve_lag state trajectory control.tracking",
-    "absent conduit touch recorder sensors",
+    "pictures places valve valve_lag state trajectory control.tracking",
+    "absent conduit touch recorder sensors job_outputs",
     "physics scene",
     "system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "

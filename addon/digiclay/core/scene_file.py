@@ -13,7 +13,7 @@ from .quantity import nearest
 from .scene import Scene
 from .scene_table import resolve
 
-__all__ = ["SAMPLES", "Setting", "find", "load", "sample_names"]
+__all__ = ["SAMPLES", "Setting", "find", "load", "read_table", "sample_names"]
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "sessions"
@@ -71,7 +71,7 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     SceneError
         One line: file or option, key, rule, value.
     """
-    table = _read(path)
+    table = read_table(path)
     try:
         return resolve(_overridden(table, settings), path.stem)
     except ParameterError as error:
@@ -83,7 +83,7 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
         raise SceneError(f"{origin}: {error}") from None
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_table(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
     try:
         text = path.read_text(encoding="utf-8")

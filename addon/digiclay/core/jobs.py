@@ -1,0 +1,173 @@
+"""Batches: scenes × methods × settings, read from a JOBS file into jobs that need nothing else.
+
+A job's folder holds ``scene.toml``, every parameter of its session, and ``job.toml``, what is
+made of the run. Whoever has that folder and this package can do the job, on any machine.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import ParameterError, SceneError
+from .job_outputs import KEYS, Outputs, outputs, word
+from .methods import METHODS
+from .part_table import refuse_unknown, shown
+from .scene import Scene
+from .scene_file import Setting, find, load, read_table
+
+__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "job_outputs"]
+
+#: The files of a job.
+SCENE, JOB = "scene.toml", "job.toml"
+#: More jobs than this, or a longer name of one, are a slip of the keyboard.
+MOST, LONGEST = 10_000, 120
+#: What decides which jobs there are; all other keys say what is made of each.
+WHICH = ("scenes", "methods", "settings")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One scene with one method and one setting.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    scene : Scene or None
+        None where the values do not go together; `error` says why.
+    """
+
+    name: str
+    scene: Scene | None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The jobs of a file, and what is made of each."""
+
+    name: str
+    jobs: tuple[Job, ...]
+    outputs: Outputs
+
+
+def batch(path: Path) -> Batch:
+    """Read a JOBS file.
+
+    Every scene is combined with every method and every setting. A combination whose values do
+    not go together makes a job with an error; what no job could have is refused.
+
+    Raises
+    ------
+    SceneError
+        One line: file, key, rule, value.
+    """
+    table = read_table(path)
+    try:
+        refuse_unknown("", table, (*WHICH, *KEYS))
+        made = outputs({key: table[key] for key in table if key not in WHICH})
+        words, methods, changes = _scenes(table), _methods(table), _settings(table)
+        count = len(words) * len(methods) * len(changes)
+        if count > MOST:
+            raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
+        files = [_found(path, said) for said in words]
+        for file in files:
+            load(file)  # what is wrong without any change is told of first
+        jobs = tuple(_job(*parts) for parts in itertools.product(files, methods, changes.items()))
+        _refuse_one_name_for_two(jobs)
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+    return Batch(path.stem, jobs, made)
+
+
+def job_outputs(path: Path) -> Outputs:
+    """Read a ``job.toml``; SceneError says in one line what is wrong with it."""
+    try:
+        return outputs(read_table(path))
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def _scenes(table: Mapping[str, Any]) -> list[str]:
+    """Return what the file says its scenes are."""
+    words = table.get("scenes")
+    if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
+        value = "none" if words is None else shown(words)
+        raise ParameterError("scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value)
+    return words
+
+
+def _methods(table: Mapping[str, Any]) -> list[str]:
+    """Return the methods every scene is run with; an empty one is the scene's own."""
+    if "methods" not in table:
+        return [""]
+    methods = table["methods"]
+    if not isinstance(methods, list) or not methods:
+        raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', shown(methods))
+    for method in methods:
+        if not isinstance(method, str) or method not in METHODS:
+            raise ParameterError("methods", "", f"must be some of {', '.join(METHODS)}", shown(method))
+    return methods
+
+
+def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
+    """Return the settings by their labels; without any, one that changes nothing."""
+    if "settings" not in table:
+        return {"": []}
+    given = table["settings"]
+    if not isinstance(given, dict) or not given:
+        rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
+        raise ParameterError("settings", "", rule, shown(given))
+    found = {}
+    for label, changes in given.items():
+        if not isinstance(changes, dict):
+            rule = "must be a table such as { control.force_gain = 2 }"
+            raise ParameterError("settings", label, rule, shown(changes))
+        if not re.fullmatch(r"\w[\w.+-]*", label):
+            raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
+        option = f"settings.{label}"
+        found[label] = [Setting(key, word(value), option) for key, value in _flat(changes)]
+    return found
+
+
+def _flat(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    """Return the dotted keys of nested tables, and their values."""
+    pairs = []
+    for key, value in table.items():
+        dotted = f"{above}{key}"
+        pairs += _flat(value, f"{dotted}.") if isinstance(value, dict) else [(dotted, value)]
+    return pairs
+
+
+def _found(jobs: Path, said: str) -> Path:
+    """Return the file of a scene: beside the JOBS file, or as anywhere else."""
+    beside = jobs.parent / said
+    return find(str(beside)) if beside.exists() else find(said)
+
+
+def _job(file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
+    """Make one job."""
+    label, changes = setting
+    stem = file.parent.name if file.name == SCENE else file.stem
+    name = "-".join(re.sub(r"[^\w.+-]", "_", part) for part in (stem, method, label) if part)
+    if len(name) > LONGEST:
+        raise ParameterError("settings", label, f"must make names of at most {LONGEST} letters", repr(name))
+    chosen = [Setting("control.method", word(method), "methods")] if method else []
+    try:
+        return Job(name, load(file, [*chosen, *changes]))
+    except SceneError as error:
+        return Job(name, None, str(error))
+
+
+def _refuse_one_name_for_two(jobs: tuple[Job, ...]) -> None:
+    """Refuse jobs that would share a folder; some file systems do not tell A from a."""
+    seen: set[str] = set()
+    for job in jobs:
+        if job.name.casefold() in seen:
+            raise ParameterError("scenes", "", "must give every job a name of its own", f"{job.name} twice")
+        seen.add(job.name.casefold())

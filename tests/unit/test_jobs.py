@@ -1,0 +1,124 @@
+"""JOBS files: what makes a job, what is told of a mistake, and that a job's own files say it all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from digiclay.core.errors import SceneError
+from digiclay.core.job_outputs import Outputs
+from digiclay.core.jobs import batch, job_outputs
+from digiclay.core.pictures import Film, Still, Turntable
+from digiclay.core.scene_file import SAMPLES, load
+
+
+def jobs_file(folder: Path, said: str) -> Path:
+    """Write a JOBS file."""
+    path = folder / "first.toml"
+    path.write_text(said, encoding="utf-8")
+    return path
+
+
+def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> None:
+    said = """
+    scenes = ["tap", "slow_press"]
+    methods = ["virtual_master", "cell_states"]
+    [settings]
+    soft = { control.force_setpoint = "300 mN" }
+    firm.control.force_setpoint = 0.6
+    """
+    made = batch(jobs_file(tmp_path, said))
+    assert [job.name for job in made.jobs] == [
+        f"{scene}-{method}-{label}"
+        for scene in ("tap", "slow_press")
+        for method in ("virtual_master", "cell_states")
+        for label in ("soft", "firm")
+    ]
+    assert [job.error for job in made.jobs] == [""] * 8
+    assert [(job.scene.method, job.scene.control.force_setpoint) for job in made.jobs[:4] if job.scene] == [
+        ("virtual_master", 0.3), ("virtual_master", 0.6), ("cell_states", 0.3), ("cell_states", 0.6),
+    ]  # fmt: skip
+
+
+def test_a_file_that_names_only_scenes_runs_each_as_it_is(tmp_path: Path) -> None:
+    made = batch(jobs_file(tmp_path, 'scenes = ["tap"]'))
+    assert [(job.name, job.scene) for job in made.jobs] == [("tap", load(SAMPLES / "tap.toml"))]
+    assert made.outputs == Outputs()
+
+
+def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "Übung 1.toml").write_text("simulation.duration = 0.25", encoding="utf-8")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    (job,) = batch(jobs_file(tmp_path, 'scenes = ["Übung 1.toml"]')).jobs
+    assert job.name == "Übung_1"
+    assert job.scene is not None
+    assert job.scene.simulation.duration == 0.25
+
+
+def test_values_that_do_not_go_together_make_one_job_with_an_error(tmp_path: Path) -> None:
+    said = 'scenes = ["tap"]\nsettings.narrow = { layout.pitch = "1 mm" }\nsettings.wide.layout.pitch = 0.004'
+    narrow, wide = batch(jobs_file(tmp_path, said)).jobs
+    assert (narrow.scene, wide.error) == (None, "")
+    assert "settings.narrow: layout.pitch must be at least actuator.bore" in narrow.error
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("", "scenes must be a list of scenes"),
+        ("scenes = []", "scenes must be a list of scenes"),
+        ('scenes = "tap"', "scenes must be a list of scenes"),
+        ('scenes = ["tap", 3]', "scenes must be a list of scenes"),
+        ('scenes = ["tapp"]', "tapp is neither a file nor a sample .* Did you mean tap?"),
+        ('scenes = ["tap"]\nmethod = ["cell_states"]', "method must be a known key .* Did you mean methods?"),
+        ('scenes = ["tap"]\nmethods = []', "methods must be a list"),
+        ('scenes = ["tap"]\nmethods = ["magic"]', "methods must be some of virtual_master"),
+        ('scenes = ["tap", "tap"]', r"scenes must give every job a name of its own \(got tap twice\)"),
+        ('scenes = ["tap"]\nsettings = 3', "settings must be a section of labels"),
+        ('scenes = ["tap"]\nsettings.a = 3', r"settings\.a must be a table"),
+        ('scenes = ["tap"]\nsettings."../a" = {}', "settings must have labels of letters"),
+        ('scenes = ["tap"]\nexport = "stl"', "export must be a list of formats"),
+        ('scenes = ["tap"]\nexport = ["stl", "stl"]', "export must not name a format twice"),
+        ('scenes = ["tap"]\nerrors = 1', "errors must be true or false"),
+        ('scenes = ["tap"]\nfilm = true', r"film must be a section, \[film\]"),
+        ('scenes = ["tap"]\n[film]\nheight = 101', r"film\.height must be an even number of pixels"),
+        ('scenes = ["tap"]\n[film]\nspeed = 0', r"film\.speed must be at least 0\.001"),
+        ('scenes = ["tap"]\n[film]\nspeed = nan', r"film\.speed must be a finite number"),
+        ('scenes = ["tap"]\n[film]\nrate = 2.5', r"film\.rate must be a whole number"),
+        ('scenes = ["tap"]\n[still]\nengine = "eevee"', r"still\.engine must be one of workbench, cycles"),
+        ('scenes = ["tap"]\n[turntable]\nframes = 1', r"turntable\.frames must be at least 2"),
+        ('scenes = ["tap"]\n[film]\nfps = 3', r"film\.fps must be a known key"),
+        ('scenes = ["tap"', r"first\.toml, line 1: "),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(said: str, told: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=told) as caught:
+        batch(jobs_file(tmp_path, said))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_batch_of_more_jobs_than_anyone_wants_is_refused(tmp_path: Path) -> None:
+    labels = "\n".join(f"n{i} = {{}}" for i in range(10_001))
+    with pytest.raises(SceneError, match=r"10000 jobs at most \(got 10001 jobs\)"):
+        batch(jobs_file(tmp_path, f'scenes = ["tap"]\n[settings]\n{labels}'))
+
+
+def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
+    made = Outputs(
+        export=("stl", "glb"), errors=False, still=Still(engine="cycles"), turntable=Turntable(frames=4),
+        film=Film(speed=0.5, start=0.1, arrows=False),
+    )  # fmt: skip
+    path = tmp_path / "job.toml"
+    path.write_text(made.text(), encoding="utf-8")
+    assert job_outputs(path) == made
+    path.write_text(Outputs().text(), encoding="utf-8")
+    assert job_outputs(path) == Outputs()
+
+
+def test_the_sample_batch_makes_eight_sound_jobs() -> None:
+    made = batch(SAMPLES.parent / "batches" / "first.toml")
+    assert len(made.jobs) == 8
+    assert [job.error for job in made.jobs] == [""] * 8
