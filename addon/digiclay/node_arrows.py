@@ -11,7 +11,7 @@ __all__ = ["ARROWS", "ARROW_LENGTH", "LEAST", "LENGTH", "add_settings", "arrows_
 #: Names of the settings.
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
 #: How long an arrow is drawn by default, mm for each N.
-LENGTH = 80.0
+LENGTH = 150.0
 #: Smaller forces get no arrow, N: a millinewton is what the pulp of a finger just feels.
 LEAST = 1e-3
 

@@ -19,7 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 #: Marks the objects of the device; names are the user's to change.
-ROLE = "digiclay"
+ROLE = "digiclay_role"
 BED, FINGERTIP, ELLIPSOID, HOUSING, PIN = "bed", "fingertip", "ellipsoid", "housing", "pin"
 
 #: sRGB of what is no pin.
@@ -33,7 +33,7 @@ GAP, WALL = 0.85, 1.7
 #: Above this many pins they are drawn with fewer faces.
 MANY = 4000
 #: Radius of an arrow's head, in pitches.
-HEAD = 0.3
+HEAD = 0.36
 
 
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:

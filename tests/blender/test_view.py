@@ -210,7 +210,7 @@ def arrows(bed: Any) -> np.ndarray:
         for item in graph.object_instances
         if item.is_instance
         and item.parent.original == bed
-        and item.object.material_slots[0].material["digiclay"] == "force_arrow"
+        and item.object.material_slots[0].material[view.ROLE] == "force_arrow"
     ]
     return np.array(found).reshape(-1, 4)
 
@@ -232,7 +232,7 @@ def test_one_sees_through_the_fingertip_while_arrows_are_on(bed: Any) -> None:
     (ball,) = view.fingertip_of(bed).children
     for on, name in ((True, "fingertip_clear"), (False, "fingertip")):
         view.show_arrows(bed, on)
-        assert ball.material_slots[0].material["digiclay"] == name
+        assert ball.material_slots[0].material[view.ROLE] == name
 
 
 def test_a_copy_of_a_bed_keeps_its_own_colours_and_arrows(bed: Any) -> None:
