@@ -23,7 +23,7 @@ LEVELS = (
     "quantity run_folder surface control.transitions metrics_path sweep_axis",
     "layout fluid delay supply actuator contact relaxation fingertip part_table "
     "methods export metrics control.servo control.blister",
-    "pictures places valve valve_lag state trajectory control.tracking",
+    "shots places valve valve_lag state trajectory control.tracking",
     "absent conduit touch recorder sensors job_outputs",
     "physics scene",
     "system observer steppers.bernoulli steppers.explicit "

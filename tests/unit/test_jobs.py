@@ -8,7 +8,7 @@ import pytest
 from digiclay.core.errors import SceneError
 from digiclay.core.job_outputs import Outputs
 from digiclay.core.jobs import batch, job_outputs
-from digiclay.core.pictures import Film, Still, Turntable
+from digiclay.core.shots import Film, Still, Turntable
 from digiclay.core.scene_file import SAMPLES, load
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from .errors import ParameterError
 from .part_table import read_part, refuse_unknown, shown
-from .pictures import Film, Still, Turntable
+from .shots import Film, Still, Turntable
 from .quantity import Parameters, quantities
 
 __all__ = ["KEYS", "Outputs", "outputs", "word"]
