@@ -21,21 +21,22 @@ CORE = PACKAGE / "core"
 LEVELS = (
     "errors modes closed_form control.travel metrics_signal",
     "quantity run_folder surface control.transitions metrics_path sweep_axis",
-    "layout fluid delay supply actuator contact relaxation fingertip part_table "
+    "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "methods export metrics control.servo control.blister",
-    "shots places valve valve_lag state trajectory control.tracking",
-    "absent conduit touch recorder sensors job_outputs",
-    "physics scene",
+    "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
+    "heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
+    "shape_file physics scene",
     "system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
     "control.drive control.neighbours control.shapes",
-    "assembly gathering steppers.* control.replay control.virtual_master control.cell_states scene_file "
+    "gathering steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
-    "simulation jobs",
+    "simulation jobs control.handover",
+    "assembly",
     "accuracy",
     "session metrics_trial",
-    "metrics_speed sweep",
+    "metrics_speed sweep budget",
     "sweep_folder",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.

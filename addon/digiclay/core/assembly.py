@@ -5,6 +5,8 @@ Modules of parts that a scene may leave out are imported where the part is put i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .delay import Queue, queue
@@ -110,13 +112,23 @@ def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
 
 
 def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
-    """Return the control method, or None: every valve stays shut."""
-    if scene.control is None:
+    """Return the control method, before it the display of a shape; or None: every valve stays shut."""
+    if scene.control is None and scene.shape is None:
         return None
     from .control.bench import Bench
 
     bench = Bench(bed, cell, scene.simulation.control_period, scene.blister)
-    controller: Controller = part(METHODS[scene.method].module, "assembled")(scene.control, bench)
+    if scene.shape:
+        from .shape_file import fitted_to
+
+        bench = replace(bench, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
+    controller: Controller | None = None
+    if scene.control:
+        controller = part(METHODS[scene.method].module, "assembled")(scene.control, bench)
+    if scene.shape and not (controller and controller.name == "shape_display"):
+        from .control.handover import handover
+
+        controller = handover(scene.shape, bench, controller, recovers=METHODS[scene.method].recovers)
     return controller
 
 

@@ -32,11 +32,14 @@ class Method:
         Class of its parameters there.
     blister : mapping or None
         Its defaults for the blister where they differ; None: it forms no blister.
+    recovers : bool
+        Whether its cells go back to the height they had at rest.
     """
 
     module: str
     parameters: str
     blister: Mapping[str, float] | None = field(default=None)
+    recovers: bool = False
 
 
 METHODS: dict[str, Method] = {
@@ -44,10 +47,10 @@ METHODS: dict[str, Method] = {
     "cell_states": Method(
         "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
     ),
-    "elastic": Method("control.elastic", "Elastic"),
+    "elastic": Method("control.elastic", "Elastic", recovers=True),
     "plastic": Method("control.plastic", "Plastic"),
-    "viscous": Method("control.viscous", "Viscous"),
+    "viscous": Method("control.viscous", "Viscous", recovers=True),
     "push_pull": Method("control.push_pull", "PushPull"),
-    "force_display": Method("control.force_display", "ForceDisplay"),
+    "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
     "shape_display": Method("control.shape_display", "ShapeDisplay"),
 }

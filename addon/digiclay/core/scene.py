@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from .recorder import Recorder
     from .relaxation import Relaxation
     from .sensors import Sensing
+    from .shape import Shape
     from .supply import Supply
     from .trajectory import Trajectory
     from .valve import Valve
@@ -60,18 +61,21 @@ PARTS: dict[str, tuple[str, str]] = {
     "relaxation": ("relaxation", "Relaxation"),
     "sensors": ("sensors", "Sensing"),
     "blister": ("control.blister", "Blister"),
+    "shape": ("shape", "Shape"),
     "simulation": ("scene", "Simulation"),
     "recorder": ("recorder", "Recorder"),
 }
 #: The sections of a scene that are parts, in the order they are written.
 SECTIONS = (
     "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
-    "relaxation", "sensors", "control", "blister", "simulation", "recorder",
+    "relaxation", "sensors", "control", "blister", "shape", "simulation", "recorder",
 )  # fmt: skip
 #: Parts a scene may leave out.
-OPTIONAL = ("conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "recorder")
+OPTIONAL = (
+    "conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "shape", "recorder",
+)  # fmt: skip
 #: Parts a scene leaves out unless it names them.
-UNASKED = ("sensors",)
+UNASKED = ("sensors", "shape")
 #: Parts that are left out together with another.
 NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
 #: Steppers: module and class.
@@ -209,6 +213,7 @@ class Scene:
     preset: str = "paper"
     method: str = "virtual_master"
     sensors: Sensing | None = None
+    shape: Shape | None = None
 
     def __post_init__(self) -> None:
         if self.layout.pitch < self.actuator.bore:

@@ -73,7 +73,7 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     """
     table = read_table(path)
     try:
-        return resolve(_overridden(table, settings), path.stem)
+        return resolve(_overridden(_beside(table, path.parent), settings), path.stem)
     except ParameterError as error:
         if settings:
             load(path)  # a file that is wrong by itself is told of first
@@ -99,6 +99,15 @@ def read_table(path: Path) -> dict[str, Any]:
         line = re.match(r"line (\d+)", place)
         number = line[1] if line else str(max(1, len(text.splitlines())))
         raise SceneError(f"{path}, line {number}: {said}.") from None
+
+
+def _beside(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Find a shape's file that lies beside the scene file, or in a folder there."""
+    shape = table.get("shape")
+    name = shape.get("file") if isinstance(shape, dict) else None
+    if isinstance(name, str) and Path(name).suffix and "\0" not in name and (folder / name).is_file():
+        table["shape"] = {**table["shape"], "file": str((folder / name).resolve())}
+    return table
 
 
 def _overridden(table: dict[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..layout import Grid
 from ..physics import Cell
 from .blister import Blister
@@ -24,12 +27,15 @@ class Bench:
         Control period, s.
     blister : Blister or None
         For the methods that form one.
+    heights : ndarray (n,) or None
+        The shape from outside that is to be displayed, m.
     """
 
     grid: Grid
     cell: Cell
     period: float
     blister: Blister | None = None
+    heights: NDArray[np.float64] | None = None
 
     @property
     def lift(self) -> float:

@@ -150,7 +150,7 @@ class ShapeDisplayControl:
 
 
 def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
-    """Put shape display together for a device.
+    """Put shape display together for a device; a shape of the scene's own is displayed in place of its own.
 
     Raises
     ------
@@ -158,7 +158,9 @@ def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
         When the shape leaves the stroke, or its file cannot be used.
     """
     actuator, grid = bench.cell.actuator, bench.grid
-    if parameters.shape.endswith(FILE):
+    if bench.heights is not None:
+        heights = bench.heights
+    elif parameters.shape.endswith(FILE):
         heights = from_file("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
     else:
         heights = actuator.rest_height + parameters.amplitude * named(parameters.shape, grid)

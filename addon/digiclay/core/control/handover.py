@@ -1,0 +1,130 @@
+"""From a shape to the finger: the bed displays a shape, then the scene's own method takes over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..layout import Grid
+from ..places import Controller, Measurement, Orders
+from ..shape import Shape
+from .bench import Bench
+from .drive import DriveParameters
+from .neighbours import cells_at
+from .shape_display import Progress, ShapeDisplay, ShapeDisplayControl, assembled
+
+__all__ = ["Handed", "Handover", "handover"]
+
+Floats = NDArray[np.float64]
+
+
+class Handed(NamedTuple):
+    """The memory of both: how far the display is, and what the method remembers."""
+
+    display: Progress
+    method: Any
+
+    @property
+    def losses(self) -> int | None:
+        """How often the method lost the finger, where it counts that."""
+        return getattr(self.method, "losses", None)
+
+
+@dataclass(frozen=True, eq=False)
+class Handover:
+    """Display, then method; without a method the shape stands.
+
+    Attributes
+    ----------
+    display : ShapeDisplayControl
+    method : Controller or None
+    grid : Grid
+    raised : ndarray (n,) or None
+        Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it
+        sees the bed without them, so that the shape is what its cells go back to.
+    """
+
+    display: ShapeDisplayControl
+    method: Controller | None
+    grid: Grid
+    raised: Floats | None
+
+    @property
+    def name(self) -> str:
+        """The method's name; the display's where there is none."""
+        return self.method.name if self.method else self.display.name
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        return self.method.rows if self.method else 0
+
+    def begin(self) -> Handed:
+        """Return the memory before a session."""
+        return Handed(self.display.begin(), self.method.begin() if self.method else None)
+
+    def displayed(self, memory: Handed) -> bool:
+        """Tell whether the shape stands, and the method has taken over."""
+        return memory.display.move >= len(self.display.moves)
+
+    def attend(
+        self, memory: Handed, touched: Measurement
+    ) -> tuple[Handed, tuple[float, float, float] | None]:
+        """Let the one whose turn it is look at the touched cells; see `places.Controller`."""
+        if not self.displayed(memory):
+            progress, disc = self.display.attend(memory.display, touched)
+            return memory._replace(display=progress), disc
+        if self.method is None:
+            return memory, None
+        known, disc = self.method.attend(memory.method, self._lowered(touched))
+        return memory._replace(method=known), disc
+
+    def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Orders]:
+        """Let the one whose turn it is command the cells; see `places.Controller`."""
+        if self.method is None or not self.displayed(memory):
+            progress, orders = self.display.command(memory.display, seen)
+            return memory._replace(display=progress), orders
+        known, orders = self.method.command(memory.method, self._lowered(seen))
+        if self.raised is not None:
+            target = orders.target + self.raised.take(self._cells(seen))
+            orders = Orders(target, orders.mode, orders.command)
+        return memory._replace(method=known), orders
+
+    def _lowered(self, seen: Measurement) -> Measurement:
+        """Return what the method is to see: the bed without the shape, where its cells go back to rest."""
+        if self.raised is None:
+            return seen
+        raised = self.raised.take(self._cells(seen))
+        return Measurement(
+            seen.place, seen.height - raised, seen.force, seen.target - raised, seen.mode, seen.own
+        )
+
+    def _cells(self, seen: Measurement) -> NDArray[np.intp]:
+        """Return the numbers of the cells that are seen."""
+        return cells_at(self.grid, seen.place)
+
+
+def handover(shape: Shape, bench: Bench, method: Controller | None, *, recovers: bool) -> Handover:
+    """Put a shape's display in front of a method.
+
+    Parameters
+    ----------
+    shape : Shape
+        Says how the surface gets there.
+    bench : Bench
+        With the heights to display.
+    method : Controller or None
+    recovers : bool
+        Whether the method's cells go back to rest.
+    """
+    assert bench.heights is not None
+    # As quick as a display is by itself, and never quicker than its control period allows.
+    settling = max(DriveParameters().settling_time, 2.0 * bench.period)
+    known = ShapeDisplay(
+        refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling
+    )
+    raised = bench.heights - bench.cell.actuator.rest_height if recovers else None
+    return Handover(assembled(known, bench), method, bench.grid, raised)

@@ -1,0 +1,129 @@
+"""Shapes from files: sample shapes by name, meshes, pictures, and arrays of numpy's."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .actuator import Actuator
+from .errors import ParameterError, SceneError
+from .heightmap import HeightMap, height_map
+from .heightmap_picture import PICTURES, pixels
+from .layout import Grid
+from .quantity import nearest
+from .relief import Relief
+from .shape import AUTO, LENGTHS, Shape
+from .shape_fit import Fitted, fitted, given
+from .shape_mesh import ShapeMesh, shape_mesh
+
+__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "read", "sample_shapes"]
+
+#: Where the sample shapes are.
+SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "shapes"
+#: Meshes by extension; whatever else trimesh can read is welcome too.
+MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")
+ARRAY = ".npy"
+#: What a file of this kind of shape may end with.
+KINDS = (*MESHES, *PICTURES, ARRAY)
+#: Formats whose standard says metres, and y upwards.
+GLTF = (".glb", ".gltf")
+
+
+def sample_shapes() -> list[str]:
+    """Return the names of the sample shapes."""
+    return sorted(path.stem for path in SAMPLES.glob("*") if path.suffix in KINDS)
+
+
+def find_shape(word: str) -> Path:
+    """Return the file of a shape: a sample's name, or a file.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file, or sample.
+    """
+    if word in sample_shapes():
+        return next(path for path in SAMPLES.glob(f"{word}.*") if path.suffix in KINDS)
+    path = Path(word)
+    try:
+        there = path.is_file()
+    except ValueError:  # no file's name has a zero byte in it
+        there = False
+    if there:
+        return path
+    if path.suffix or path.name != word:
+        raise SceneError(f"shape.file: there is no file {word}.")
+    close = nearest(word, sample_shapes())
+    asked = f" Did you mean {close}?" if close else ""
+    known = ", ".join(sample_shapes())
+    raise SceneError(f"shape.file: {word} is neither a file nor a sample shape ({known}).{asked}")
+
+
+def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
+    """Return the shape of a scene, laid onto its bed; errors as `read` and `shape_fit.fitted`."""
+    if shape.heights:
+        return given(shape, grid, actuator)
+    return fitted(shape, read(shape), grid, actuator)
+
+
+def read(shape: Shape) -> Relief:
+    """Read the shape a scene names.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file.
+    ParameterError
+        When it holds no shape.
+    """
+    path = find_shape(shape.file)
+    kind = path.suffix.lower()
+    if kind == ARRAY:
+        return _array(path)
+    if kind in PICTURES:
+        return height_map(path.name, pixels(path))
+    return _mesh(path, shape)
+
+
+def _array(path: Path) -> HeightMap:
+    """Read an array of heights, m; its first row lies at the lowest y."""
+    try:
+        values = np.load(path, allow_pickle=False, mmap_mode="r")
+    except OSError as error:
+        said = error.strerror or "not an array"
+        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
+    except (ValueError, TypeError, EOFError):
+        raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
+    if not isinstance(values, np.ndarray):
+        raise ParameterError("shape", "file", "must hold one array of numbers", str(path))
+    return height_map(path.name, values, value_length=1.0)
+
+
+def _mesh(path: Path, shape: Shape) -> ShapeMesh:
+    """Read a mesh with trimesh, which knows the formats."""
+    try:
+        trimesh: Any = importlib.import_module("trimesh")
+    except ImportError:
+        raise ParameterError(
+            "shape", "file", "must be a picture or an array where trimesh is not installed", str(path),
+            "Run 'pip install trimesh'.",
+        ) from None  # fmt: skip
+    try:
+        read = trimesh.load_mesh(str(path), process=False)
+        vertices, faces = np.asarray(read.vertices, np.float64), np.asarray(read.faces)
+    except OSError as error:
+        said = error.strerror or error
+        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
+    # Its readers raise whatever a broken file makes them trip over.
+    except Exception as error:
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ParameterError(
+            "shape", "file", f"must be a mesh, a picture or an array ({', '.join(KINDS)})", f"{path}: {said}"
+        ) from None
+    gltf = path.suffix.lower() in GLTF
+    up = shape.up if shape.up != AUTO else "y" if gltf else "z"
+    unit = shape.unit if shape.unit != AUTO else "m" if gltf else "mm"
+    return shape_mesh(path.name, vertices, faces, up, LENGTHS[unit])
