@@ -11,7 +11,7 @@ from ..core.quantity import parse
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
 
-__all__ = ["add_run", "add_scene", "scene_of", "seconds", "size"]
+__all__ = ["add_run", "add_scene", "length", "scene_of", "seconds", "size"]
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
@@ -73,8 +73,18 @@ def _setting(text: str) -> Setting:
 
 def seconds(text: str) -> float:
     """Read a time: a number of seconds, or a quantity such as ``"300 ms"``."""
+    return _measured(text, "s")
+
+
+def length(text: str) -> float:
+    """Read a length: a number of metres, or a quantity such as ``"20 um"``."""
+    return _measured(text, "m")
+
+
+def _measured(text: str, unit: str) -> float:
+    """Read a quantity; a bare number is in SI."""
     try:
-        return parse(text if " " in text.strip() else f"{text.strip()} s", "s")
+        return parse(text if text.strip()[-1:].isalpha() else f"{text} {unit}", unit)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{error} (got {text!r})") from None
 

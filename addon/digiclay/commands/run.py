@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from ..core.errors import DigiclayError, OutputError, ParameterError, SceneError
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.session import Result, run, save
-from .arguments import add_scene, scene_of
+from .arguments import add_scene, length, scene_of
+from .budget import noted, within
 from .export import exported, formats, refuse_what_has_no_surface, refuse_without
 from .finished import last_touch
 from .progress import Bar
@@ -27,6 +29,7 @@ EXAMPLES = """\
 examples:
   digiclay run ridge_mound_valley
   digiclay run my.toml --out first --overwrite --export stl,obj --plots --render
+  digiclay run ridge_mound_valley --budget 20um
   digiclay run tap --set layout.rows=9 --set control.force_setpoint="300 mN" --set conduit=absent
 
 The folder holds scene.toml (every parameter), history.npz, metrics.json, and what the options
@@ -46,6 +49,12 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--export", metavar="F,...", type=formats, default=[], help="also meshes: stl,obj,ply,glb"
     )
+    parser.add_argument(
+        "--budget",
+        metavar="E",
+        type=length,
+        help="leave out of the model what changes no height by more than this, such as 20um: tried and told",
+    )
     parser.add_argument("--plots", action="store_true", help="also plots, session.png and surface.png")
     parser.add_argument("--render", action="store_true", help="also a picture, pins.png (needs bpy)")
     parser.add_argument(
@@ -63,10 +72,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out or Path(path.parent.name if path.name == "scene.toml" else path.stem)
     may_be_written(out, overwrite=arguments.overwrite)
     _refuse_early(arguments, scene)
+    found = within(scene, arguments.budget, quiet=arguments.quiet) if arguments.budget is not None else None
+    scene = found.scene if found else scene
     with Stop() as stop:
         result = _simulated(scene, _blamed(arguments, path), stop, quiet=arguments.quiet)
         if not arguments.no_errors:
             result = _judged(result, stop, quiet=arguments.quiet)
+        if found:
+            result = replace(result, metrics={**result.metrics, "budget": noted(found)})
         wrong: list[DigiclayError] = []
         with written(out, overwrite=arguments.overwrite) as folder:
             save(result, folder)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,9 @@ UNITS: dict[str, tuple[float, str]] = {
     "1/N": (1.0, "1/N"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"),
     "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
 }  # fmt: skip
+
+#: A number, and what stands behind it.
+WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
 
 @dataclass(frozen=True)
@@ -136,12 +140,12 @@ def _finite(owner: Parameters, name: str, known: Quantity, value: float) -> floa
 
 
 def parse(text: str, unit: str) -> float:
-    """Read a quantity written with a unit, such as ``"3 mm"``, into SI.
+    """Read a quantity written with a unit, such as ``"3 mm"`` or ``"20um"``, into SI.
 
     Parameters
     ----------
     text : str
-        A number, a blank, a unit from `UNITS`.
+        A number, and a unit from `UNITS`.
     unit : str
         The SI unit the parameter is declared in.
 
@@ -150,12 +154,10 @@ def parse(text: str, unit: str) -> float:
     ValueError
         When the number or the unit cannot be read, or the unit measures something else.
     """
-    number, _, name = text.strip().partition(" ")
-    try:
-        value = float(number)
-    except ValueError:
-        raise ValueError(f"must be a number, or a text such as '3 {unit}'") from None
-    name = name.strip()
+    read = WRITTEN.fullmatch(text.strip())
+    if not read:
+        raise ValueError(f"must be a number, or a text such as '3 {unit}'")
+    value, name = float(read[1]), read[2]
     factor, si = UNITS.get(name, (0.0, ""))
     if not si:
         raise ValueError(

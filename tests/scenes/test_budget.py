@@ -1,0 +1,111 @@
+"""What a scene does without within a budget: the budget holds against the full model, and is used."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.assembly import assemble
+from digiclay.core.budget import Fitted, fitted, omissions
+from digiclay.core.errors import ParameterError
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import SAMPLES
+from numpy.typing import NDArray
+
+from tests.assemble import record, sample
+
+NAMES = sorted(path.stem for path in SAMPLES.glob("*.toml"))
+#: What is checked of each session, s: the first touches, and what follows from them.
+CUT = 2.0
+BUDGET = 20e-6
+
+
+def cut(name: str) -> Scene:
+    """Return the beginning of a sample session."""
+    scene = sample(name)
+    lasts = min(CUT, scene.simulation.duration)
+    return replace(scene, simulation=replace(scene.simulation, duration=lasts))
+
+
+def heights(scene: Scene) -> NDArray[np.float64]:
+    """Return all heights of a run, (t, n), m."""
+    return record(assemble(scene), scene.trajectory.trajectory(), scene.periods).height
+
+
+@cache
+def found(name: str, budget: float) -> Fitted:
+    """Fit a sample session into a budget."""
+    return fitted(cut(name), budget)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_height_is_further_from_the_full_model_than_the_budget(name: str) -> None:
+    one = found(name, BUDGET)
+    off = np.abs(heights(one.scene) - heights(cut(name))).max()
+    assert off == one.departure  # the very same runs
+    assert off + one.own_error <= BUDGET
+
+
+def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_its_estimate() -> None:
+    # A press that no switch cuts short: here a finer step changes no mode, so the two can be compared.
+    one = found("elastic_press", 50e-6)
+    full = cut("elastic_press")
+    fine = replace(full.simulation, physics_step=full.simulation.physics_step / 10)
+    off = np.abs(heights(one.scene) - heights(replace(full, simulation=fine))).max()
+    assert off <= one.departure + 2.0 * one.own_error + 1e-6  # the full scene's own error at 1 ms
+
+
+def test_a_larger_budget_leaves_no_more_work_to_do() -> None:
+    assert found("tap", BUDGET).work <= found("tap", 5e-6).work < 1.0
+
+
+def test_what_is_left_out_is_left_out_of_the_scene() -> None:
+    one = fitted(cut("tap"), 500e-6)
+    full = {omission.said: omission.leave_out for omission in omissions(cut("tap"), 500e-6)}
+    rebuilt = cut("tap")
+    for said in one.left_out:
+        rebuilt = full[said](rebuilt)
+    assert one.left_out
+    assert one.scene == rebuilt
+
+
+def test_a_trial_that_leaves_the_budget_is_broken_off_and_not_kept() -> None:
+    relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.said)
+    assert (relaxation.departure, relaxation.kept) == (math.inf, False)
+
+
+@pytest.mark.parametrize("budget", [0.0, -1e-6, math.nan, math.inf])
+def test_a_budget_that_is_no_length_is_refused(budget: float) -> None:
+    with pytest.raises(ParameterError, match=r"run.budget must be above 0 m"):
+        fitted(cut("tap"), budget)
+
+
+def test_a_budget_below_the_integrations_own_error_is_refused_with_the_remedy() -> None:
+    with pytest.raises(ParameterError, match=r"own integration.*richardson"):
+        fitted(cut("tap"), 1e-10)
+
+
+def told(capsys: pytest.CaptureFixture[str]) -> Callable[[str], bool]:
+    """Return a function that tells whether something was printed."""
+    text = capsys.readouterr().out
+    return lambda said: said in text
+
+
+def test_run_with_a_budget_tells_what_it_left_out_and_writes_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["run", "tap", "--budget", "20um", "--out", str(out), "--no-errors"]) == 0
+    printed = told(capsys)
+    noted = json.loads((out / "metrics.json").read_text())["budget"]
+    assert noted["allowed"] == pytest.approx(20e-6, rel=1e-15)  # read from "20um": rounding
+    assert noted["measured"] <= 20e-6
+    assert noted["left_out"]
+    assert all(printed(said) for said in noted["left_out"])
