@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import operators, panels
+from . import operators, panels, properties
 
 __all__ = ["MODULES", "register", "unregister"]
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (
+    properties,
     operators,
     panels,
 )

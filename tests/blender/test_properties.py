@@ -1,0 +1,209 @@
+"""A bed's settings hold every parameter of the core, and give back the scene they were given."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import bpy
+import pytest
+from digiclay import properties, settings_table
+from digiclay.core.errors import ParameterError
+from digiclay.core.methods import METHODS
+from digiclay.core.quantity import quantities
+from digiclay.core.scene import OPTIONAL, SECTIONS, Scene, parameters
+from digiclay.core.scene_file import find, load, sample_names
+from digiclay.core.scene_table import PRESETS, resolve
+from digiclay.shown_units import unit_of
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+EVERY = [(section, "virtual_master") for section in SECTIONS if section != "control"]
+EVERY += [("control", method) for method in METHODS]
+
+
+def thing(cells: int = 625) -> Any:
+    """Return an object with as many loose vertices as a bed has pins."""
+    mesh = bpy.data.meshes.new("Bed")
+    mesh.vertices.add(cells)
+    return bpy.data.objects.new("Bed", mesh)
+
+
+def told(bed: Any, scene: Scene) -> Scene:
+    """Return a scene as a bed's settings can tell it: its name, and no words or path of its own."""
+    path = resolve({"actuator": {"rest_height": scene.actuator.rest_height}}).trajectory
+    return dataclasses.replace(scene, name=bed.name, description="", trajectory=path)
+
+
+def test_the_settings_of_a_new_bed_are_the_scene_of_an_empty_scene_file() -> None:
+    bed = thing()
+    assert properties.scene_of(bed) == resolve({}, bed.name)
+
+
+@pytest.mark.parametrize(("section", "method"), EVERY)
+def test_every_parameter_of_a_part_has_a_property_with_its_unit_and_meaning(
+    section: str, method: str
+) -> None:
+    settings = thing().digiclay
+    settings.method = method
+    shown = properties.part_group(settings, section).bl_rna.properties
+    kind = parameters(section, method)
+    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+    for name, known in quantities(kind).items():
+        unit, _ = unit_of(known.unit, defaults[name])
+        assert shown[name].name.endswith(f"({unit})") or not unit
+        assert known.doc[1:] in shown[name].description
+
+
+@pytest.mark.parametrize(("section", "method"), EVERY)
+def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str) -> None:
+    settings = thing().digiclay
+    settings.method = method
+    group = properties.part_group(settings, section)
+    kind = parameters(section, method)
+    for field in dataclasses.fields(kind):
+        known = field.metadata["quantity"]
+        if not isinstance(field.default, float):
+            continue
+        for end in (-1e30, 1e30):
+            setattr(group, field.name, end)
+            value = settings_table.read(group, kind, {}, section)[field.name]
+            bounds = (known.above, known.at_least) if end < 0 else (known.below, known.at_most)
+            if any(bound is not None for bound in bounds):
+                assert known.broken_rule(value) == "", field.name
+
+
+@pytest.mark.parametrize("sample", sample_names())
+def test_a_sample_scene_comes_back_bit_for_bit(sample: str) -> None:
+    scene = load(find(sample))
+    bed = thing(scene.cells)
+    properties.adopt(bed, scene)
+    assert properties.scene_of(bed) == told(bed, scene)
+
+
+def test_values_blender_cannot_keep_come_back_bit_for_bit() -> None:
+    scene = resolve(
+        {
+            "valve": {"stroke": 1 / 33000, "orifice_diameter": 1e-12},
+            "sensors": {"seed": 2**63 - 1},
+            "relaxation": {"times": [1 / 300, 1 / 7], "weights": [0.1, 1 / 3, 0.2]},
+        }
+    )
+    bed = thing()
+    properties.adopt(bed, scene)
+    assert properties.scene_of(bed) == told(bed, scene)
+
+
+def test_a_value_changed_by_hand_is_no_longer_the_one_adopted() -> None:
+    bed = thing()
+    properties.adopt(bed, resolve({"valve": {"stroke": 1 / 33000}}))
+    bed.digiclay.valve.stroke = 0.04
+    assert properties.scene_of(bed).valve.stroke == 40e-6
+
+
+@pytest.mark.parametrize(("typed", "meant"), [(3.0, 3e-3), (2.7, 2.7e-3), (12.34567, 12.34567e-3)])
+def test_a_length_typed_in_mm_is_that_length_exactly(typed: float, meant: float) -> None:
+    bed = thing()
+    bed.digiclay.layout.pitch = typed
+    assert properties.scene_of(bed).layout.pitch == meant
+
+
+@pytest.mark.parametrize("section", OPTIONAL)
+def test_a_part_that_is_switched_off_is_left_out(section: str) -> None:
+    bed = thing()
+    setattr(bed.digiclay, f"use_{section}", False)
+    assert getattr(properties.scene_of(bed), section) is None
+    setattr(bed.digiclay, f"use_{section}", True)
+    assert getattr(properties.scene_of(bed), section) is not None
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_choosing_a_preset_gives_the_scene_of_that_preset(preset: str) -> None:
+    bed = thing()
+    bed.digiclay.preset = "viscous"
+    bed.digiclay.preset = preset
+    assert properties.scene_of(bed) == resolve({"preset": preset}, bed.name)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_choosing_a_method_gives_the_scene_of_that_method(method: str) -> None:
+    bed = thing()
+    bed.digiclay.method = "cell_states"
+    bed.digiclay.method = method
+    assert properties.scene_of(bed) == resolve({"control": {"method": method}}, bed.name)
+
+
+@pytest.mark.parametrize("arrangement", ["hexagonal", "aligned", "staggered"])
+def test_choosing_an_arrangement_gives_the_contact_it_needs(arrangement: str) -> None:
+    bed = thing()
+    bed.digiclay.layout.arrangement = "hexagonal"
+    bed.digiclay.layout.arrangement = arrangement
+    assert properties.scene_of(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
+
+
+def test_each_method_keeps_parameters_of_its_own() -> None:
+    bed = thing()
+    bed.digiclay.control.virtual_master.force_setpoint = 0.25
+    bed.digiclay.method = "cell_states"
+    assert properties.scene_of(bed).control.force_setpoint == 0.04
+    bed.digiclay.method = "virtual_master"
+    assert properties.scene_of(bed).control.force_setpoint == 0.25
+
+
+def test_settings_that_do_not_go_together_are_told_in_the_words_of_the_panel() -> None:
+    bed = thing()
+    bed.digiclay.layout.pitch = 1.0
+    wanted = r"^Layout: Pitch must be at least Actuator: Bore, 2 mm: cylinders would overlap \(got 1 mm\)\.$"
+    with pytest.raises(ParameterError, match=wanted):
+        properties.scene_of(bed)
+
+
+@pytest.mark.parametrize("typed", ["", "4; 70", "4, , 70", "four"])
+def test_a_list_that_is_none_is_refused(typed: str) -> None:
+    bed = thing()
+    bed.digiclay.relaxation.times = typed
+    with pytest.raises(ParameterError, match=r"^Relaxation: Times must be numbers separated by commas"):
+        properties.scene_of(bed)
+
+
+@pytest.mark.parametrize("typed", ["nan, 70, 1400", "4, inf, 5", "-4, 70, 1400", "0, 70, 1400"])
+def test_a_list_of_numbers_out_of_bounds_is_refused(typed: str) -> None:
+    bed = thing()
+    bed.digiclay.relaxation.times = typed
+    with pytest.raises(ParameterError, match=r"^Relaxation: Times must be (a finite number|at least)"):
+        properties.scene_of(bed)
+
+
+def test_a_bed_whose_pins_are_not_those_of_its_settings_is_told_how_to_mend_it() -> None:
+    bed = thing(624)
+    with pytest.raises(ParameterError, match=r"624 pins the bed has \(got 625\)\. Press Rebuild"):
+        properties.scene_of(bed)
+
+
+def test_a_copy_of_a_bed_has_settings_of_its_own() -> None:
+    bed = thing()
+    bed.digiclay.valve.stroke = 0.04
+    copy = bed.copy()
+    copy.digiclay.valve.stroke = 0.05
+    assert properties.scene_of(bed).valve.stroke == 40e-6
+    assert properties.scene_of(copy).valve.stroke == 50e-6
+
+
+def test_settings_are_saved_with_the_file(tmp_path: Any) -> None:
+    bed = thing()
+    bpy.context.scene.collection.objects.link(bed)
+    scene = resolve({"preset": "viscous", "valve": {"stroke": 1 / 33000}, "conduit": "absent"})
+    properties.adopt(bed, scene)
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    again = bpy.data.objects["Bed"]
+    assert properties.scene_of(again) == told(again, scene)
+
+
+def test_a_path_that_starts_at_the_file_is_one_the_core_can_open(tmp_path: Any) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here.blend"))
+    bed = thing()
+    bed.digiclay.method = "shape_display"
+    bed.digiclay.control.shape_display.shape = "//hill.npy"
+    assert properties.table_of(bed)["control"]["shape"] == str(tmp_path / "hill.npy")
