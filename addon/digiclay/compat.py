@@ -21,7 +21,10 @@ except ModuleNotFoundError as error:
 except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
-__all__ = ["bpy", "has_denoiser", "node_setting", "quiet", "scratch", "set_node_setting", "shader_nodes"]
+__all__ = [
+    "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "quiet", "scratch",
+    "set_node_setting", "shader_nodes", "strips", "to_video",
+]  # fmt: skip
 
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
@@ -55,6 +58,26 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
     modifier.id_data.update_tag()  # Blender does not notice by itself
 
 
+def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
+    """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value."""
+    identifier = modifier.node_group.interface.items_tree[name].identifier
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).keyframe_insert("value", frame=frame)
+    else:
+        modifier.keyframe_insert(f'["{identifier}"]', frame=frame)
+
+
+def curves(owner: Any) -> list[Any]:
+    """Return the collections of animation curves of an object; there is one for each slot from 5.0 on."""
+    action = owner.animation_data.action if owner.animation_data else None
+    if action is None:
+        return []
+    if hasattr(action, "fcurves"):
+        return [action.fcurves]
+    strips = (strip for layer in action.layers for strip in layer.strips)
+    return [bag.fcurves for strip in strips for bag in strip.channelbags]
+
+
 def has_denoiser() -> bool:
     """Tell whether this Blender was built with Cycles' denoiser; some distributions' are not."""
     try:
@@ -62,6 +85,23 @@ def has_denoiser() -> bool:
     except ImportError:
         return False
     return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+def to_video(render: Any) -> None:
+    """Have a scene's render settings write a film in an MP4 file, H.264, without sound."""
+    image = render.image_settings
+    if hasattr(image, "media_type"):  # from 5.0 on
+        image.media_type = "VIDEO"
+    image.file_format, image.color_mode = "FFMPEG", "RGB"
+    film = render.ffmpeg
+    film.format, film.codec, film.audio_codec = "MPEG4", "H264", "NONE"
+    film.constant_rate_factor, film.ffmpeg_preset, film.gopsize = "HIGH", "GOOD", 12
+
+
+def strips(scene: Any) -> Any:
+    """Return the strips of a scene's video sequencer, made now; up to 4.3 they were called sequences."""
+    editor = scene.sequence_editor_create()
+    return editor.strips if hasattr(editor, "strips") else editor.sequences
 
 
 @contextmanager

@@ -20,11 +20,11 @@ CORE = PACKAGE / "core"
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
     "errors modes closed_form control.travel metrics_signal",
-    "quantity run_folder surface control.transitions metrics_path sweep_axis",
+    "keeping_memory quantity run_folder surface control.transitions metrics_path sweep_axis",
     "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "methods export metrics control.servo control.blister",
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
+    "pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
     "shape_file physics scene",
     "system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
@@ -34,8 +34,8 @@ LEVELS = (
     "control.push_pull control.force_display control.shape_display",
     "simulation jobs control.handover",
     "assembly",
-    "accuracy",
-    "session metrics_trial",
+    "accuracy keeping live shadow",
+    "session metrics_trial take",
     "metrics_speed sweep budget",
     "sweep_folder",
 )

@@ -1,0 +1,218 @@
+"""Takes kept in the .blend and baked: what they show frame by frame, and what undoing them leaves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bake, bridge, takes, view
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import DigiclayError
+from digiclay.core.fingertip import LEVEL, Fingertip
+from digiclay.core.keeping import packed
+from digiclay.core.layout import Layout
+from digiclay.core.live import lived
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import begin
+from digiclay.core.take import Take
+from digiclay.instant import Instant
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+COUNT = 100  # control periods of 5 ms: half a second
+
+
+def scene() -> Scene:
+    """Return a bed of 12 x 12 pins under Method I."""
+    return resolve({"layout": {"rows": 12, "columns": 12}})
+
+
+def taken(count: int = COUNT) -> tuple[Take, Floats]:
+    """Press 5 mm deep; return the take, and all heights (t + 1, n)."""
+    made = scene()
+    system = assemble(made)
+    state = begin(system)
+    first, heights = packed(system, state), [state.row(0)]
+    poses = np.tile([0.0, 0.0, 0.0, *LEVEL], (count + 1, 1))
+    poses[:, 2] = np.linspace(41e-3, 35e-3, count + 1)
+    for state in lived(system, state, poses):  # noqa: B020
+        heights.append(state.row(0))
+    return Take(made, first, poses, packed(system, state)), np.array(heights)
+
+
+@pytest.fixture
+def bed() -> Any:
+    """Return a bed in the open file."""
+    made = scene()
+    bpy.context.scene.render.fps = 40  # a frame is five control periods
+    return view.build(Instant.at_rest(made.layout, made.actuator, made.fingertip), bpy.context.collection)
+
+
+def shown(bed: Any, frame: float) -> Floats:
+    """Return the heights drawn at a frame, m."""
+    bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+    modifier = next(one for one in bed.modifiers if one.name == "Pins")
+    modifier.show_viewport = False  # leaves the vertices the pins stand on
+    bpy.context.view_layer.update()
+    mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    return places.reshape(-1, 3)[:, 2].astype(float) / bridge.SCALE
+
+
+def baked(bed: Any, take: Take, first: int = 1) -> bake.Moments:
+    """Bake a take into a bed."""
+    *_, moments = bake.moments_of(take, 40.0)
+    assert isinstance(moments, bake.Moments)
+    bake.apply(bed, moments, first, Fingertip(), keyframe_finger=True)
+    return moments
+
+
+def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_path: Path) -> None:
+    take, _ = taken()
+    name = bed.name
+    entry = takes.keep(bed, take, "A press")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    again = bpy.data.objects[name]
+    assert takes.entries(again) == [entry]
+    read = takes.read(again, entry.number)
+    assert np.array_equal(read.poses, take.poses)
+    assert (read.start, read.end) == (take.start, take.end)
+
+
+def test_a_copy_of_a_bed_has_its_takes(bed: Any) -> None:
+    take, _ = taken()
+    takes.keep(bed, take)
+    assert takes.entries(bed.copy()) == takes.entries(bed)
+
+
+def test_a_number_is_not_used_again_while_later_takes_stand(bed: Any) -> None:
+    take, _ = taken(5)
+    numbers = [takes.keep(bed, take).number for _ in range(3)]
+    takes.remove(bed, numbers[1])
+    assert takes.keep(bed, take).number == "4"
+    assert [one.number for one in takes.entries(bed)] == ["1", "3", "4"]
+
+
+def test_a_take_that_is_not_there_is_refused_with_those_that_are(bed: Any) -> None:
+    take, _ = taken(5)
+    takes.keep(bed, take)
+    with pytest.raises(DigiclayError, match="has no take '7': its takes are 1"):
+        takes.read(bed, "7")
+
+
+def test_every_frame_shows_the_heights_of_its_moment(bed: Any) -> None:
+    take, heights = taken()
+    baked(bed, take, first=10)
+    for frame in (0, 7, 20):
+        # Pins are drawn in float32 at ten units a metre: 3e-8 of 0.4.
+        assert np.abs(shown(bed, 10 + frame) - heights[5 * frame]).max() < 1e-7
+
+
+def test_between_two_frames_heights_are_blended(bed: Any) -> None:
+    take, heights = taken()
+    baked(bed, take)
+    between = (heights[50] + heights[55]) / 2.0
+    assert np.ptp(heights[50] - heights[55]) > 1e-5
+    # The curve's value is float32: 1e-6 of a moment.
+    assert np.abs(shown(bed, 11.5) - between).max() < 1e-7
+
+
+def test_before_the_first_frame_and_after_the_last_the_bed_stays(bed: Any) -> None:
+    take, heights = taken()
+    baked(bed, take, first=10)
+    assert np.abs(shown(bed, 1) - heights[0]).max() < 1e-7
+    assert np.abs(shown(bed, 99) - heights[-1]).max() < 1e-7
+
+
+def test_modes_and_forces_play_too(bed: Any) -> None:
+    take, _ = taken()
+    moments = baked(bed, take)
+    shown(bed, 1 + 20)
+    mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    force, mode = np.empty(144, np.float32), np.empty(144, np.int32)
+    mesh.attributes["force"].data.foreach_get("value", force)
+    mesh.attributes["mode"].data.foreach_get("value", mode)
+    assert np.array_equal(force, moments.force[20])
+    assert np.array_equal(mode, moments.mode[20])
+    assert force.max() > 0.0
+
+
+def test_the_fingertip_follows_its_keyframes(bed: Any) -> None:
+    take, _ = taken()
+    baked(bed, take)
+    bpy.context.scene.frame_set(1 + 12)
+    # Locations are float32.
+    assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, :3]).max() < 1e-7
+
+
+def test_baking_again_replaces_the_bake(bed: Any) -> None:
+    take, _ = taken()
+    for _ in range(2):
+        baked(bed, take)
+    assert len(bed.modifiers) == 2
+    assert len([one for one in bpy.data.objects if one.get(view.ROLE) == bake.BAKE]) == 1
+
+
+def test_freeing_a_bake_leaves_nothing_of_it(bed: Any) -> None:
+    meshes, trees = len(bpy.data.meshes), len(bpy.data.node_groups)
+    take, _ = taken()
+    baked(bed, take)
+    assert bake.is_baked(bed)
+    assert bake.free(bed)
+    assert (len(bpy.data.meshes), len(bpy.data.node_groups)) == (meshes, trees)
+    assert not bake.is_baked(bed)
+    assert not bake.free(bed)
+    assert [curve for group in bake.curves(bed) for curve in group] == []
+
+
+def test_a_bake_plays_without_the_extension(bed: Any, tmp_path: Path) -> None:
+    # No handler and no driver: what plays is a modifier and its curve.
+    take, heights = taken()
+    baked(bed, take)
+    name = bed.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
+    assert not bpy.app.handlers.frame_change_pre
+    assert not bpy.app.handlers.frame_change_post
+    assert np.abs(shown(bpy.data.objects[name], 21) - heights[100]).max() < 1e-7
+
+
+def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
+    tip = view.fingertip_of(bed)
+    bridge.place_fingertip(tip, np.array([0.0, 0.0, 45e-3, *LEVEL]), Fingertip())
+    tip.keyframe_insert("location", frame=1)
+    tip.location.z -= 8e-3 * bridge.SCALE
+    tip.keyframe_insert("location", frame=21)
+    for _, curve in ((group, curve) for group in bake.curves(tip) for curve in group):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    bpy.context.scene.frame_set(3)
+    *_, poses = bake.sampled(bpy.context.scene, bed, 1, 21, 5e-3)
+    # 20 frames at 40 a second are 100 periods; a subframe is read to 1e-4 of a frame or better.
+    assert np.abs(poses[:, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
+    assert bpy.context.scene.frame_current == 3
+
+
+@pytest.mark.parametrize(("first", "last"), [(5, 5), (9, 2), (1, 300_000)])
+def test_a_range_of_frames_that_cannot_be_is_refused(bed: Any, first: int, last: int) -> None:
+    with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):
+        next(bake.sampled(bpy.context.scene, bed, first, last, 5e-3))
+
+
+def test_a_take_shorter_than_a_frame_bakes_to_its_first_moment(bed: Any) -> None:
+    take, _ = taken(2)
+    moments = baked(bed, replace(take))
+    assert len(moments.height) == 1
+
+
+def test_each_frame_shows_the_nearest_period() -> None:
+    take, _ = taken()
+    assert bake.frames_in(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]
+    assert Layout(rows=12, columns=12) == take.scene.layout

@@ -1,0 +1,161 @@
+"""A take: replayed bit for bit, simulated more finely, written as a scene and as bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import OutputError, ParameterError
+from digiclay.core.fingertip import LEVEL
+from digiclay.core.keeping import packed
+from digiclay.core.layout import Layout
+from digiclay.core.live import lived
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import load
+from digiclay.core.scene_table import text
+from digiclay.core.simulation import begin
+from digiclay.core.state import State
+from digiclay.core.system import System
+from digiclay.core.take import Take, as_scene, difference, finer, from_bytes, replayed, states, to_bytes
+from numpy.typing import NDArray
+
+from tests.assemble import record, sample
+
+Floats = NDArray[np.float64]
+#: Control periods of the take.
+COUNT = 160
+
+
+def scene() -> Scene:
+    """Return a bed of 12 x 12 pins under Method I."""
+    return replace(sample("slow_press"), layout=Layout(rows=12, columns=12))
+
+
+def gesture(count: int = COUNT) -> Floats:
+    """Return the poses of a finger that presses 4 mm, drags 6 mm and turns, read every 6th period."""
+    read = np.arange(0, count + 6, 6)
+    part = read / count
+    poses = np.zeros((read.size, 7))
+    poses[:, 0] = 6e-3 * np.clip(2.0 * part - 1.0, 0.0, 1.0)
+    poses[:, 2] = 42e-3 - 6e-3 * np.clip(2.0 * part, 0.0, 1.0)
+    poses[:, 3:] = LEVEL
+    poses[:, 4] = 0.1 * part
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    at = np.arange(count + 1)
+    return np.column_stack([np.interp(at, read, column) for column in poses.T])
+
+
+def taken(start: State | None = None) -> tuple[System, Take, State]:
+    """Live through the gesture; return the system, the take and the last state."""
+    system = assemble(scene())
+    state = start or begin(system)
+    first, poses = packed(system, state), gesture()
+    for state in lived(system, state.copy(), poses):  # noqa: B020
+        pass
+    return system, Take(scene(), first, poses, packed(system, state)), state
+
+
+def test_a_replay_ends_in_the_same_state_bit_for_bit() -> None:
+    _, take, _ = taken()
+    assert replayed(take)
+
+
+def test_a_take_begun_on_a_formed_bed_replays_bit_for_bit_too() -> None:
+    _, _, formed = taken()
+    _, take, _ = taken(formed)
+    assert replayed(take)
+
+
+def test_a_replay_on_another_path_does_not_pass_for_the_take() -> None:
+    _, take, _ = taken()
+    poses = take.poses.copy()
+    poses[COUNT // 2, 2] += 1e-9
+    assert not replayed(replace(take, poses=poses))
+
+
+def test_a_replay_can_be_broken_off() -> None:
+    _, take, _ = taken()
+    seen: list[int] = []
+
+    def told(done: int, total: int) -> bool:
+        seen.append(done)
+        return done < 3
+
+    assert not replayed(take, told)
+    assert seen == [1, 2, 3]
+
+
+def test_bytes_bring_a_take_back_as_it_was() -> None:
+    _, take, _ = taken()
+    back = from_bytes(to_bytes(take))
+    assert np.array_equal(back.poses, take.poses)
+    assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
+
+
+@pytest.mark.parametrize("harm", [lambda data: data[:-50], lambda data: b"", lambda data: b"no take"])
+def test_damaged_bytes_are_refused_in_one_line(harm: object) -> None:
+    _, take, _ = taken()
+    with pytest.raises(OutputError, match="The take is damaged"):
+        from_bytes(harm(to_bytes(take)))  # type: ignore[operator]
+
+
+def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> None:
+    # 1 ms steps leave about 1 µm; a difference of nothing at all would mean that nothing was refined.
+    _, take, _ = taken()
+    assert 0.0 < difference(take, 4) < 5e-6
+
+
+def test_the_same_step_makes_no_difference() -> None:
+    _, take, _ = taken()
+    assert difference(take, 1) == 0.0
+
+
+@pytest.mark.parametrize("parts", [0, -1, 65])
+def test_a_step_cut_into_too_few_or_too_many_parts_is_refused(parts: int) -> None:
+    with pytest.raises(ParameterError, match="must be from 1 to 64"):
+        finer(scene(), parts)
+
+
+def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> None:
+    system, take, last = taken()
+    file = tmp_path / "my take.toml"  # type: ignore[operator]
+    file.write_text(text(as_scene(take, "my take")), encoding="utf-8")
+    read = load(file)
+    done = record(assemble(read), read.trajectory.trajectory(), read.periods)
+    assert read.periods == COUNT
+    # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a thousandfold.
+    assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
+    assert system.grid.count == read.cells
+
+
+def test_only_turning_points_of_the_path_become_waypoints() -> None:
+    _, take, _ = taken()
+    # The finger was read every 6th period, and goes straight in between.
+    assert len(as_scene(take, "take").trajectory.waypoints) <= COUNT // 6 + 2
+
+
+def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
+    _, _, formed = taken()
+    _, take, _ = taken(formed)
+    with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
+        as_scene(take, "late")
+
+
+def test_states_come_one_a_period() -> None:
+    _, take, _ = taken()
+    assert [state.period for state in states(take)] == list(range(1, COUNT + 1))
+
+
+@pytest.mark.parametrize(
+    ("poses", "rule"),
+    [
+        (np.zeros((1, 7)), "must hold one control period at least"),
+        (np.zeros((3, 6)), "must hold one control period at least"),
+        (np.full((3, 7), np.nan), "must be finite numbers"),
+    ],
+)
+def test_a_path_that_is_none_is_refused(poses: Floats, rule: str) -> None:
+    with pytest.raises(ParameterError, match=rule):
+        Take(scene(), b"", poses, b"")
