@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .quantity import Parameters, quantity
 
-__all__ = ["LEVEL", "Fingertip", "forms", "reach", "reaches", "underside"]
+__all__ = ["LEVEL", "Fingertip", "forms", "matrices", "reach", "reaches", "underside"]
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Fingertip(Parameters):
             the tilt of the mid surface t_x, t_y; the half thickness over the centre, m; the
             smaller eigenvalue of S, 1/m².
         """
-        rotation = _matrices(poses[:, 3:])
+        rotation = matrices(poses[:, 3:])
         axes = np.array([self.length, self.width, self.height])
         inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
         form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
@@ -149,7 +149,7 @@ def underside(inward: Floats, middle: Floats, half: Floats, place: Floats) -> Fl
     return root
 
 
-def _matrices(quaternions: Floats) -> Floats:
+def matrices(quaternions: Floats) -> Floats:
     """Return rotation matrices (k, 3, 3) of quaternions (k, 4), w first."""
     w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
     return np.moveaxis(
