@@ -29,7 +29,7 @@ LEVELS = (
     "system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
     "control.drive control.neighbours control.shapes",
-    "gathering steppers.* control.replay control.virtual_master control.cell_states scene_file "
+    "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
     "simulation jobs control.handover",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError"]
+__all__ = ["DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError", "StateError"]
 
 
 class DigiclayError(Exception):
@@ -38,6 +38,10 @@ class SceneError(DigiclayError):
 
 class OutputError(DigiclayError):
     """A result cannot be written, or a run's folder cannot be read."""
+
+
+class StateError(DigiclayError):
+    """A kept state cannot be taken up."""
 
 
 class DivergenceError(DigiclayError, ArithmeticError):

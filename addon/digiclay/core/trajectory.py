@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .errors import ParameterError
 from .fingertip import LEVEL
 
-__all__ = ["Trajectory", "between", "level"]
+__all__ = ["Trajectory", "along", "between", "level"]
 
 Floats = NDArray[np.float64]
 
@@ -106,11 +106,29 @@ def between(start: Floats, end: Floats, parts: Floats) -> Floats:
     parts : ndarray (k,)
         Where on the way, 0 to 1.
     """
-    part = parts[:, None]
-    turned = _turned(
-        np.broadcast_to(start[3:], (parts.size, 4)), np.broadcast_to(end[3:], (parts.size, 4)), part
-    )
-    return np.concatenate([start[:3] + (end[:3] - start[:3]) * part, turned], axis=1)
+    poses: Floats = along(np.array([start, end]), parts)[0]
+    return poses
+
+
+def along(path: Floats, parts: Floats) -> Floats:
+    """Return poses (t, p, 7) on the straight ways from each pose of a path to the next.
+
+    Whether the ways are worked out one by one or together makes no difference to any bit.
+
+    Parameters
+    ----------
+    path : ndarray (t + 1, 7)
+        Poses: position, m, and unit quaternion.
+    parts : ndarray (p,)
+        Where on each way, 0 to 1.
+    """
+    count = len(path) - 1
+    start, end = np.repeat(path[:-1], parts.size, axis=0), np.repeat(path[1:], parts.size, axis=0)
+    part = np.tile(parts, count)[:, None]
+    poses = np.empty((count * parts.size, 7))
+    poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
+    poses[:, 3:] = _turned(start[:, 3:], end[:, 3:], part)
+    return poses.reshape(count, parts.size, 7)
 
 
 def _monotone_slopes(times: Floats, values: Floats) -> Floats:

@@ -1,0 +1,258 @@
+"""A state is kept as bytes and taken up again bit for bit; what does not fit is refused in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import StateError
+from digiclay.core.keeping import START, carried, packed, unpacked
+from digiclay.core.keeping_memory import rebuilt, written
+from digiclay.core.methods import METHODS
+from digiclay.core.modes import Mode
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import begin, periods
+from digiclay.core.state import State
+from digiclay.core.system import System
+from numpy.typing import NDArray
+
+from tests.assemble import path
+
+SIZES = {"rows": 9, "columns": 11}
+PRESS = path((0.0, -6, 0, 42), (0.2, -6, 0, 36), (0.6, 6, 2, 36), (0.8, 6, 2, 46))
+
+
+def system_of(method: str = "virtual_master", **tables: Any) -> System:
+    """Return a small bed under a method."""
+    return assemble(resolve({"layout": SIZES, "control": {"method": method}, **tables}))
+
+
+def run(system: System, state: State, count: int) -> State:
+    """Return the state some periods later."""
+    *_, last = periods(system, PRESS, state, count)
+    return last
+
+
+def same(first: State, second: State) -> bool:
+    """Tell whether two states are equal bit for bit, what is gathered included."""
+    return packed_parts(first) == packed_parts(second)
+
+
+def packed_parts(state: State) -> list[Any]:
+    """Return all of a state as things that compare exactly."""
+    held = state.gathered
+    arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.place)
+    rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
+    return [*(array.tobytes() for array in arrays), *rest, state.memory, type(state.memory)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str) -> None:
+    system = system_of(method)
+    half = run(system, begin(system), 70)
+    data = packed(system, half)
+    taken_up = unpacked(system, data)
+    assert same(taken_up, half)
+    assert same(run(system, taken_up, 90), run(system, half, 90))
+
+
+def test_sensors_that_remember_are_kept_as_well() -> None:
+    system = system_of(sensors={"delay": 3, "observer": "valve", "height_noise": "1 um"})
+    half = run(system, begin(system), 70)
+    taken_up = unpacked(system, packed(system, half))
+    assert same(run(system, taken_up, 50), run(system, half, 50))
+
+
+def test_kept_bytes_do_not_change_when_the_session_goes_on() -> None:
+    system = system_of()
+    state = run(system, begin(system), 70)
+    data = packed(system, state)
+    before = bytes(data)
+    run(system, state, 10)
+    assert data == before
+
+
+def test_a_state_taken_up_may_be_used_up() -> None:
+    system = system_of()
+    data = packed(system, run(system, begin(system), 70))
+    first = run(system, unpacked(system, data), 20)
+    assert same(run(system, unpacked(system, data), 20), first)
+
+
+def test_the_bytes_of_a_default_bed_are_few() -> None:
+    system = assemble(resolve({}))
+    # 10 rows of float64, the time of ageing and a mode for each of 625 cells, and a header.
+    assert len(packed(system, begin(system))) < 625 * (8 * system.rows.count + 9) + 1000
+
+
+def kept() -> tuple[System, bytes]:
+    """Return a small bed and its state in the middle of a press."""
+    system = system_of()
+    return system, packed(system, run(system, begin(system), 70))
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"layout": {"rows": 9, "columns": 12}}, "number of cells"),
+        ({"relaxation": "absent"}, "rows of a cell"),
+        ({"simulation": {"control_period": "10 ms"}}, "control period"),
+        ({"control": {"method": "plastic"}}, "memory of the controller"),
+        ({"control": {"method": "viscous"}}, "memory of the controller"),
+    ],
+)
+def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) -> None:
+    _, data = kept()
+    with pytest.raises(StateError, match=said):
+        unpacked(assemble(resolve({"layout": SIZES, **tables})), data)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"nothing", START, START + b"\xff\xff\xff\xff", START + bytes(90), None, 7]
+)
+def test_bytes_that_are_no_state_are_refused(data: Any) -> None:
+    with pytest.raises(StateError, match="Reset the session"):
+        unpacked(system_of(), data)
+
+
+@pytest.mark.parametrize("cut", [1, 8, 1000, -1])
+def test_a_state_that_was_cut_short_or_added_to_is_refused(cut: int) -> None:
+    system, data = kept()
+    with pytest.raises(StateError):
+        unpacked(system, data[:-cut] if cut > 0 else data + b"\0")
+
+
+def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
+    """Return the bytes with something else in their header."""
+    first = len(START) + 4
+    length = int.from_bytes(data[len(START) : first], "little")
+    text = data[first : first + length]
+    assert old in text
+    text = text.replace(old, new, 1)
+    return START + len(text).to_bytes(4, "little") + text + data[first + length :]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"cells": 99', b'"cells": -99'),
+        (b'"cells": 99', b'"cells": 1e99'),
+        (b'"cells": 99', b'"cells": 99999999999999'),
+        (b'"near": ', b'"near": 1'),
+        (b'"peak": ', b'"peak": NaN, "p": '),
+        (b'"memory": ["Master"', b'"memory": ["State"'),
+        (b'"memory": ["Master", ', b'"memory": ["Master", 9'),
+        (b'"memory": ["Master", ', b'"memory": ["Master", null, '),
+        (b'"arrays": []', b'"arrays": [["O", [1]]]'),
+        (b'"rows": [', b'"rows": ["a", '),
+        (b'"reach": [', b'"reach": [1, '),
+    ],
+)
+def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
+    system, data = kept()
+    with pytest.raises(StateError):
+        unpacked(system, header_replaced(data, old, new))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_not_finite_are_refused(value: float) -> None:
+    system = system_of()
+    state = begin(system)
+    state.rows[0, 3] = value
+    with pytest.raises(StateError, match="no state has"):
+        unpacked(system, packed(system, state))
+
+
+def test_a_mode_that_does_not_exist_is_refused() -> None:
+    system = system_of()
+    state = begin(system)
+    state.modes[5] = len(Mode)
+    with pytest.raises(StateError, match="no state has"):
+        unpacked(system, packed(system, state))
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"control": {"method": "plastic"}},
+        {"relaxation": "absent"},
+        {"simulation": {"control_period": "10 ms"}},
+    ],
+)
+def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None:
+    system, data = kept()
+    before = unpacked(system, data).row(0)
+    other = assemble(resolve({"layout": SIZES, **tables}))
+    state = carried(other, data)
+    assert np.array_equal(state.row(0), before)
+    # Nothing calls the pins back: without a finger they stay where they are.
+    *_, later = periods(other, path((0.0, 0, 0, 500)), state, 40)
+    assert np.array_equal(later.row(0), before)
+
+
+def test_carried_heights_stay_within_the_stroke() -> None:
+    _, data = kept()
+    low = assemble(resolve({"layout": SIZES, "actuator": {"stroke": "38 mm", "rest_height": "20 mm"}}))
+    assert carried(low, data).row(0).max() == 38e-3
+
+
+def test_heights_are_not_carried_over_to_another_number_of_cells() -> None:
+    _, data = kept()
+    with pytest.raises(StateError, match="number of cells"):
+        carried(assemble(resolve({})), data)
+
+
+class Colour(IntEnum):
+    """Something a controller might remember."""
+
+    RED = 1
+    BLUE = 2
+
+
+class Inner(NamedTuple):
+    """A part of a memory."""
+
+    edge: float = 0.0
+    felt: bool = False
+
+
+class Outer(NamedTuple):
+    """A memory with everything in it."""
+
+    colour: Colour
+    inner: Inner
+    table: NDArray[np.float64]
+    count: int = 0
+
+
+def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
+    memory = Outer(Colour.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
+    arrays: list[NDArray[Any]] = []
+    text = written(memory, arrays)
+    back = rebuilt(Outer(Colour.RED, Inner(), np.zeros((0, 2))), text, arrays)
+    assert back.table.tolist() == [[0.1, 2.0]]
+    assert [*back[:2], back.count] == [Colour.BLUE, Inner(-math.inf, True), 7]
+    assert [type(item) for item in (back.colour, back.inner.edge, back.inner.felt, back.count)] == [
+        Colour, float, bool, int,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "kept_memory",
+    [None, 3, "Inner", [], ["Inner"], ["Inner", 0.0], ["Inner", 0.0, False, 1], ["Inner", "a", False],
+     ["Inner", math.nan, False], {"array": 0}, ["Outer", 0.0, False]],
+)  # fmt: skip
+def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
+    with pytest.raises(StateError, match="memory of the controller must be a Inner"):
+        rebuilt(Inner(), kept_memory, [])
+
+
+def test_every_field_of_a_state_is_kept() -> None:
+    # A field that is added to a state must be added to what is kept, and to `packed_parts`.
+    fields = {field.name for field in dataclasses.fields(State)}
+    assert fields == {"period", "rows", "modes", "aged", "peak", "gathered", "memory"}

@@ -1,0 +1,237 @@
+"""The wall's clock, the finger's way, the trace and the shadow of a live session."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.fingertip import LEVEL
+from digiclay.core.keeping import packed
+from digiclay.core.live import Clock, due, lived, reachable, spent, way
+from digiclay.core.scene_table import resolve
+from digiclay.core.shadow import PAUSE, STRETCH, LiveErrors, cast, cast_from, compared
+from digiclay.core.simulation import begin, periods
+from digiclay.core.trace import ROWS, begun, extended, felt, picked, row
+from digiclay.core.trajectory import along, between
+from numpy.typing import NDArray
+
+from tests.assemble import path
+
+Floats = NDArray[np.float64]
+PERIOD = 5e-3
+SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
+SYSTEM = assemble(SCENE)
+
+
+def looked(times: list[float], most: int = 100, clock: Clock | None = None) -> tuple[list[int], Clock]:
+    """Look at the clock at some times; return the periods due each time."""
+    clock, counts = clock or Clock(), []
+    for time in times:
+        count, clock = due(clock, time, PERIOD, most)
+        counts.append(count)
+    return counts, clock
+
+
+def test_nothing_is_due_at_the_first_look() -> None:
+    assert looked([1e6])[0] == [0]
+
+
+def test_whole_periods_are_due_and_the_rest_is_kept_for_the_next_look() -> None:
+    assert looked([0.0, 0.012, 0.024, 0.026])[0] == [0, 2, 2, 1]
+
+
+def test_as_much_is_simulated_as_time_goes_by() -> None:
+    times = np.cumsum(np.random.default_rng(1).uniform(0.0, 0.06, 2000)).tolist()
+    counts, clock = looked(times)
+    # Less than a period is owed at the end, whatever has been rounded on the way.
+    assert 0.0 <= times[-1] - times[0] - sum(counts) * PERIOD < PERIOD * 1.001
+    assert clock.factor == pytest.approx(1.0, abs=2 * PERIOD)
+
+
+def test_more_than_the_most_is_dropped_and_not_made_up_for() -> None:
+    counts, clock = looked([0.0, 10.0, 10.01], most=20)
+    assert counts == [0, 20, 2]
+    assert clock.factor == pytest.approx(0.011, abs=1e-3)
+
+
+def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
+    clock, now, looks = Clock(), 0.0, []
+    for _ in range(200):
+        count, clock = due(clock, now, PERIOD, 1000)
+        took = count * 4 * PERIOD  # a period takes four times as long as it lasts
+        clock = spent(clock, count, took)
+        now += took + 0.02  # drawing
+        looks.append(took)
+    assert max(looks[5:]) < 0.1
+    assert 0.1 < clock.factor < 0.25
+
+
+def test_a_clock_that_goes_back_does_no_harm() -> None:
+    assert looked([5.0, 4.0, 4.01])[0] == [0, 0, 2]
+
+
+def test_the_time_of_a_pause_does_not_count() -> None:
+    _, clock = looked([0.0, 0.02])
+    assert looked([100.0, 100.01], clock=clock.stopped())[0] == [0, 2]
+
+
+def test_the_clock_does_not_grow() -> None:
+    _, clock = looked(np.arange(0.0, 100.0, 0.01).tolist())
+    assert len(clock.ticks) <= 101  # a second of looks
+
+
+def pose(x: float = 0.0, z: float = 0.05) -> Floats:
+    """Return a level finger's pose, m."""
+    return np.array([x, 0.0, z, *LEVEL])
+
+
+def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
+    start, end = pose(), np.array([0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0])
+    path = way(start, end, 7)
+    assert path.shape == (8, 7)
+    assert np.array_equal(path[0], start)
+    np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(np.diff(path[:, :3], axis=0), [(end - start)[:3] / 7] * 7, atol=1e-16)
+
+
+def test_ways_worked_out_together_are_those_worked_out_one_by_one() -> None:
+    random = np.random.default_rng(2)
+    poses = random.normal(size=(40, 7))
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1)[:, None]
+    parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
+    alone = [between(a, b, parts) for a, b in pairwise(poses)]
+    assert np.array_equal(along(poses, parts), alone)
+
+
+def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() -> None:
+    poses = np.concatenate([way(pose(), pose(z=0.035), 40), way(pose(z=0.035), pose(0.01, 0.035), 50)[1:]])
+    *_, together = lived(SYSTEM, begin(SYSTEM), poses)
+    state = begin(SYSTEM)
+    for first in range(0, 90, 7):
+        *_, state = lived(SYSTEM, state, poses[first : first + 8])
+    assert packed(SYSTEM, state) == packed(SYSTEM, together)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ((0.0, 0.0, -50.0), (0.0, 0.0, 0.0)),
+        ((1e9, -1e9, 1e9), (100.0, -100.0, 100.0)),
+        ((0.01, 0.02, 0.03), (0.01, 0.02, 0.03)),
+    ],
+)
+def test_a_finger_stays_where_a_finger_can_be(given: tuple[float, ...], wanted: tuple[float, ...]) -> None:
+    at = pose()
+    at[:3] = given
+    assert reachable(at, 0.1)[:3].tolist() == list(wanted)
+
+
+def test_a_trace_never_holds_more_than_its_rows() -> None:
+    trace = begun(PERIOD)
+    state = begin(SYSTEM)
+    for time in range(5 * ROWS):
+        line = row(SYSTEM, state, 0.4, ())
+        line[0] = time
+        trace = extended(trace, [line])
+    assert len(trace.rows) == ROWS
+    assert trace.time[0] == 4 * ROWS
+
+
+def test_a_trace_spans_ten_seconds_also_with_a_short_control_period() -> None:
+    assert begun(1e-4).every * 1e-4 * ROWS >= 10.0
+
+
+def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
+    press = path((0, 0, 0, 42), (0.2, 0, 0, 36))
+    system = assemble(resolve({}))
+    *_, state = periods(system, press, begin(system), 60)
+    middle, corner = 312, 0
+    assert np.isin([middle, corner], state.gathered.cells).tolist() == [True, False]
+    trace = picked(begun(PERIOD), [middle, corner], system.grid.count)
+    trace = extended(trace, [row(system, state, 0.4, trace.pins)])
+    assert trace.heights.tolist() == [[state.row(0)[middle], state.row(0)[corner]]]
+    assert trace.force[0] == pytest.approx(state.row(system.rows.force).sum(), rel=1e-12)
+    assert trace.force[0] > 0.1
+    assert (trace.time[0], trace.set_point[0]) == (60 * PERIOD, 0.4)
+
+
+def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
+    trace = extended(begun(PERIOD), [row(SYSTEM, begin(SYSTEM), None, ())])
+    assert np.isnan(trace.set_point).all()
+
+
+def test_a_pin_that_stays_picked_keeps_its_past() -> None:
+    trace = picked(begun(PERIOD), [3, 4], 121)
+    trace = extended(trace, [row(SYSTEM, begin(SYSTEM), 0.4, trace.pins)])
+    other = picked(trace, [9, 4, 500, -1], 121)
+    assert other.pins == (9, 4)
+    assert np.isnan(other.heights[0, 0])
+    assert other.heights[0, 1] == trace.heights[0, 1]
+
+
+def test_time_that_goes_back_takes_the_trace_along() -> None:
+    trace = extended(begun(PERIOD), [[float(time)] + [0.0] * 8 for time in range(10)])
+    assert extended(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def shadowed(count: int, finger: Floats, step: str = "1 ms") -> list[LiveErrors]:
+    """Return the errors a session's shadow finds."""
+    table = {"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}}
+    scene = resolve(table)
+    system, shadow, found = assemble(scene), cast(scene), []
+    assert shadow is not None
+    start = begin(system)
+    shadow = cast_from(shadow, start)
+    for index, state in enumerate(lived(system, start, finger)):
+        shadow, errors = compared(shadow, state, finger[index : index + 2])
+        shadow = cast_from(shadow, state)
+        found += [errors] if errors else []
+    assert index == count - 1
+    return found
+
+
+def test_a_shadow_comes_along_for_a_stretch_now_and_then() -> None:
+    count = 2 * (STRETCH + PAUSE) + STRETCH
+    assert len(shadowed(count, way(pose(), pose(z=0.05), count))) == 3
+
+
+def test_the_shadow_finds_the_error_of_a_stretch() -> None:
+    # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
+    # before them changed, so it is no more than the right size that is asked for.
+    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    (found,) = shadowed(STRETCH, finger)
+    fine = assemble(
+        resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "0.05 ms"}})
+    )
+    *_, exact = lived(fine, begin(fine), finger)
+    *_, state = lived(SYSTEM, begin(SYSTEM), finger)
+    error = np.abs(exact.row(0) - state.row(0)).max()
+    assert 0.3 * error < found.height < 3.0 * error
+    assert error > 1e-9
+
+
+def test_a_finer_step_has_smaller_errors() -> None:
+    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    coarse, fine = shadowed(STRETCH, finger)[0], shadowed(STRETCH, finger, "0.25 ms")[0]
+    # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
+    assert fine.height < coarse.height / 8
+    assert fine.force < coarse.force / 8
+
+
+def test_a_shadow_leaves_the_session_alone() -> None:
+    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    *_, alone = lived(SYSTEM, begin(SYSTEM), finger)
+    shadow, start = cast(SCENE), begin(SYSTEM)
+    assert shadow is not None
+    shadow = cast_from(shadow, start)
+    for index, state in enumerate(lived(SYSTEM, start, finger)):
+        shadow, _ = compared(shadow, state, finger[index : index + 2])
+    assert packed(SYSTEM, state) == packed(SYSTEM, alone)
+    assert felt(SYSTEM, state) > 0.0
+
+
+def test_a_step_that_cannot_be_halved_casts_no_shadow() -> None:
+    table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
+    assert cast(resolve(table)) is None

@@ -1,0 +1,296 @@
+"""A running session follows the finger, goes back, and is recorded so that it can be played again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay import running, sculpting
+from digiclay.core.errors import DigiclayError
+from digiclay.core.fingertip import LEVEL
+from digiclay.core.keeping import packed, unpacked
+from digiclay.core.live import lived
+from digiclay.core.scene_table import resolve
+from digiclay.running import Running
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+SIZES = {"rows": 15, "columns": 15}
+SCENE = resolve({"layout": SIZES})
+TICK = 1 / 30
+
+
+def pose(x: float = 0.0, z: float = 46.0) -> Floats:
+    """Return a level finger's pose, in mm."""
+    return np.array([x * 1e-3, 0.0, z * 1e-3, *LEVEL])
+
+
+def started() -> Running:
+    """Return a session at its beginning, its clock started."""
+    session, said = sculpting.begun(7, "Bed", SCENE, pose())
+    assert said == ""
+    return sculpting.advanced(session, pose(), 0.0, 100)
+
+
+class Hand:
+    """Moves the finger, in mm, while time goes by."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def move(self, session: Running, poses: Iterable[tuple[float, float]]) -> Running:
+        """Advance tick by tick."""
+        for x, z in poses:
+            self.now += TICK
+            session = sculpting.advanced(session, pose(x, z), self.now, 100)
+        return session
+
+    def press(self, session: Running, x: float = 0.0) -> Running:
+        """Press at a place and lift off again."""
+        down, up = np.linspace(46, 37, 10), np.linspace(37, 46, 10)
+        return self.move(session, [(x, z) for z in (*down, *[37] * 10, *up, *[46] * 20)])
+
+
+def heights(session: Running) -> Floats:
+    """Return the pin tops."""
+    return session.state.row(0)
+
+
+def test_a_press_forms_the_bed_as_it_goes_on() -> None:
+    hand, session = Hand(), started()
+    seen = []
+    for z in np.linspace(46, 37, 10):
+        session = hand.move(session, [(0.0, z)] * 3)
+        seen.append(heights(session).min())
+    assert seen[0] == 40e-3
+    assert (np.diff(seen)[-3:] < 0).all()
+
+
+def test_simulated_time_is_the_walls() -> None:
+    hand, session = Hand(), started()
+    session = hand.move(session, [(0.0, 46.0)] * 300)
+    assert session.state.period == pytest.approx(300 * TICK / 5e-3, abs=1)
+    assert session.factor == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_paused_session_stands_still_and_goes_on_without_catching_up() -> None:
+    hand = Hand()
+    session = replace(hand.move(started(), [(0.0, 39.0)] * 5), paused=True)
+    before = session.state.period
+    session = hand.move(session, [(0.0, 39.0)] * 100)
+    assert (session.state.period, session.factor) == (before, 0.0)
+    session = hand.move(replace(session, paused=False), [(0.0, 39.0)] * 2)
+    assert session.state.period <= before + 7
+
+
+def test_a_single_step_is_one_control_period() -> None:
+    hand, session = Hand(), started()
+    session = hand.move(session, [(0.0, 39.0)] * 5)
+    before = session.state.period
+    session = hand.move(sculpting.stepped(session), [(0.0, 39.0)] * 10)
+    assert (session.state.period, session.paused) == (before + 1, True)
+
+
+def test_rewinding_takes_back_one_gesture_after_the_other() -> None:
+    hand, session = Hand(), started()
+    rest = heights(session)
+    once = hand.press(session, -9.0)
+    first = heights(once)
+    twice = hand.press(once, 9.0)
+    assert len(twice.gestures) == 2
+    assert np.abs(heights(twice) - first).max() > 1e-3
+    back = sculpting.rewound(twice)
+    np.testing.assert_allclose(heights(back), first, rtol=0, atol=1e-5)  # pins were still coming to rest
+    back = sculpting.rewound(back)
+    assert np.array_equal(heights(back), rest)
+    assert sculpting.rewound(back) is back
+
+
+def test_rewinding_puts_the_finger_where_the_gesture_began() -> None:
+    hand = Hand()
+    session = hand.press(hand.press(started(), -9.0), 9.0)
+    assert sculpting.rewound(session).pose[2] > 40e-3
+
+
+def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
+    hand, session = Hand(), started()
+    session = hand.move(session, [(0.0, z) for z in np.linspace(46, 38, 20)])
+    assert len(session.gestures) == 1
+    session = hand.move(session, [(0.0, 38.0)] * 30 + [(x, 38.0) for x in np.linspace(0, 5, 10)])
+    assert len(session.gestures) == 2
+    assert len(hand.move(session, [(5.0, 38.0)] * 30).gestures) == 2
+
+
+def test_gestures_kept_do_not_grow_in_number() -> None:
+    hand, session = Hand(), started()
+    for _ in range(sculpting.GESTURES + 3):
+        session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
+    assert len(session.gestures) == sculpting.GESTURES
+
+
+def test_a_gesture_goes_on_after_rewinding_it() -> None:
+    hand = Hand()
+    session = sculpting.rewound(hand.press(started()))
+    session = hand.press(session)
+    assert len(session.gestures) == 1
+
+
+def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
+    hand = Hand()
+    session = hand.press(started())
+    formed = heights(session)
+    back = sculpting.reset(session, pose())
+    assert (heights(back) == 40e-3).all()
+    assert back.state.period == 0
+    assert np.array_equal(heights(sculpting.rewound(back)), formed)
+
+
+def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
+    hand = Hand()
+    session = hand.press(started())
+    kept = session.kept
+    back = sculpting.restored(hand.press(session, 6.0), kept, pose())
+    assert packed(back.system, back.state) == kept
+    assert len(back.gestures) == 1
+
+
+def test_undo_to_before_the_first_start_finds_a_bed_at_rest() -> None:
+    session = Hand().press(started())
+    assert (heights(sculpting.restored(session, None, pose())) == 40e-3).all()
+
+
+def test_a_bed_goes_on_from_what_was_kept() -> None:
+    session = Hand().press(started())
+    other, said = sculpting.begun(8, "Copy", SCENE, pose(), session.kept)
+    assert said == ""
+    assert packed(other.system, other.state) == session.kept
+
+
+def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:
+    session = Hand().press(started())
+    other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
+    later, said = sculpting.begun(8, "Copy", other, pose(), session.kept)
+    assert np.array_equal(heights(later), heights(session))
+    assert "heights were taken up" in said
+
+
+@pytest.mark.parametrize("kept", [b"nothing", b""])
+def test_a_kept_state_that_cannot_be_used_begins_at_rest_and_says_so(kept: bytes) -> None:
+    session, said = sculpting.begun(7, "Bed", SCENE, pose(), kept)
+    assert (heights(session) == 40e-3).all()
+    assert "begins at rest" in said
+
+
+def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
+    hand = Hand()
+    session = hand.move(started(), [(0.0, 38.0)] * 10)
+    other = resolve({"layout": SIZES, "control": {"force_setpoint": 0.8}})
+    later, said = sculpting.adapted(session, other)
+    assert (said, later.kept) == ("", session.kept)
+    assert hand.move(later, [(0.0, 38.0)] * 30).trace.set_point[-1] == 0.8
+
+
+def test_nothing_changes_where_no_parameter_has() -> None:
+    session = started()
+    assert sculpting.adapted(session, resolve({"layout": SIZES}))[0] is session
+
+
+def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
+    hand = Hand()
+    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = hand.press(hand.press(session), 6.0)
+    keep = session.recording
+    assert keep is not None
+    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
+    assert packed(session.system, again) == session.kept
+
+
+def test_undo_shortens_a_recording_to_what_led_there() -> None:
+    hand = Hand()
+    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = hand.press(session)
+    kept, moment, at = session.kept, session.moment, session.pose
+    session = sculpting.restored(hand.press(session, 6.0), kept, at, moment)
+    session = hand.press(session, 3.0)
+    keep = session.recording
+    assert keep is not None
+    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
+    assert packed(session.system, again) == session.kept
+
+
+def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
+    hand = Hand()
+    session = sculpting.recording(started(), True)
+    early = hand.press(session)
+    here = early.kept, early.pose, early.moment
+    late = hand.press(early, 6.0)
+    there = late.kept, late.pose, late.moment
+    session = hand.press(sculpting.restored(late, *here), -6.0)
+    assert sculpting.restored(session, *there).path is None
+
+
+def test_a_long_recording_copies_itself_seldom() -> None:
+    session = sculpting.recording(started(), True)
+    keep, arrays = session.recording, set()
+    assert keep is not None
+    for moment in range(5000):
+        keep = keep.extended(np.zeros((7, 7)), moment)
+        arrays.add(id(keep.rows))
+    assert len(keep.path) == 35001
+    assert len(arrays) < 12
+
+
+def test_a_finger_far_below_the_floor_or_far_away_does_no_harm() -> None:
+    hand, session = Hand(), started()
+    session = hand.move(session, [(0.0, -1e9), (1e12, -1e9), (0.0, 1e9), (0.0, 46.0)])
+    assert np.isfinite(heights(session)).all()
+    assert heights(session).min() >= 0.0
+
+
+def test_a_step_too_long_to_halve_has_no_error_estimate() -> None:
+    table = {
+        "simulation": {"control_period": "1 s"},
+        "layout": SIZES,
+        "control": "absent",
+    }
+    session, _ = sculpting.begun(7, "Bed", resolve(table), pose())
+    session = sculpting.advanced(session, pose(), 0.0, 9)
+    assert sculpting.advanced(session, pose(z=39.0), 2.0, 9).errors is None
+
+
+def test_an_error_estimate_is_there_after_a_second() -> None:
+    session = Hand().move(started(), [(0.0, 39.0)] * 40)
+    assert session.errors is not None
+    assert 0.0 < session.errors.height < 1e-4
+
+
+def test_scenes_whose_parts_do_not_go_together_are_refused() -> None:
+    table = {
+        "layout": SIZES,
+        "control": {"method": "shape_display", "amplitude": "1 m"},
+    }
+    with pytest.raises(DigiclayError, match="amplitude"):
+        sculpting.adapted(started(), resolve(table))
+
+
+class Bed:
+    """What is known of an object of Blender's."""
+
+    def __init__(self, uid: int) -> None:
+        self.session_uid = uid
+
+
+def test_a_session_is_found_by_its_bed_until_it_is_dropped() -> None:
+    session = started()
+    running.put(session)
+    try:
+        assert running.of(Bed(7)) is session
+        assert running.all() == (session,)
+        assert running.of(Bed(8)) is None
+        assert running.of(None) is None
+    finally:
+        assert running.drop(7) is session
+    assert running.all() == ()
+    assert running.drop(7) is None
