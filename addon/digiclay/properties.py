@@ -18,7 +18,7 @@ from .core.scene_table import ABSENT, resolve
 from .settings_group import CLASSES, SETTINGS
 from .settings_words import named
 
-__all__ = ["adopt", "part_group", "register", "scene_of", "table_of", "unregister"]
+__all__ = ["adopt", "described", "part_group", "register", "scene_of", "table_of", "unregister"]
 
 
 def scene_of(bed: Any) -> Scene:
@@ -33,15 +33,20 @@ def scene_of(bed: Any) -> Scene:
     ParameterError
         Its owner and field are those of the panels.
     """
-    try:
-        scene = resolve(table_of(bed))
-    except ParameterError as error:
-        raise named(error) from None
+    scene = described(bed)
     pins = len(bed.data.vertices)
     if scene.cells != pins:
         rule, remedy = f"must give the {pins} pins the bed has", "Press Rebuild in the Device panel."
-        raise ParameterError("Device: Layout", "", rule, str(scene.cells), remedy)
+        raise ParameterError("Layout", "", rule, str(scene.cells), remedy)
     return scene
+
+
+def described(bed: Any) -> Scene:
+    """Return the scene a bed's settings describe, whatever the bed looks like by now; as `scene_of`."""
+    try:
+        return resolve(table_of(bed))
+    except ParameterError as error:
+        raise named(error) from None
 
 
 def table_of(bed: Any) -> dict[str, Any]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import operators, panels, properties
+from . import command_line, operators, panels, preferences, properties
 
 __all__ = ["MODULES", "register", "unregister"]
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (
     properties,
+    preferences,
     operators,
     panels,
+    command_line,
 )
 
 

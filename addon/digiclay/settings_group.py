@@ -5,15 +5,16 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from . import bridge, view
 from .compat import bpy
 from .core.methods import METHODS
 from .core.quantity import quantities
 from .core.scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
 from .core.scene_table import HEXAGONAL_SHARE, PRESETS
 from .property_groups import Update, group, title
-from .settings_table import assign, reset
+from .settings_table import assign, read, reset
 
-__all__ = ["CLASSES", "PLAIN", "SETTINGS"]
+__all__ = ["CLASSES", "PLAIN", "PRESET_WORDS", "SETTINGS", "method_items"]
 
 #: Sections whose parameters are the same whatever the method.
 PLAIN = tuple(section for section in SECTIONS if section != "control")
@@ -62,8 +63,20 @@ def take_arrangement(layout: Any, context: Any) -> None:
         reset(settings.contact, kind, "share")
 
 
+def take_size(fingertip: Any, context: Any) -> None:
+    """Show the fingertip in its new size."""
+    bed = fingertip.id_data
+    tip = view.fingertip_of(bed)
+    kind = parameters("fingertip", bed.digiclay.method)
+    if tip is not None:
+        bridge.resize_fingertip(tip, kind(**read(fingertip, kind, {}, "fingertip")))
+
+
 #: What happens after a change, by section and field.
-UPDATES: dict[str, dict[str, Update]] = {"layout": {"arrangement": take_arrangement}}
+UPDATES: dict[str, dict[str, Update]] = {
+    "layout": {"arrangement": take_arrangement},
+    "fingertip": dict.fromkeys(("length", "width", "height"), take_size),
+}
 
 
 def method_items() -> list[tuple[str, str, str]]:
@@ -122,6 +135,9 @@ SETTINGS = made(
             items=method_items(),
             default="virtual_master",
             update=take_method,
+        ),
+        "own_preset": bpy.props.StringProperty(
+            name="Own Preset", description="The preset of your own that was applied last", options={"HIDDEN"}
         ),
         "notes": bpy.props.StringProperty(options={"HIDDEN"}),
         **use_properties(),

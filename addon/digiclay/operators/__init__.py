@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import add_bed, import_run
+from . import add_bed, import_run, presets, rebuild
 
 __all__ = ["register", "unregister"]
 
-CLASSES = (add_bed.AddBed, import_run.ImportRun)
-MENUS = (("VIEW3D_MT_mesh_add", add_bed.entry), ("TOPBAR_MT_file_import", import_run.entry))
+CLASSES: tuple[type, ...] = (
+    add_bed.AddBed,
+    import_run.ImportRun,
+    presets.ApplyPreset,
+    presets.SavePreset,
+    presets.RemovePreset,
+    rebuild.Rebuild,
+)
+#: Entries in Blender's own menus: the menu, and the function that draws the entry.
+MENUS = (
+    ("VIEW3D_MT_mesh_add", add_bed.entry),
+    ("TOPBAR_MT_file_import", import_run.entry),
+)
 
 
 def register() -> None:

@@ -3,18 +3,35 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import view
+from .. import own_presets, palettes, preferences, properties, view
 from ..compat import bpy
 from ..core.actuator import Actuator
 from ..core.errors import DigiclayError
+from ..core.fingertip import Fingertip
 from ..core.layout import Layout
+from ..core.methods import METHODS
+from ..core.scene import Scene
+from ..core.scene_table import PRESETS
+from ..devices import device
 from ..instant import Instant
+from ..property_groups import title
+from ..settings_group import PRESET_WORDS, method_items
+from ..shown_units import SHOWN, si
 
-__all__ = ["AddBed", "entry", "select_only", "stand_at_cursor"]
+__all__ = ["AddBed", "add", "entry", "select_only", "stand_at_cursor"]
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400
+#: Blender keeps no reference to the texts of a list that is made on demand: this one does.
+OFFERED: list[tuple[str, str, str]] = []
+
+
+def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
+    """Return the core's presets and the user's own."""
+    OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
+    OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
+    return OFFERED
 
 
 class AddBed(bpy.types.Operator):  # type: ignore[misc]
@@ -22,7 +39,7 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
 
     bl_idname = "mesh.digital_clay_add"
     bl_label = "Digital Clay"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012
 
     rows: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Rows", description="Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST
@@ -50,6 +67,24 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
         ],
         default=DEFAULT.arrangement,
     )
+    method: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Method",
+        description="How the cells are controlled",
+        items=method_items(),
+        default=next(iter(METHODS)),
+    )
+    preset: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Preset", description="Fluid, valves and whatever else a preset of your own sets", items=offered
+    )
+    scale: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="1 mm Shown as (cm)",
+        description="How large the device is drawn: centimetres in Blender for a millimetre of the device",
+        default=1.0,
+        min=0.001,
+        soft_min=0.1,
+        soft_max=10.0,
+        max=1000.0,
+    )
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -63,22 +98,36 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
         """Build the device at the 3D cursor."""
         try:
             layout = Layout(
-                rows=self.rows, columns=self.columns, pitch=self.pitch * 1e-3, arrangement=self.arrangement
+                rows=self.rows,
+                columns=self.columns,
+                pitch=si(self.pitch, SHOWN["m"][1]),
+                arrangement=self.arrangement,
             )
-            instant = Instant.at_rest(layout)
+            bed = add(context, device(self.preset, layout, self.method))
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        bed = view.build(instant, context.collection, lowest=0.0)
+        bed.scale = (self.scale,) * 3
         stand_at_cursor(context, bed)
         select_only(context, bed)
         return {"FINISHED"}
 
 
+def add(context: Any, scene: Scene) -> Any:
+    """Add the device of a scene, at rest, in the context's collection; return its bed."""
+    instant = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
+    coloured = palettes.worn()
+    bed = view.build(instant, context.collection, lowest=0.0)
+    if not coloured:
+        palettes.wear(preferences.of(context).palette)
+    properties.adopt(bed, scene)
+    return bed
+
+
 def stand_at_cursor(context: Any, bed: Any) -> None:
     """Put the housing's underside on the 3D cursor."""
     bed.location = context.scene.cursor.location
-    bed.location.z -= view.underside(bed)
+    bed.location.z -= view.underside(bed) * bed.scale.z
 
 
 def select_only(context: Any, bed: Any) -> None:

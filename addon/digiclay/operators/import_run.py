@@ -4,9 +4,10 @@
 from pathlib import Path
 from typing import Any
 
-from .. import view
+from .. import properties, view
 from ..compat import bpy
 from ..core.errors import DigiclayError
+from ..core.scene_file import load
 from ..instant import read
 from .add_bed import select_only, stand_at_cursor
 
@@ -36,11 +37,13 @@ class ImportRun(bpy.types.Operator):  # type: ignore[misc]
     def execute(self, context: Any) -> set[str]:
         """Read the run and build the bed at the 3D cursor."""
         try:
-            instant = read(Path(bpy.path.abspath(self.filepath)), self.row)
+            path = Path(bpy.path.abspath(self.filepath))
+            instant, scene = read(path, self.row), load(path.with_name("scene.toml"))
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         bed = view.build(instant, context.collection, lowest=0.0)
+        properties.adopt(bed, scene)
         stand_at_cursor(context, bed)
         select_only(context, bed)
         return {"FINISHED"}

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from ..compat import bpy
+from . import control, device, finger
 
 __all__ = ["register", "unregister"]
 
 #: In the order they are drawn, each with a `bl_order` of its own: device 10, finger 20, control 30,
 #: session 40, display 50, shapes 60, takes 70, export 80.
-CLASSES: tuple[type, ...] = ()
+CLASSES: tuple[type, ...] = (
+    *device.CLASSES,
+    *finger.CLASSES,
+    *control.CLASSES,
+)
 
 
 def register() -> None:

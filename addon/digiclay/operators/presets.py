@@ -1,0 +1,133 @@
+"""Presets of a device: applying one, saving one's own, removing one's own."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from dataclasses import replace
+from typing import Any
+
+from .. import own_presets, properties, running
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..core.scene_file import load
+from ..core.scene_table import PRESETS
+from ..devices import laid_out
+from ..panels.base import bed_of
+from ..settings_group import PRESET_WORDS
+
+__all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
+
+
+class ApplyPreset(bpy.types.Operator):  # type: ignore[misc]
+    """Set the bed's parameters to those of a preset; its layout stays"""
+
+    bl_idname = "digiclay.preset_apply"
+    bl_label = "Apply Digital Clay Preset"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # noqa: RUF012
+
+    preset: bpy.props.StringProperty(name="Preset")  # type: ignore[valid-type]
+
+    @classmethod
+    def description(cls, context: Any, chosen: Any) -> str:
+        """Say what the preset is."""
+        return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed, and no session that runs with other parameters."""
+        bed = bed_of(context)
+        if bed is not None and running.of(bed) is not None:
+            cls.poll_message_set("Stop the session first: it runs with the parameters it began with")
+            return False
+        return _on_a_bed(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Set the parameters."""
+        bed = bed_of(context)
+        settings = bed.digiclay
+        try:
+            if self.preset in PRESETS:
+                settings.preset, settings.own_preset = self.preset, ""
+            else:
+                layout = properties.described(bed).layout
+                properties.adopt(bed, laid_out(load(own_presets.path(self.preset)), layout))
+                settings.own_preset = self.preset
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class SavePreset(bpy.types.Operator):  # type: ignore[misc]
+    """Save the bed's parameters as a preset of your own, for other beds and files"""
+
+    bl_idname = "digiclay.preset_save"
+    bl_label = "Save Digital Clay Preset"
+
+    name: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Name",
+        description="What the preset is called; one of that name is replaced",
+        maxlen=own_presets.LONGEST,
+    )
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed."""
+        return _on_a_bed(cls, context)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask for the name."""
+        self.name = bed_of(context).digiclay.own_preset
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: Any) -> set[str]:
+        """Save it."""
+        bed = bed_of(context)
+        try:
+            file = own_presets.save(self.name, replace(properties.described(bed), name=self.name.strip()))
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        bed.digiclay.own_preset = file.stem
+        self.report({"INFO"}, f"Saved as {file}")
+        return {"FINISHED"}
+
+
+class RemovePreset(bpy.types.Operator):  # type: ignore[misc]
+    """Remove the preset of your own that was applied last"""
+
+    bl_idname = "digiclay.preset_remove"
+    bl_label = "Remove Digital Clay Preset"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A preset of the user's own must be the bed's: the core's cannot be removed."""
+        if not _on_a_bed(cls, context):
+            return False
+        name = bed_of(context).digiclay.own_preset
+        if name not in own_presets.names():
+            cls.poll_message_set("Apply a preset of your own first: those that come along cannot be removed")
+            return False
+        return True
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Make sure."""
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, context: Any) -> set[str]:
+        """Remove it; the bed keeps its parameters."""
+        settings = bed_of(context).digiclay
+        try:
+            own_presets.remove(settings.own_preset)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Removed the preset {settings.own_preset}")
+        settings.own_preset = ""
+        return {"FINISHED"}
+
+
+def _on_a_bed(operator: Any, context: Any) -> bool:
+    """Tell whether a bed is active; say so when none is."""
+    if bed_of(context) is None:
+        operator.poll_message_set("Select a bed or its fingertip first")
+        return False
+    return True

@@ -1,0 +1,98 @@
+"""What a user sets once for all beds: how often the view is drawn, its colours, how far a tick catches up."""
+
+# No postponed annotations here: Blender reads the preferences' properties from them.
+from dataclasses import dataclass
+from typing import Any
+
+from . import palettes
+from .compat import bpy
+
+__all__ = ["Choices", "Preferences", "of", "register", "unregister"]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """The preferences of somebody who has set none.
+
+    Attributes
+    ----------
+    redraw_rate : int
+        How often a running session is drawn, Hz, at most.
+    most_periods : int
+        Control periods a tick simulates, at most: what a slow machine does not manage is dropped.
+    palette : str
+        A key of `palettes.PALETTES`.
+    """
+
+    redraw_rate: int = 30
+    most_periods: int = 20
+    palette: str = palettes.DEFAULT
+
+
+def take_palette(preferences: Any, context: Any) -> None:
+    """Recolour the beds of the open file."""
+    palettes.wear(preferences.palette)
+
+
+class Preferences(bpy.types.AddonPreferences):  # type: ignore[misc]
+    """Edit > Preferences > Add-ons > Digital Clay."""
+
+    bl_idname = __package__
+
+    redraw_rate: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Redraw Rate (Hz)",
+        description="How often a running session is drawn at most, in Hz; drawing is what costs most",
+        default=Choices.redraw_rate,
+        min=1,
+        max=240,
+        soft_min=10,
+        soft_max=60,
+    )
+    most_periods: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Periods per Redraw",
+        description=(
+            "Control periods simulated between two redraws at most. A machine that does not manage them "
+            "runs the session slower than real time instead of stalling"
+        ),
+        default=Choices.most_periods,
+        min=1,
+        max=1000,
+        soft_max=100,
+    )
+    palette: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Mode Colours",
+        description="Colours of the control modes; choosing one recolours the beds of the open file",
+        items=[(name, *words) for name, words in palettes.WORDS.items()],
+        default=Choices.palette,
+        update=take_palette,
+    )
+
+    def draw(self, context: Any) -> None:
+        """Draw the preferences."""
+        column = self.layout.column()
+        column.use_property_split = True
+        column.prop(self, "redraw_rate")
+        column.prop(self, "most_periods")
+        column.prop(self, "palette")
+
+
+def of(context: Any) -> Any:
+    """Return the user's preferences; where the package is used without being enabled, the defaults.
+
+    Returns
+    -------
+    Preferences or Choices
+        With the same attributes.
+    """
+    entry = context.preferences.addons.get(__package__)
+    return Choices() if entry is None or entry.preferences is None else entry.preferences
+
+
+def register() -> None:
+    """Register the preferences."""
+    bpy.utils.register_class(Preferences)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    bpy.utils.unregister_class(Preferences)
