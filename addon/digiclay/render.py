@@ -8,10 +8,11 @@ from typing import Any
 
 from . import stage, view
 from .compat import bpy, has_denoiser, quiet, scratch
-from .core.errors import DigiclayError, OutputError
+from .core.errors import OutputError
+from .core.shots import Picture, Still
 from .instant import Instant
 
-__all__ = ["ENGINES", "still"]
+__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "still"]
 
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
@@ -26,6 +27,8 @@ def still(
     engine: str = "cycles",
     samples: int = 6,
     denoise: bool = True,
+    colour: str = "mode",
+    arrows: bool = False,
 ) -> Path:
     """Draw an instant into a PNG file.
 
@@ -44,6 +47,10 @@ def still(
         Samples per pixel of Cycles; more is smoother and slower in proportion.
     denoise : bool, optional
         Smooth what few samples leave, where Blender was built with Cycles' denoiser.
+    colour : {"mode", "force"}, optional
+        What the colour of a pin tells.
+    arrows : bool, optional
+        Draw the force on each pin as an arrow.
 
     Returns
     -------
@@ -52,27 +59,21 @@ def still(
 
     Raises
     ------
+    ParameterError
+        On an unknown engine, or a size that makes no picture.
     OutputError
         When the file cannot be written.
     """
-    if engine not in ENGINES:
-        raise DigiclayError(f"render.engine must be one of {', '.join(ENGINES)} (got {engine!r}).")
-    if min(width, height, samples) < 1:
-        size = f"{width} x {height} at {samples}"
-        raise DigiclayError(f"render.size must be at least 1 x 1 pixels at 1 sample (got {size}).")
-    partial = out.with_name(f".{out.name}.partial.png")
+    looks = Still(width=width, height=height, engine=engine, samples=samples, colour=colour, arrows=arrows)
+    partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        partial.touch()
         with scratch():
-            scene = bpy.data.scenes.new("Digital Clay Still")
-            _settings(scene, partial, (width, height), engine, samples, denoise)
+            scene = picture_scene("Digital Clay Still", looks, denoise=denoise)
             bed = view.build(instant, scene.collection)
+            dress(bed, looks)
             stage.set_up(scene, bed, instant)
-            with quiet():
-                bpy.ops.render.render(write_still=True, scene=scene.name)
-        if not partial.stat().st_size:
-            raise OutputError(f"{out} cannot be written: Blender gave no picture.")
+            draw(scene, partial)
         os.replace(partial, out)
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
@@ -81,36 +82,80 @@ def still(
     return out
 
 
-def _settings(
-    scene: Any, path: Path, size: tuple[int, int], engine: str, samples: int, denoise: bool
-) -> None:
-    """Set what decides the picture besides the scene's contents."""
-    render = scene.render
+def dress(bed: Any, looks: Picture) -> None:
+    """Colour the pins as asked, and show arrows or not."""
+    view.colour_by(bed, looks.colour)
+    view.show_arrows(bed, looks.arrows)
+
+
+def draw(scene: Any, path: Path) -> None:
+    """Draw a scene into a PNG file.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    scene.render.filepath = str(path)
+    try:
+        path.touch()
+        with quiet():
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        if not path.stat().st_size:
+            raise OutputError(f"{path} cannot be written: Blender gave no picture.")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from None
+    except RuntimeError as error:
+        raise OutputError(f"{path} cannot be drawn: {' '.join(str(error).split())}") from None
+
+
+def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
+    """Add a scene with all that decides a picture besides the scene's contents."""
+    scene = bpy.data.scenes.new(name)
+    render, engine = scene.render, looks.engine
     render.engine = ENGINES[engine]
-    render.resolution_x, render.resolution_y = size
+    render.resolution_x, render.resolution_y = looks.width, looks.height
     render.resolution_percentage = 100
-    render.filepath = str(path)
     render.use_file_extension = False
     render.image_settings.file_format = "PNG"
     render.image_settings.color_mode = "RGB"
     if engine == "cycles":
-        cycles = scene.cycles
-        cycles.device = "CPU"
-        cycles.samples = samples
-        cycles.seed = 0
-        cycles.use_adaptive_sampling = False
-        cycles.max_bounces = 2
-        cycles.use_denoising = denoise and has_denoiser()
-        if cycles.use_denoising:
-            cycles.denoiser = "OPENIMAGEDENOISE"
-            if hasattr(cycles, "denoising_quality"):
-                cycles.denoising_quality = "FAST"
-            cycles.denoising_prefilter = "NONE"
-        cycles.caustics_reflective = cycles.caustics_refractive = False
-        return
-    shading = scene.display.shading
-    scene.display.render_aa = "16"
-    scene.display.light_direction = (0.45, 0.35, 0.82)
+        _cycles(scene.cycles, looks.samples, denoise)
+    else:
+        _workbench(scene.display)
+    return scene
+
+
+def hasten(scene: Any) -> None:
+    """Leave out of a film's frames what costs Workbench most on a machine without a graphics card.
+
+    Shadows are two thirds of a frame, and the second half of the samples can hardly be seen.
+    """
+    scene.display.shading.show_shadows = False
+    scene.display.render_aa = "8"
+
+
+def _cycles(cycles: Any, samples: int, denoise: bool) -> None:
+    """Few samples, no surprises: the same picture each time, on any machine."""
+    cycles.device = "CPU"
+    cycles.samples = samples
+    cycles.seed = 0
+    cycles.use_adaptive_sampling = False
+    cycles.max_bounces = 2
+    cycles.use_denoising = denoise and has_denoiser()
+    if cycles.use_denoising:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+        if hasattr(cycles, "denoising_quality"):
+            cycles.denoising_quality = "FAST"
+        cycles.denoising_prefilter = "NONE"
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+
+
+def _workbench(display: Any) -> None:
+    """Plain colours, with shadows and edges that show slopes."""
+    shading = display.shading
+    display.render_aa = "16"
+    display.light_direction = (0.45, 0.35, 0.82)
     shading.light = "STUDIO"
     shading.color_type = "MATERIAL"
     shading.show_shadows = True

@@ -1,42 +1,77 @@
-"""Everything about a picture but the device: camera, lights, floor, legend."""
+"""Everything about a picture but the device: camera, lights, floor; and the legend before it."""
 
 from __future__ import annotations
 
 import math
-import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import bridge, device_shapes, view
+from . import bridge, view
 from .compat import bpy, shader_nodes
-from .core.modes import COLOURS, MEANINGS, Mode
+from .core.modes import Mode
 from .instant import Instant
+from .legend import Front, of_forces, of_modes
 
-__all__ = ["camera_place", "half_frame", "outline", "set_up"]
+__all__ = ["MARGINS", "camera_place", "half_frame", "outline", "set_up"]
 
 Floats = NDArray[np.float64]
 
 #: Where the camera stands, seen from the bed: angle from x and above the floor, rad.
 AZIMUTH, ELEVATION = math.radians(-62.0), math.radians(43.0)
 LENS, SENSOR = 62.0, 36.0
+Margins = tuple[float, float, float, float]
 #: Parts of the picture's width or height kept free: left, right, below, above.
 MARGINS = (0.25, 0.03, 0.05, 0.05)
-#: sRGB of the floor and of the legend's letters.
-FLOOR, INK, FADED = (0.80, 0.81, 0.82), (0.10, 0.12, 0.15), (0.30, 0.33, 0.37)
+#: sRGB of the floor.
+FLOOR = (0.80, 0.81, 0.82)
 
 
-def set_up(scene: Any, bed: Any, instant: Instant) -> None:
-    """Put camera, lights, floor and legend about a bed that stands at the origin of `scene`."""
-    points = outline(bed)
+def set_up(
+    scene: Any,
+    bed: Any,
+    instant: Instant,
+    *,
+    points: Floats | None = None,
+    modes: Sequence[Mode] | None = None,
+    margins: Margins = MARGINS,
+) -> Front:
+    """Put camera, lights, floor and legend about a bed that stands at the origin of `scene`.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Engine and size of the picture are set.
+    bed : bpy.types.Object
+    instant : Instant
+        What the bed shows.
+    points : ndarray (k, 3), optional
+        What must be seen, Blender units; the bed's outline as it stands when left out.
+    modes : sequence of Mode, optional
+        What the legend explains; the modes present when left out.
+    margins : tuple of float, optional
+        As `MARGINS`.
+
+    Returns
+    -------
+    Front
+        The plane before the camera, for whatever else is to be written there.
+    """
+    points = outline(bed) if points is None else points
     floor = float(points[:, 2].min())
     span = float(np.ptp(points, axis=0).max())
-    camera = _camera(scene, points)
+    camera = _camera(scene, points, margins)
     if scene.render.engine == "CYCLES":
         _floor(scene, floor, 60.0 * span)
     _lights(scene)
-    _legend(scene, camera, instant.modes)
+    front = Front.before(scene, camera, half_frame(scene))
+    if view.coloured_by(bed) == "force":
+        of_forces(front)
+    else:
+        of_modes(front, instant.modes if modes is None else modes)
+    return front
 
 
 def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Floats:
@@ -85,7 +120,7 @@ def outline(bed: Any) -> Floats:
     return np.concatenate(clouds)
 
 
-def _camera(scene: Any, points: Floats) -> Any:
+def _camera(scene: Any, points: Floats, margins: Margins) -> Any:
     """Add the camera that frames the points."""
     data = bpy.data.cameras.new("Digital Clay Camera")
     data.lens, data.sensor_width, data.sensor_fit = LENS, SENSOR, "HORIZONTAL"
@@ -97,7 +132,7 @@ def _camera(scene: Any, points: Floats) -> Any:
     right /= np.linalg.norm(right)
     axes = np.array([right, np.cross(backward, right), backward])
     width, height = half_frame(scene)
-    left, right_, below, above = MARGINS
+    left, right_, below, above = margins
     low = np.array([-width * (1 - 2 * left), -height * (1 - 2 * below)])
     high = np.array([width * (1 - 2 * right_), height * (1 - 2 * above)])
     place = camera_place(points, axes, low, high)
@@ -140,55 +175,3 @@ def _lights(scene: Any) -> None:
     world.color = bridge.linear(FLOOR)[:3]  # what Workbench shows behind everything
     scene.world = world
     scene.view_settings.view_transform = "Standard"
-
-
-def _legend(scene: Any, camera: Any, modes: list[Mode]) -> None:
-    """List the modes present down the picture's left side, each with a dot of its colour."""
-    depth = camera.data.clip_start * 20.0
-    width, height = (half * depth for half in half_frame(scene))
-    size = min(0.056 * height, 0.040 * width)
-    turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
-    disc = device_shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
-    y = 0.86 * height
-    for mode in modes:
-        name, lines = mode.name.lower().replace("_", " "), textwrap.wrap(MEANINGS[mode], 26)
-        for radius, colour, behind in ((0.42, COLOURS[mode], 1.0), (0.47, FADED, 1.001)):
-            dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
-            dot.scale = (radius * size * behind,) * 3
-            at = (-0.94 * width * behind, (y + 0.33 * size) * behind, -depth * behind)
-            _in_front(scene, camera, dot, at, colour)
-        x = -0.94 * width + 0.95 * size
-        _in_front(scene, camera, _letters(name, size), (x, y, -depth), INK)
-        small = 0.70 * size
-        _in_front(scene, camera, _letters("\n".join(lines), small), (x, y - 1.25 * small, -depth), FADED)
-        y -= (1.25 + len(lines)) * small + 1.25 * size
-
-
-def _letters(body: str, size: float) -> Any:
-    """Make a text object."""
-    text = bpy.data.curves.new(body, "FONT")
-    text.body, text.size = body, size
-    return bpy.data.objects.new(body, text)
-
-
-def _in_front(
-    scene: Any, camera: Any, part: Any, at: tuple[float, float, float], colour: tuple[float, float, float]
-) -> None:
-    """Hang something before the camera, where it neither casts nor takes any light."""
-    part.parent, part.location = camera, at
-    part.data.materials.append(_flat(part.name, colour))
-    part.visible_shadow = part.visible_diffuse = part.visible_glossy = False
-    part.display.show_shadows = False
-    scene.collection.objects.link(part)
-
-
-def _flat(name: str, colour: tuple[float, float, float]) -> Any:
-    """Make a material of one colour that no light changes."""
-    material = bpy.data.materials.new(name)
-    material.diffuse_color = bridge.linear(colour)
-    tree = shader_nodes(material)
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value = bridge.linear(colour)
-    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
-    tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
-    return material

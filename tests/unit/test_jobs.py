@@ -8,8 +8,8 @@ import pytest
 from digiclay.core.errors import SceneError
 from digiclay.core.job_outputs import Outputs
 from digiclay.core.jobs import batch, job_outputs
-from digiclay.core.shots import Film, Still, Turntable
 from digiclay.core.scene_file import SAMPLES, load
+from digiclay.core.shots import Film, Still, Turntable
 
 
 def jobs_file(folder: Path, said: str) -> Path:
@@ -88,7 +88,7 @@ def test_values_that_do_not_go_together_make_one_job_with_an_error(tmp_path: Pat
         ('scenes = ["tap"]\n[film]\nspeed = 0', r"film\.speed must be at least 0\.001"),
         ('scenes = ["tap"]\n[film]\nspeed = nan', r"film\.speed must be a finite number"),
         ('scenes = ["tap"]\n[film]\nrate = 2.5', r"film\.rate must be a whole number"),
-        ('scenes = ["tap"]\n[still]\nengine = "eevee"', r"still\.engine must be one of workbench, cycles"),
+        ('scenes = ["tap"]\n[still]\nengine = "eevee"', r"still\.engine must be one of cycles, workbench"),
         ('scenes = ["tap"]\n[turntable]\nframes = 1', r"turntable\.frames must be at least 2"),
         ('scenes = ["tap"]\n[film]\nfps = 3', r"film\.fps must be a known key"),
         ('scenes = ["tap"', r"first\.toml, line 1: "),

@@ -9,8 +9,8 @@ from typing import Any
 
 from .errors import ParameterError
 from .part_table import read_part, refuse_unknown, shown
-from .shots import Film, Still, Turntable
 from .quantity import Parameters, quantities
+from .shots import Film, Still, Turntable
 
 __all__ = ["KEYS", "Outputs", "outputs", "word"]
 

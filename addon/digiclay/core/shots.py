@@ -16,7 +16,7 @@ __all__ = ["COLOURS", "ENGINES", "MOST_FRAMES", "Film", "Picture", "Still", "Tur
 Floats = NDArray[np.float64]
 
 #: What draws, and what colours the pins.
-ENGINES = ("workbench", "cycles")
+ENGINES = ("cycles", "workbench")
 COLOURS = ("mode", "force")
 #: More frames than this are a slip of the keyboard: an hour of film is 90 000.
 MOST_FRAMES = 100_000

@@ -1,0 +1,180 @@
+"""Films show the recorded rows, one after another, and leave nothing behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import film as films
+from digiclay.compat import scratch, strips
+from digiclay.core.errors import OutputError, ParameterError
+from digiclay.core.fingertip import LEVEL
+from digiclay.core.layout import Layout, grid
+from digiclay.core.modes import COLOURS, Mode
+from digiclay.core.shots import Film, Turntable
+from digiclay.instant import Instant
+
+WIDTH, HEIGHT = 160, 100
+SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}
+
+
+@pytest.fixture
+def history() -> dict[str, np.ndarray]:
+    """One second of a bed that turns from one mode into another half way, while the force rises."""
+    bed = grid(Layout(rows=5, columns=5))
+    time = np.linspace(0.0, 1.0, 201)
+    rise = 0.02 * time[:, None] * np.ones(bed.count)
+    mode = np.where(time[:, None] < 0.5, Mode.HOLD, Mode.FORCE_FOLLOW) * np.ones(bed.count)
+    finger = np.zeros((201, 7))
+    finger[:, 2], finger[:, 3:] = 0.050, LEVEL
+    return {
+        "time": time, "position": bed.positions, "height": 0.04 - 0.2 * rise, "mode": mode.astype(np.int8),
+        "force": rise, "total_force": rise.sum(axis=1), "fingertip": finger,
+    }  # fmt: skip
+
+
+def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
+    """Read a film with Blender itself: its rate, and each frame (height, width, 3), the lower row first."""
+    folder.mkdir()
+    with scratch():
+        scene = bpy.data.scenes.new("reading")
+        strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
+        shown = strip.elements[0]
+        scene.render.resolution_x, scene.render.resolution_y = shown.orig_width, shown.orig_height
+        lasts = "duration" if hasattr(strip, "duration") else "frame_final_duration"  # from 5.2 on
+        scene.frame_end, rate = getattr(strip, lasts), shown.orig_fps
+        scene.view_settings.view_transform = "Standard"
+        scene.render.filepath = str(folder / "f")
+        bpy.ops.render.render(animation=True, scene=scene.name)
+        pictures = []
+        for file in sorted(folder.glob("f*.png")):
+            image = bpy.data.images.load(str(file))
+            pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)
+            pictures.append(pixels[:, :, :3])
+    return rate, pictures
+
+
+def looks_like(pixels: np.ndarray, mode: Mode) -> int:
+    """Count pixels of the bed, right of the legend and above the strip, in the direction of a colour."""
+    bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
+    wanted = np.array(COLOURS[mode])
+    cosine = bed @ wanted / np.maximum(np.linalg.norm(bed, axis=1) * np.linalg.norm(wanted), 1e-6)
+    # Blue and vermilion are 70 degrees apart; grey is 25 degrees or more from both.
+    return int((cosine > 0.97).sum())
+
+
+def inventory() -> dict[str, int]:
+    """Count what is in the open file, by kind."""
+    kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
+    found = {k: len(v) for k, v in kinds.items() if isinstance(v, bpy.types.bpy_prop_collection)}
+    return {kind: count for kind, count in found.items() if kind != "images"}  # Blender's own Render Result
+
+
+def test_a_film_shows_the_rows_in_their_colours_at_its_rate(tmp_path: Path, history: Any) -> None:
+    before = inventory()
+    told: list[tuple[int, int]] = []
+    looks = Film(**SMALL, arrows=False)
+    path = films.film(
+        history, tmp_path / "a film.mp4", looks, set_point=0.3, progress=lambda *at: told.append(at)
+    )
+    assert inventory() == before
+    assert told == [(i, 9) for i in range(1, 10)]
+    assert [file.name for file in tmp_path.iterdir()] == ["a film.mp4"]
+    assert path is not None
+    rate, pictures = frames_of(path, tmp_path / "frames")
+    assert (rate, len(pictures), pictures[0].shape) == (8.0, 9, (HEIGHT, WIDTH, 3))
+    blue = [looks_like(picture, Mode.HOLD) for picture in pictures]
+    red = [looks_like(picture, Mode.FORCE_FOLLOW) for picture in pictures]
+    # Frames 0 to 3 are before half a second. A few pixels may be mixtures at edges.
+    assert min(blue[:4]) > 20 * max(max(blue[4:]), 5)
+    assert min(red[4:]) > 20 * max(max(red[:4]), 5)
+
+
+def test_the_strip_fills_up_as_time_goes_on(tmp_path: Path, history: Any) -> None:
+    history["total_force"][:] = 0.3
+    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, arrows=False))
+    assert path is not None
+    _, pictures = frames_of(path, tmp_path / "frames")
+    # Along the strip's lower edge, what has been is blue and what is to come is grey.
+    lower = [picture[6, :, 2] - picture[6, :, 0] > 0.25 for picture in pictures]
+    shares = [np.flatnonzero(row).max(initial=0) / WIDTH for row in lower]
+    # The strip goes from 3 % to 97 % of the width; letters and the cursor are 2 % wide.
+    np.testing.assert_allclose(shares[1:], 0.03 + 0.94 * np.arange(1, 9) / 8, rtol=0, atol=0.03)
+
+
+def test_without_a_strip_the_bed_has_its_place(tmp_path: Path, history: Any) -> None:
+    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, strip=False, stop=0.125, arrows=False))
+    assert path is not None
+    _, pictures = frames_of(path, tmp_path / "frames")
+    assert len(pictures) == 2
+    assert not (pictures[-1][6, :, 2] - pictures[-1][6, :, 0] > 0.25).any()
+
+
+def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: Any) -> None:
+    counts = []
+    for arrows in (False, True):
+        looks = Film(**SMALL, start=0.375, stop=0.45, arrows=arrows, strip=False)
+        path = films.film(history, tmp_path / f"{arrows}.mp4", looks)
+        assert path is not None
+        _, pictures = frames_of(path, tmp_path / f"{arrows}")
+        red = pictures[-1]
+        counts.append(
+            int(
+                (
+                    (red[..., 0] > 0.4)
+                    & (red[..., 1] < 0.5 * red[..., 0])
+                    & (red[..., 2] < 0.5 * red[..., 0])
+                ).sum()
+            )
+        )
+    assert counts[0] < 5 < counts[1]
+
+
+def test_a_bed_coloured_by_force_changes_its_colours_with_the_force(tmp_path: Path, history: Any) -> None:
+    history["force"] = history["force"] * 10.0
+    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, colour="force", arrows=False))
+    assert path is not None
+    _, pictures = frames_of(path, tmp_path / "frames")
+    middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
+    yellow = [int(((p[:, 1] > 0.8 * p[:, 0]) & (p[:, 2] < 0.5 * p[:, 0])).sum()) for p in middle]
+    assert yellow[0] < 5 < yellow[-1] / 10
+
+
+def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: Any) -> None:
+    # One half of the bed is blue: its middle goes round.
+    history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
+    instant = Instant.of(history, -1)
+    path = films.turntable(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
+    assert path is not None
+    _, pictures = frames_of(path, tmp_path / "frames")
+    assert len(pictures) == 4
+    across = []
+    for picture in pictures:
+        blue = picture[:, WIDTH // 4 :, 2] - picture[:, WIDTH // 4 :, 0] > 0.2
+        across.append(np.argwhere(blue).mean(axis=0))
+    turns = np.diff([*across, across[0]], axis=0)
+    # It goes round in four steps like a square: opposite steps are opposite, and none is nothing.
+    assert np.linalg.norm(turns, axis=1).min() > 5.0
+    assert np.all(np.sum(turns[:2] * turns[2:], axis=1) < 0.0)
+
+
+def test_a_film_that_is_stopped_leaves_nothing(tmp_path: Path, history: Any) -> None:
+    asked = iter([False, False, True])
+    assert films.film(history, tmp_path / "film.mp4", Film(**SMALL), stopped=lambda: next(asked)) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_part_that_is_not_in_the_session_is_refused_before_any_work(tmp_path: Path, history: Any) -> None:
+    with pytest.raises(ParameterError, match="start must be between 0 s and 1 s"):
+        films.film(history, tmp_path / "film.mp4", Film(start=3.0))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, history: Any) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
+        films.film(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
+    assert "\n" not in str(caught.value)
