@@ -35,4 +35,5 @@ class Stop:
 
     def __exit__(self, *raised: object) -> None:
         for number, former in self._former.items():
-            signal.signal(number, former)
+            # Python does not know a handler that Blender itself has set, and cannot set it again.
+            signal.signal(number, signal.SIG_DFL if former is None else former)
