@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import command_line, operators, panels, preferences, properties
+from . import command_line, display, operators, panels, preferences, properties
 
 __all__ = ["MODULES", "register", "unregister"]
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (
     properties,
+    display,
     preferences,
     operators,
     panels,

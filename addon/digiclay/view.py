@@ -28,8 +28,9 @@ from .parts import BED, ELLIPSOID, FINGERTIP, HOUSING, ROLE, material
 
 __all__ = [
     "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
-    "arrows_shown", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed", "material",
-    "scale_arrows", "scale_colours", "show", "show_arrows", "show_state", "underside", "wants_force",
+    "arrow_length", "arrows_shown", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed", "is_drawn",
+    "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state", "top_colour",
+    "underside", "wants_force",
 ]  # fmt: skip
 
 #: What the colour of a pin can tell.
@@ -113,6 +114,11 @@ def coloured_by(bed: Any) -> str:
     return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
 
 
+def top_colour(bed: Any) -> float:
+    """Return the force from which on a pin has the last colour, N."""
+    return float(node_setting(_modifier(bed), TOP_FORCE))
+
+
 def scale_colours(bed: Any, top: float) -> None:
     """Set the force from which on a pin has the last colour, N."""
     set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
@@ -132,6 +138,11 @@ def arrows_shown(bed: Any) -> bool:
     return bool(node_setting(_modifier(bed), ARROWS))
 
 
+def arrow_length(bed: Any) -> float:
+    """Return the length of the arrow of 1 N, m of the device."""
+    return float(node_setting(_modifier(bed), ARROW_LENGTH)) * 1e-3
+
+
 def scale_arrows(bed: Any, length: float) -> None:
     """Set the length of the arrow of 1 N, m of the device."""
     set_node_setting(_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
@@ -139,7 +150,12 @@ def scale_arrows(bed: Any, length: float) -> None:
 
 def wants_force(bed: Any) -> bool:
     """Tell whether anything drawn needs the force on each pin."""
-    return _modifier_of(bed) is not None and (arrows_shown(bed) or coloured_by(bed) == "force")
+    return is_drawn(bed) and (arrows_shown(bed) or coloured_by(bed) == "force")
+
+
+def is_drawn(bed: Any) -> bool:
+    """Tell whether the bed still has the modifier that draws its pins."""
+    return _modifier_of(bed) is not None
 
 
 def is_bed(thing: Any) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import add_bed, import_run, presets, rebuild
+from . import add_bed, import_run, pick_pins, presets, rebuild
 
 __all__ = ["register", "unregister"]
 
@@ -14,6 +14,8 @@ CLASSES: tuple[type, ...] = (
     presets.SavePreset,
     presets.RemovePreset,
     rebuild.Rebuild,
+    pick_pins.PickPins,
+    pick_pins.ClearPins,
 )
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import control, device, finger
+from . import control, device, display, finger
 
 __all__ = ["register", "unregister"]
 
@@ -13,6 +13,7 @@ CLASSES: tuple[type, ...] = (
     *device.CLASSES,
     *finger.CLASSES,
     *control.CLASSES,
+    *display.CLASSES,
 )
 
 

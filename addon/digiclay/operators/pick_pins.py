@@ -1,0 +1,96 @@
+"""Pick pins in the view, so that the overlay shows their heights."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from typing import Any
+
+from .. import aim, display
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..panels.base import bed_of
+
+__all__ = ["ClearPins", "PickPins"]
+
+KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
+
+
+class PickPins(bpy.types.Operator):  # type: ignore[misc]
+    """Click pins of the active bed to see their heights in the overlay"""
+
+    bl_idname = "digiclay.pick_pins"
+    bl_label = "Pick Pins"
+    bl_options = {"UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """There must be a bed to pick pins of, in a view to click into."""
+        if bed_of(context) is None:
+            cls.poll_message_set("Select a bed of pins first")
+            return False
+        if context.area is None or context.area.type != "VIEW_3D":
+            cls.poll_message_set("Pins are picked in a 3D view")
+            return False
+        return True
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Wait for clicks."""
+        self.changed = False
+        context.workspace.status_text_set(KEYS)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Pick or drop the pin under a click; what is no click goes on to the view."""
+        if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
+            context.workspace.status_text_set(None)
+            return {"FINISHED"} if self.changed else {"CANCELLED"}
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            return self._clicked(context, event)
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: Any) -> None:
+        """Blender ends the operator, for instance to load a file."""
+        context.workspace.status_text_set(None)
+
+    def _clicked(self, context: Any, event: Any) -> set[str]:
+        """Pick or drop the pin under the mouse; a click beside the bed goes on to whatever lies there."""
+        region = next((part for part in context.area.regions if part.type == "WINDOW"), None)
+        if region is None or context.area.type != "VIEW_3D":
+            return {"PASS_THROUGH"}
+        with context.temp_override(region=region):
+            found = aim.target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
+        if found is None or found.bed != bed_of(context):
+            return {"PASS_THROUGH"}
+        present = display.picked(found.bed)
+        pins = [pin for pin in present if pin != found.pin]
+        try:
+            display.pick(found.bed, pins if found.pin in present else [*pins, found.pin])
+        except DigiclayError as error:
+            self.report({"WARNING"}, str(error))
+        else:
+            self.changed = True
+        return {"RUNNING_MODAL"}
+
+
+class ClearPins(bpy.types.Operator):  # type: ignore[misc]
+    """Drop all picked pins of the active bed"""
+
+    bl_idname = "digiclay.clear_pins"
+    bl_label = "Clear"
+    bl_options = {"UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """There must be picked pins."""
+        bed = bed_of(context)
+        if bed is None:
+            cls.poll_message_set("Select a bed of pins first")
+            return False
+        if not display.picked(bed):
+            cls.poll_message_set("No pins are picked")
+            return False
+        return True
+
+    def execute(self, context: Any) -> set[str]:
+        """Drop them."""
+        display.pick(bed_of(context), ())
+        return {"FINISHED"}

@@ -1,0 +1,91 @@
+"""The overlay's colours: whatever the theme, letters and curves stand out from what is behind them.
+
+Numpy only, no Blender.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["CURVES", "Colour", "Look", "contrast", "legible", "look"]
+
+#: sRGB.
+Colour = tuple[float, float, float]
+
+#: Curves of picked pins: Okabe and Ito's palette, in the order in which they are told apart best.
+CURVES: tuple[Colour, ...] = (
+    (0.34, 0.71, 0.91),
+    (0.90, 0.62, 0.00),
+    (0.00, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.00),
+    (0.95, 0.90, 0.25),
+)
+#: Contrast that the Web Content Accessibility Guidelines ask of letters, and of lines.
+LETTERS, LINES = 4.5, 3.0
+BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of the overlay: behind everything, letters, faint letters, frames, force, set point, pins."""
+
+    back: Colour
+    ink: Colour
+    faint: Colour
+    frame: Colour
+    force: Colour
+    set_point: Colour
+    pins: tuple[Colour, ...]
+
+
+def look(back: Colour, ink: Colour) -> Look:
+    """Choose all colours to go with those of the theme.
+
+    Parameters
+    ----------
+    back : Colour
+        The theme's colour behind letters.
+    ink : Colour
+        The theme's letters; replaced by black or white where they could not be read.
+    """
+    ink = legible(ink, back, LETTERS)
+    return Look(
+        back=back,
+        ink=ink,
+        faint=legible(_mixed(ink, back, 0.35), back, LETTERS),
+        frame=_mixed(ink, back, 0.75),
+        force=ink,
+        set_point=legible(CURVES[4], back, LINES),
+        pins=tuple(legible(colour, back, LINES) for colour in CURVES),
+    )
+
+
+def contrast(one: Colour, other: Colour) -> float:
+    """Return the contrast of two colours as the guidelines define it, 1 to 21."""
+    low, high = sorted((_luminance(one), _luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def legible(colour: Colour, back: Colour, least: float) -> Colour:
+    """Return a colour, mixed with as much black or white as it needs for a contrast to what is behind it."""
+    end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
+    for share in np.linspace(0.0, 1.0, 41):
+        mixed = _mixed(colour, end, float(share))
+        if contrast(mixed, back) >= least:
+            return mixed
+    return end
+
+
+def _mixed(one: Colour, other: Colour, share: float) -> Colour:
+    """Return a colour with a share of another."""
+    r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
+    return r, g, b
+
+
+def _luminance(colour: Colour) -> float:
+    """Return the relative luminance of an sRGB colour."""
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b

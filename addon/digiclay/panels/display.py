@@ -1,0 +1,50 @@
+"""The sub-panel Display: colours, arrows, and what the overlay shows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import display, view
+from ..compat import bpy
+from .base import Panel, bed_of
+
+__all__ = ["CLASSES", "Display"]
+
+
+class Display(Panel, bpy.types.Panel):  # type: ignore[misc]
+    """What is shown of the bed; each part can be off, and then costs nothing."""
+
+    bl_label = "Display"
+    bl_idname = "DIGICLAY_PT_display"
+    bl_order = 50
+
+    def draw(self, context: Any) -> None:
+        """Draw the panel."""
+        bed, layout = bed_of(context), self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        shown, drawn = bed.digiclay_display, view.is_drawn(bed)
+        if not drawn:
+            layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
+        column = layout.column()
+        column.enabled = drawn
+        column.row().prop(shown, "colour", expand=True)
+        row = column.row()
+        row.active = shown.colour == "force"
+        row.prop(shown, "top_force")
+        column.prop(shown, "arrows")
+        row = column.row()
+        row.active = shown.arrows
+        row.prop(shown, "arrow_length")
+        layout.prop(shown, "overlay")
+        column = layout.column()
+        column.active = shown.overlay
+        column.prop(shown, "seconds")
+        pins = ", ".join(str(pin) for pin in display.picked(bed))
+        column.label(text=f"Picked pins: {pins or 'none'}")
+        row = column.row(align=True)
+        row.operator("digiclay.pick_pins")
+        row.operator("digiclay.clear_pins")
+
+
+CLASSES = (Display,)

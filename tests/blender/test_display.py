@@ -1,0 +1,142 @@
+"""What is shown of a bed is a setting of the bed; what is off is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge, display, overlay, palettes, properties, running, sculpting, view
+from digiclay.core.errors import DigiclayError
+from digiclay.core.modes import Mode
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture
+def bed() -> Any:
+    """A bed of 20 x 20 pins as the Add menu makes it."""
+    bpy.ops.mesh.digital_clay_add(rows=20, columns=20)
+    bpy.context.view_layer.update()
+    return bpy.context.object
+
+
+@pytest.fixture
+def session(bed: Any) -> Iterator[running.Running]:
+    """A running session whose finger has pressed the middle of the bed for a third of a second."""
+    scene = properties.scene_of(bed)
+    above = bridge.pose(view.fingertip_of(bed))
+    begun, _ = sculpting.begun(bed.session_uid, bed.name, scene, above)
+    pressed = above.copy()
+    pressed[2] = 0.037
+    begun = sculpting.advanced(begun, above, 0.0, 100)
+    for tick in range(1, 11):
+        begun = sculpting.advanced(begun, pressed, tick / 30, 100, pins=display.picked(bed))
+    running.put(begun)
+    yield begun
+    running.drop(begun.uid)
+    overlay.follow()
+
+
+def forces(bed: Any) -> np.ndarray:
+    """Return the forces written into a bed's mesh, N."""
+    return bridge.read_cells(bed.data)["force"]
+
+
+def test_the_properties_are_the_settings_of_the_geometry_nodes(bed: Any) -> None:
+    shown = bed.digiclay_display
+    shown.colour, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
+    assert (view.coloured_by(bed), view.arrows_shown(bed)) == ("force", True)
+    assert view.top_colour(bed) == 0.5
+    assert view.arrow_length(bed) == pytest.approx(0.25, rel=1e-12)
+    view.colour_by(bed, "mode")
+    assert shown.colour == "mode"
+
+
+def test_a_bed_without_its_nodes_has_nothing_to_set_and_says_nothing(bed: Any) -> None:
+    bed.modifiers.clear()
+    shown = bed.digiclay_display
+    shown.colour, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
+    assert (shown.colour, shown.arrows) == ("mode", False)
+
+
+def test_turning_the_heat_map_on_shows_the_forces_of_now(bed: Any, session: running.Running) -> None:
+    view.show_state(bed, session.system, session.state)
+    assert not forces(bed).any()
+    bed.digiclay_display.colour = "force"
+    felt = session.state.row(session.system.rows.force)
+    assert felt.max() > 0.01
+    np.testing.assert_allclose(forces(bed), felt, rtol=2.0**-23)
+
+
+def test_turning_arrows_on_after_a_session_shows_the_forces_it_ended_with(
+    bed: Any, session: running.Running
+) -> None:
+    bed[display.STATE] = session.kept
+    running.drop(session.uid)
+    bed.digiclay_display.arrows = True
+    np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)
+
+
+def test_the_overlay_is_drawn_only_while_a_session_runs_whose_bed_wants_it(
+    bed: Any, session: running.Running
+) -> None:
+    assert not overlay.shown()
+    overlay.follow()
+    assert overlay.shown()
+    bed.digiclay_display.overlay = False
+    assert not overlay.shown()
+    bed.digiclay_display.overlay = True
+    assert overlay.shown()
+    running.drop(session.uid)
+    overlay.follow()
+    assert not overlay.shown()
+
+
+def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: running.Running) -> None:
+    overlay.follow()
+    display.unregister()
+    try:
+        assert not overlay.shown()
+    finally:
+        display.register()
+
+
+def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Running) -> None:
+    told = overlay.told(bed, session, palettes.PALETTES["okabe_ito"])
+    assert (told.name, told.method, told.set_point) == (bed.name, "virtual_master", session.scene.set_point)
+    assert told.modes.sum() == 400
+    assert np.count_nonzero(told.modes) > 1
+    total = session.state.row(session.system.rows.force).sum()
+    assert told.force[-1] == pytest.approx(total, rel=1e-12)
+    stopped = overlay.told(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
+    assert stopped.paused
+    assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
+
+
+def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: Any) -> None:
+    display.pick(bed, (7, 399, 0))
+    assert display.picked(bed) == (7, 399, 0)
+    assert display.picked(bed.copy()) == (7, 399, 0)
+    assert bpy.ops.digiclay.clear_pins() == {"FINISHED"}
+    assert display.picked(bed) == ()
+    assert not bpy.ops.digiclay.clear_pins.poll()
+
+
+@pytest.mark.parametrize(
+    ("pins", "said"),
+    [((1, 1), "6 different pins"), (range(7), "6 different pins"), ((400,), "0 to 399"), ((-1,), "0 to 399")],
+)
+def test_pins_that_cannot_be_picked_are_refused(bed: Any, pins: tuple[int, ...], said: str) -> None:
+    with pytest.raises(DigiclayError, match=said):
+        display.pick(bed, pins)
+    assert display.picked(bed) == ()
+
+
+def test_the_panel_display_stands_in_the_sidebar(bed: Any) -> None:
+    panel = bpy.types.DIGICLAY_PT_display
+    assert (panel.bl_category, panel.bl_label) == ("Digital Clay", "Display")
+    assert panel.poll(bpy.context)

@@ -1,0 +1,160 @@
+"""The overlay's picture: what it says, where its curves go, and that it can be read on any theme."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.modes import COLOURS, Mode
+from digiclay.overlay_layout import free, laid_out
+from digiclay.overlay_look import LETTERS, LINES, contrast, look
+from digiclay.overlay_picture import Box, Picture, axis, scaled
+from digiclay.overlay_sections import Told
+from hypothesis import given
+from hypothesis import strategies as st
+
+DARK, LIGHT = (0.09, 0.09, 0.09), (0.93, 0.93, 0.93)
+CHANNEL = st.floats(0.0, 1.0)
+COLOUR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
+ROOM = (0.0, 0.0, 900.0, 700.0)
+
+
+def session(**changes: object) -> Told:
+    """Return what a session of ten seconds tells, two pins picked."""
+    time = np.linspace(0.0, 10.0, 1001)
+    told = Told(
+        name="Digital Clay",
+        method="virtual_master",
+        paused=False,
+        factor=0.97,
+        errors=(2.1e-6, 4.6e-4),
+        set_point=0.4,
+        time=time,
+        force=0.4 + 0.1 * np.sin(time),
+        pins=(312, 40),
+        heights=np.column_stack([0.04 + 0.001 * np.sin(time), np.full(1001, 0.035)]),
+        modes=np.array([600, 10, 0, 15, 0, 0, 0, 0]),
+        colours=tuple(COLOURS[mode] for mode in Mode),
+        seconds=5.0,
+    )
+    return replace(told, **changes)
+
+
+def said(picture: Picture) -> str:
+    """Return all words of a picture."""
+    return " | ".join(words.text for words in picture.words)
+
+
+@pytest.mark.parametrize("back", [DARK, LIGHT, (0.5, 0.5, 0.5)])
+def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, float]) -> None:
+    chosen = look(back, back)  # a theme with letters of the colour of the ground: the worst there is
+    # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
+    assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
+    assert min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force)) >= LINES
+
+
+@given(COLOUR, COLOUR)
+def test_every_theme_gets_letters_that_can_be_read(
+    back: tuple[float, float, float], ink: tuple[float, float, float]
+) -> None:
+    assert contrast(look(back, ink).ink, back) >= LETTERS
+
+
+def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
+    assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
+
+
+def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None:
+    words = said(laid_out(session(), look(DARK, LIGHT), ROOM, 1.0))
+    for part in (
+        "Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
+        "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister",
+    ):  # fmt: skip
+        assert part in words
+
+
+def test_it_says_what_is_not_known_yet() -> None:
+    empty = np.empty(0)
+    told = session(
+        factor=None, errors=None, set_point=None, time=empty, force=empty, heights=np.empty((0, 2)), method=""
+    )
+    words = said(laid_out(told, look(DARK, LIGHT), ROOM, 1.0))
+    assert "Solver error: not estimated yet" in words
+    assert "Method: none" in words
+    assert "real time" not in words
+    assert "set point" not in words
+
+
+def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
+    told = session(heights=np.full((1001, 2), np.nan))
+    picture = laid_out(told, look(DARK, LIGHT), ROOM, 1.0)
+    assert "312: | 40:" in said(picture)
+    for line in picture.lines:
+        assert np.isfinite(line.points).all()
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
+def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) -> None:
+    picture = laid_out(session(), look(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
+    (box,) = picture.boxes
+    assert box.width == 290.0 * scale
+    points = [line.points for line in picture.lines]
+    points += [np.array([[mark.x, mark.y]]) for mark in (*picture.words, *picture.dots)]
+    low, high = (
+        np.min([p.min(axis=0) for p in points], axis=0),
+        np.max([p.max(axis=0) for p in points], axis=0),
+    )
+    assert (low >= [box.x, box.y]).all()
+    assert (high <= [box.x + box.width, box.y + box.height]).all()
+
+
+def test_a_low_view_leaves_sections_away_from_the_last_on_and_a_narrow_one_all() -> None:
+    colours = look(DARK, LIGHT)
+    full = laid_out(session(), colours, ROOM, 1.0)
+    low = laid_out(session(), colours, (0.0, 0.0, 900.0, 240.0), 1.0)
+    assert "Pins by mode" in said(full)
+    assert "Total force" in said(low)
+    assert "Pins by mode" not in said(low)
+    assert low.boxes[0].height <= 240.0
+    assert laid_out(session(), colours, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
+    assert laid_out(session(), colours, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
+
+
+def test_panels_over_the_view_are_kept_clear_of() -> None:
+    assert free(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)]) == (
+        50.0, 0.0, 700.0, 648.0,
+    )  # fmt: skip
+    right = laid_out(session(), look(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
+    assert right.x + right.width <= 700.0
+
+
+def test_a_curve_shows_the_window_alone_and_nothing_that_is_no_number() -> None:
+    time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
+    value = np.where(time == 7.0, np.nan, time)
+    points = scaled(time, value, (5.0, 10.0), (0.0, 10.0), box)
+    np.testing.assert_allclose(points[:, 0], [100.0, 140.0, 220.0, 260.0, 300.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(points[:, 1], [70.0, 74.0, 82.0, 86.0, 90.0], rtol=0, atol=1e-9)
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
+def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> None:
+    ends = axis(low, low + span)
+    slack = 1e-9 * (abs(low) + span)
+    assert ends[0] <= low + slack
+    assert ends[1] >= low + span - slack
+    # A step of the axis at most a quarter of the span, and at both ends less than one step more.
+    assert ends[1] - ends[0] <= 1.5 * span + slack
+
+
+def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
+    picture = laid_out(session(set_point=0.25), look(DARK, LIGHT), ROOM, 1.0)
+    (dashed,) = (line for line in picture.lines if line.dashed)
+    low, high = (line.points[0, 1] for line in picture.lines[:2])
+    share = (dashed.points[0, 1] - low) / (high - low)
+    top = float(
+        next(w.text for w in picture.words if w.text.endswith(" N") and w.text[0] == "0" and "." in w.text)[
+            :-2
+        ]
+    )
+    assert share == pytest.approx(0.25 / top, rel=1e-9)
