@@ -81,7 +81,7 @@ def given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     ParameterError
         When they are not those of this bed.
     """
-    return _clipped("shape.heights", unpacked(shape.heights, grid), _all_covered(grid), actuator)
+    return _clipped(shape.file or "heights", unpacked(shape.heights, grid), _all_covered(grid), actuator)
 
 
 def fitted(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:

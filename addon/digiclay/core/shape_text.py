@@ -39,7 +39,7 @@ def unpacked(text: str, grid: Grid) -> Floats:
         whole = opened.eof or len(data) > wanted
     except (binascii.Error, ValueError, zlib.error):
         whole, data = False, b""
-    if not whole or len(data) % 4:
+    if not whole or (len(data) % 4 and len(data) <= wanted):
         raise ParameterError("shape", "heights", "must be heights packed as text", _cut(text), HINT)
     if len(data) != wanted:
         plan = grid.layout

@@ -1,0 +1,147 @@
+"""Maps of heights: means, places between pixels, pictures and what is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core import heightmap
+from digiclay.core.errors import ParameterError
+from digiclay.core.heightmap import averaged, height_map
+from digiclay.core.heightmap_picture import pixels
+from digiclay.core.layout import Layout, grid
+from digiclay.core.relief import Placement
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+PITCH = 3e-3
+
+
+def middle(rows: int, columns: int, factor: float) -> Placement:
+    """Return where a map lies whose middle is the bed's."""
+    return Placement(factor, factor, -columns / 2 * factor, -rows / 2 * factor)
+
+
+def test_a_map_with_a_pixel_for_every_pin_gives_every_pin_its_pixel() -> None:
+    values = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
+    found = height_map("x", values).tops(grid(Layout(5, 7, PITCH)), middle(5, 7, PITCH))
+    assert np.abs(found.value - values.ravel()).max() < 1e-12  # places between 0 and 7, rounded
+    assert found.covered.all()
+
+
+def test_a_plane_stays_a_plane_between_the_pixels() -> None:
+    row, column = np.mgrid[0:20, 0:30]
+    found = height_map("x", 2.0 * row - column).tops(grid(Layout(9, 13, PITCH)), middle(20, 30, 2.1e-3))
+    bed = grid(Layout(9, 13, PITCH))
+    wanted = 2.0 * (bed.y / 2.1e-3 + 9.5) - (bed.x / 2.1e-3 + 14.5)
+    assert np.abs(found.value - wanted).max() < 1e-10  # rounding of numbers up to 60
+
+
+def test_a_fine_map_is_averaged_over_the_square_of_a_pin() -> None:
+    # Black and white pixels in turn, eight to a pin: every pin sees their mean.
+    checkered = np.indices((72, 72)).sum(axis=0) % 2
+    found = height_map("x", checkered).tops(grid(Layout(9, 9, PITCH)), middle(72, 72, PITCH / 8))
+    assert np.abs(found.value - 0.5).max() < 1e-12
+
+
+def test_pins_beside_the_map_are_not_covered() -> None:
+    found = height_map("x", np.ones((3, 3))).tops(grid(Layout(9, 9, PITCH)), middle(3, 3, PITCH))
+    assert found.covered.reshape(9, 9)[3:6, 3:6].all()
+    assert found.covered.sum() == 9
+
+
+@given(
+    st.integers(2, 40), st.integers(2, 40), st.integers(1, 9), st.integers(1, 200), st.integers(0, 2**32 - 1)
+)
+def test_means_keep_the_sum(rows: int, columns: int, block: int, chunk: int, seed: int) -> None:
+    values = np.random.default_rng(seed).uniform(-1.0, 1.0, (rows, columns))
+    kept = heightmap.CHUNK
+    try:
+        heightmap.CHUNK = chunk
+        means = averaged(values, block)
+    finally:
+        heightmap.CHUNK = kept
+    tall = np.diff([*range(0, rows, block), rows])
+    wide = np.diff([*range(0, columns, block), columns])
+    assert means.shape == (len(tall), len(wide))
+    assert np.sum(means * tall[:, None] * wide) == pytest.approx(values.sum(), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (np.zeros((1, 1)), "at least 2 x 2 heights (got odd.npy: 1 x 1)"),
+        (np.zeros((1, 9)), "at least 2 x 2 heights (got odd.npy: 1 x 9)"),
+        (np.zeros(9), "at least 2 x 2 heights (got odd.npy: 9)"),
+        (np.zeros((2, 2, 3)), "at least 2 x 2 heights (got odd.npy: 2 x 2 x 3)"),
+        (np.zeros(()), "at least 2 x 2 heights (got odd.npy: a single number)"),
+        (np.array([["a", "b"], ["c", "d"]]), "hold numbers (got odd.npy: <U1)"),
+        (np.zeros((2, 2), complex), "hold numbers (got odd.npy: complex128)"),
+        (np.array([[0.0, 1.0], [np.nan, 2.0]]), "finite numbers only (got odd.npy: nan at 1, 0)"),
+        (np.array([[0.0, np.inf], [1.0, 2.0]]), "finite numbers only (got odd.npy: inf at 0, 1)"),
+    ],
+)
+def test_what_is_no_map_is_refused(values: np.ndarray, said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        height_map("odd.npy", values)
+    assert said in str(caught.value)
+
+
+# Pictures
+
+
+@pytest.mark.parametrize(("bits", "kind"), [(8, np.uint8), (16, np.uint16)])
+@pytest.mark.parametrize("ending", ["png", "tif"])
+def test_a_picture_is_read_as_it_was_written(tmp_path: Path, bits: int, kind: type, ending: str) -> None:
+    values = np.random.default_rng(bits).integers(0, 2**bits, (11, 7)).astype(kind)
+    path = tmp_path / f"grün und weiß.{ending}"
+    Image.fromarray(values).save(path)
+    assert np.array_equal(pixels(path), np.flipud(values))
+
+
+def test_a_coloured_picture_is_read_by_its_brightness(tmp_path: Path) -> None:
+    colours = np.zeros((2, 3, 3), np.uint8)
+    colours[0] = 255, 255, 255
+    colours[1, 1] = 255, 0, 0
+    Image.fromarray(colours).save(tmp_path / "colours.png")
+    read = pixels(tmp_path / "colours.png")
+    assert read.shape == (2, 3)
+    # 0.299 of 255: the weight of red in the brightness of the television standard Pillow follows.
+    assert read.tolist() == [[0, 76, 0], [255, 255, 255]]
+
+
+def test_a_picture_that_is_cut_off_is_refused(tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((99, 99), np.uint8)).save(tmp_path / "whole.png")
+    (tmp_path / "half.png").write_bytes((tmp_path / "whole.png").read_bytes()[:60])
+    with pytest.raises(ParameterError, match=r"must be a picture that can be read \(got .*half\.png: "):
+        pixels(tmp_path / "half.png")
+
+
+def test_an_exr_is_left_to_blender(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="Blender itself reads EXR"):
+        pixels(tmp_path / "x.exr")
+
+
+def test_a_picture_of_a_hundred_megapixels_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "large.png"
+    Image.new("L", (10_000, 10_000), 7).save(path, compress_level=1)
+    found = height_map(path.name, pixels(path))
+    assert found.pixels == (10_000, 10_000)
+    assert found.values.size <= heightmap.KEPT
+    assert np.all(found.values == 7.0)
+
+
+def test_a_picture_of_more_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    # A head that says 20 000 x 10 000 pixels, and no pixels at all.
+    path = tmp_path / "huge.png"
+    Image.new("L", (2, 2)).save(path)
+    data = bytearray(path.read_bytes())
+    data[16:24] = (20_000).to_bytes(4, "big") + (10_000).to_bytes(4, "big")
+    import zlib
+
+    data[29:33] = zlib.crc32(bytes(data[12:29])).to_bytes(4, "big")
+    path.write_bytes(bytes(data))
+    with pytest.raises(ParameterError, match="must have at most 128 million pixels"):
+        pixels(path)

@@ -1,0 +1,189 @@
+"""Shapes from files: samples by name, every kind of file, and every way a file can be wrong."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.actuator import Actuator
+from digiclay.core.errors import DigiclayError
+from digiclay.core.layout import Layout, grid
+from digiclay.core.scene_file import load
+from digiclay.core.shape import Shape
+from digiclay.core.shape_file import SAMPLES, find_shape, fitted_to, read, sample_shapes
+from digiclay.core.shape_mesh import ShapeMesh
+
+ROOT = Path(__file__).parents[2]
+BED = grid(Layout(13, 13, 3e-3))
+
+
+@pytest.fixture(scope="module")
+def maker() -> ModuleType:
+    """The program that makes the sample shapes."""
+    spec = importlib.util.spec_from_file_location("sample_shapes", ROOT / "tools" / "sample_shapes.py")
+    assert spec
+    assert spec.loader
+    module, paths = importlib.util.module_from_spec(spec), list(sys.path)
+    spec.loader.exec_module(module)
+    sys.path[:] = paths
+    return module
+
+
+def heights(file: Path | str, **known: object) -> np.ndarray:
+    """Return the heights a file makes on a bed of 13 x 13 cells."""
+    return fitted_to(Shape(file=str(file), **known), BED, Actuator()).heights
+
+
+def test_the_sample_shapes_are_those_the_program_makes(maker: ModuleType, tmp_path: Path) -> None:
+    made = {path.name for path in maker.write(tmp_path)}
+    assert made == {path.name for path in SAMPLES.iterdir() if path.name != "README.md"}
+    for name in made:
+        # Sines of two machines differ in the last bit, which may turn a pixel by one level of 255.
+        assert np.abs(heights(SAMPLES / name) - heights(tmp_path / name)).max() < 15e-3 / 200, name
+
+
+def test_every_sample_shape_has_a_note_of_its_origin() -> None:
+    notes = (SAMPLES / "README.md").read_text(encoding="utf-8")
+    assert len(sample_shapes()) >= 12
+    assert [name for name in sample_shapes() if f"| `{find_shape(name).name}` |" not in notes] == []
+
+
+def test_the_sample_shapes_are_small() -> None:
+    assert sum(path.stat().st_size for path in SAMPLES.iterdir()) < 1e6
+
+
+@pytest.mark.parametrize("name", sample_shapes())
+def test_every_sample_shape_fits_a_bed_without_clipping(name: str) -> None:
+    laid = fitted_to(Shape(file=name), grid(Layout()), Actuator())
+    assert np.ptp(laid.heights) == pytest.approx(15e-3, abs=1e-12)
+    assert laid.too_low + laid.too_high == 0
+    assert (laid.overhanging > 0) == (name == "knot")
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in sample_shapes() if find_shape(n).suffix in (".stl", ".obj", ".ply")]
+)
+def test_every_sample_mesh_is_closed_and_turned_outwards(name: str) -> None:
+    mesh = trimesh.load_mesh(find_shape(name))
+    assert mesh.is_watertight
+    assert mesh.volume > 0.0
+    shape = read(Shape(file=name))
+    assert isinstance(shape, ShapeMesh)
+    assert shape.closed
+
+
+# Files
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb", "off"])
+def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> None:
+    solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
+    path = tmp_path / f"Ein Körper mit Blank.{kind}"
+    unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in metres, y up
+    turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind == "glb" else solid.vertices
+    trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
+    bare = read(Shape(file=str(path)))
+    left, front, right, back = bare.box
+    # 32-bit numbers, or 8 digits.
+    assert (right - left) * bare.length == pytest.approx(20e-3, rel=1e-6)
+    assert (back - front) * bare.length == pytest.approx(20e-3, rel=1e-6)
+    solid.export(tmp_path / "plain.stl")
+    assert np.abs(heights(path) - heights(tmp_path / "plain.stl")).max() < 1e-7
+
+
+def test_an_array_is_taken_with_its_first_row_at_the_lowest_y(tmp_path: Path) -> None:
+    np.save(tmp_path / "steps.npy", np.repeat(np.arange(13.0), 13).reshape(13, 13))
+    rows = heights(tmp_path / "steps.npy").reshape(13, 13)
+    assert np.all(np.diff(rows[:, 0]) > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("empty.stl", b"", "must "),
+        ("rubbish.stl", b"rubbish" * 30, "must "),
+        ("empty.obj", b"# nothing\n", "must "),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must "),
+        ("nan.obj", b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "must have vertices that are finite numbers"),
+        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "must "),
+        ("half.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "must be a mesh, a picture or an array"),
+        ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be a mesh, a picture or an array"),
+        ("notes.txt", b"hello", "must be a mesh, a picture or an array"),
+        ("empty.npy", b"", "must hold one array of numbers"),
+        ("rubbish.npy", b"rubbish", "must hold one array of numbers"),
+        ("empty.png", b"", "must be a picture that can be read"),
+        ("rubbish.png", b"rubbish", "must be a picture that can be read"),
+    ],
+)
+def test_a_file_that_holds_no_shape_is_refused_by_name(
+    tmp_path: Path, name: str, content: bytes, said: str
+) -> None:
+    path = tmp_path / f"schöner Ordner {name}"
+    path.write_bytes(content)
+    with pytest.raises(DigiclayError) as caught:
+        heights(path)
+    assert said in str(caught.value)
+    assert str(path) in str(caught.value) or path.name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_array_of_objects_is_not_unpickled(tmp_path: Path) -> None:
+    np.save(tmp_path / "objects.npy", np.array([{}, {}], dtype=object), allow_pickle=True)
+    with pytest.raises(DigiclayError, match="must hold one array of numbers"):
+        heights(tmp_path / "objects.npy")
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("craters", "Did you mean crater?"),
+        ("nowhere.stl", "there is no file nowhere.stl."),
+        ("no/where", "there is no file no/where."),
+        ("a\0b", "there is no file"),
+        (".", "there is no file"),
+    ],
+)
+def test_a_shape_that_is_not_there_is_told(word: str, said: str) -> None:
+    with pytest.raises(DigiclayError) as caught:
+        find_shape(word)
+    assert said in str(caught.value) or "neither a file nor a sample" in str(caught.value)
+
+
+# Scene files
+
+
+def test_a_scene_finds_its_shape_beside_itself(tmp_path: Path) -> None:
+    (tmp_path / "Formen").mkdir()
+    np.save(tmp_path / "Formen" / "größe 1.npy", np.eye(5))
+    (tmp_path / "my.toml").write_text('[shape]\nfile = "Formen/größe 1.npy"\n', encoding="utf-8")
+    scene = load(tmp_path / "my.toml")
+    assert scene.shape
+    assert Path(scene.shape.file) == (tmp_path / "Formen" / "größe 1.npy").resolve()
+
+
+def test_a_scene_names_no_shape_unless_asked(tmp_path: Path) -> None:
+    (tmp_path / "my.toml").write_text("", encoding="utf-8")
+    assert load(tmp_path / "my.toml").shape is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[shape]\nfit = "squeeze"', "shape.fit must be one of contain, cover, stretch, actual, placed"),
+        ("[shape]\nrise = nan", "shape.rise must be a finite number"),
+        ("[shape]\nscale = 0", "shape.scale must be above 0"),
+        ('[shape]\nfile = ""', "shape.file must be a sample shape's name"),
+        ("[shape]\nfile = 3", "shape.file must be a text"),
+        ("shape = 3", "shape must be a section"),
+    ],
+)
+def test_a_wrong_section_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "my.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(DigiclayError) as caught:
+        load(tmp_path / "my.toml")
+    assert said in str(caught.value)

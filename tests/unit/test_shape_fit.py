@@ -1,0 +1,211 @@
+"""Shapes laid onto beds: their plan, their height, what is clipped, and what is said of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.actuator import Actuator
+from digiclay.core.errors import ParameterError
+from digiclay.core.heightmap import height_map
+from digiclay.core.layout import Layout, grid
+from digiclay.core.shape import Shape
+from digiclay.core.shape_fit import Fitted, fitted, given
+from digiclay.core.shape_mesh import shape_mesh
+from digiclay.core.shape_text import packed, unpacked
+
+REST, STROKE = Actuator().rest_height, Actuator().stroke
+BED = grid(Layout(13, 25, 3e-3))
+#: Heights of up to 0.1 m in 64 bits, after a few sums.
+ROUNDING = 1e-12
+
+
+def mesh(solid: trimesh.Trimesh) -> Any:
+    """Return a mesh of trimesh's, in mm."""
+    return shape_mesh("solid.stl", solid.vertices, solid.faces, "z", 1e-3)
+
+
+def laid(what: Any, bed: Any = BED, **known: Any) -> Fitted:
+    """Return a shape laid onto a bed."""
+    return fitted(Shape(**known), what, bed, Actuator())
+
+
+def box(wide: float, deep: float, high: float) -> Any:
+    """Return a box standing on z = 0, mm."""
+    solid = trimesh.creation.box((wide, deep, high))
+    solid.apply_translation((70.0, -30.0, high / 2))  # wherever it stands, it is centred
+    return mesh(solid)
+
+
+def table(cells: Fitted) -> np.ndarray:
+    """Return heights above rest, mm, row by row."""
+    return np.round((cells.heights.reshape(13, 25) - REST) * 1e3, 9)
+
+
+def test_contained_a_shape_keeps_its_proportions_within_the_bed() -> None:
+    # 39 mm are the shorter side; a square box takes 13 x 13 cells.
+    raised = table(laid(box(10, 10, 5))) > 0
+    assert raised[:, 6:19].all()
+    assert raised.sum() == 13 * 13
+
+
+def test_covering_a_shape_fills_the_bed() -> None:
+    cells = laid(box(10, 10, 5), fit="cover")
+    assert cells.covered == BED.count
+
+
+def test_stretched_a_shape_fills_the_bed_to_its_corners_and_no_more() -> None:
+    values = np.random.default_rng(3).uniform(0.0, 1.0, (13, 25))
+    cells = laid(height_map("x.png", values), fit="stretch")
+    shown = (cells.heights - REST) / 15e-3
+    assert np.abs(shown * np.ptp(values) + values.min() - values.ravel()).max() < 1e-10
+
+
+def test_in_its_own_size_a_shape_is_as_large_as_its_file_says() -> None:
+    raised = table(laid(box(30.5, 12.5, 5), fit="actual")) > 0
+    # Pins 3 mm apart within +- 15.25 mm and +- 6.25 mm.
+    assert raised.sum() == 11 * 5
+
+
+def test_scale_and_shift_move_the_plan() -> None:
+    raised = table(laid(box(10, 10, 5), fit="actual", scale=0.5, x=9e-3, y=-6e-3)) > 0
+    row, column = np.nonzero(raised)
+    # 5 mm wide about (9, -6) mm: one pin, and none of its neighbours 3 mm away.
+    assert (row.tolist(), column.tolist()) == ([4], [15])
+
+
+@pytest.mark.parametrize("rise", [15e-3, 4e-3, -12e-3])
+def test_the_relief_goes_from_the_foot_over_the_rise(rise: float) -> None:
+    cells = laid(mesh(trimesh.creation.icosphere(radius=10.0)), rise=rise, foot=2e-3)
+    ends = sorted((REST + 2e-3, REST + 2e-3 + rise))
+    assert cells.heights.min() == pytest.approx(ends[0], abs=ROUNDING)
+    assert cells.heights.max() == pytest.approx(ends[1], abs=ROUNDING)
+    assert cells.too_low + cells.too_high == 0
+
+
+def test_scaled_to_the_stroke_the_highest_pin_is_at_its_end() -> None:
+    cells = laid(box(10, 10, 5), relief="stroke")
+    assert cells.heights.max() == pytest.approx(STROKE, abs=ROUNDING)
+    assert cells.heights.min() == REST
+    assert cells.too_high == 0
+
+
+def test_a_true_relief_is_as_high_as_the_plan_makes_it() -> None:
+    # 10 mm become 39 mm, and so 5 mm become 19.5 mm.
+    assert table(laid(box(10, 10, 5), relief="true")).max() == 19.5
+
+
+def test_a_map_of_heights_is_true_in_metres_whatever_its_plan() -> None:
+    values = np.linspace(0.0, 7e-3, 12).reshape(3, 4)
+    cells = laid(height_map("x.npy", values, 1.0), relief="true", fit="stretch")
+    assert np.ptp(cells.heights) == pytest.approx(7e-3, abs=ROUNDING)
+
+
+def test_placed_a_shape_stands_where_its_coordinates_say() -> None:
+    solid = trimesh.creation.box((12.5, 12.5, 10.0))
+    solid.apply_translation((9.0, -6.0, 48.0))
+    raised = table(laid(mesh(solid), fit="placed"))
+    assert set(np.unique(raised).tolist()) == {0.0, 13.0}  # its top is at 53 mm, the bed at 40 mm
+    row, column = np.nonzero(raised)
+    assert (row.min(), row.max(), column.min(), column.max()) == (2, 6, 13, 17)
+
+
+def test_what_leaves_the_stroke_is_clipped_and_counted() -> None:
+    row = np.linspace(0.0, 1.0, 25)
+    cells = laid(height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3)
+    wanted = REST - 50e-3 + 120e-3 * row
+    assert cells.too_low == 13 * np.count_nonzero(wanted < -1e-9) > 0
+    assert cells.too_high == 13 * np.count_nonzero(wanted > STROKE + 1e-9) > 0
+    assert cells.heights.min() == 0.0
+    assert cells.heights.max() == STROKE
+    assert cells.told() == (
+        "ramp.png: heights from 0.0 to 100.0 mm, covers all cells, "
+        f"{cells.too_low + cells.too_high} cells clipped ({cells.too_low} at the floor, "
+        f"{cells.too_high} at the stroke's end)"
+    )
+
+
+def test_overhangs_are_told() -> None:
+    ring = trimesh.creation.torus(10.0, 3.0)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    cells = laid(mesh(ring))
+    assert cells.overhanging > 0
+    assert cells.told() == (
+        f"solid.stl: heights from 40.0 to 55.0 mm, covers {cells.covered} of 325 cells, no cell clipped, "
+        f"overhangs under the top at {cells.overhanging} cells"
+    )
+
+
+def test_a_level_picture_makes_a_level_bed() -> None:
+    assert np.all(laid(height_map("grey.png", np.full((4, 4), 99))).heights == REST)
+
+
+@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+def test_every_arrangement_is_covered_by_a_stretched_picture(arrangement: str) -> None:
+    bed = grid(Layout(7, 9, 3e-3, arrangement))
+    assert laid(height_map("x.png", np.eye(4)), bed, fit="stretch").covered == bed.count
+
+
+PICTURE, ARRAY = height_map("x.png", np.eye(3)), height_map("x.npy", np.eye(3), 1.0)
+LINE = shape_mesh("l.stl", np.array([[0.0, 0, 0], [9, 0, 0], [4, 0, 5]]), np.array([[0, 1, 2]]), "z", 1e-3)
+BESIDE = (
+    "shape.x, y must leave the shape over the bed (got solid.stl: no pin lies under it). Set shape.fit to"
+)
+
+
+@pytest.mark.parametrize(
+    ("what", "known", "said"),
+    [
+        (box(10, 10, 5), {"fit": "actual", "x": 1.0}, BESIDE),
+        (box(10, 10, 5), {"fit": "placed"}, BESIDE),
+        (PICTURE, {"fit": "actual"}, "its pixels have no length (got 'actual' for x.png)"),
+        (ARRAY, {"fit": "placed"}, "its pixels have no length (got 'placed' for x.npy)"),
+        (PICTURE, {"relief": "true"}, "its values are no lengths (got 'true' for x.png)"),
+        (LINE, {}, "must be wider than a line or a point, seen from above (got l.stl: 9 x 0)"),
+    ],
+)
+def test_what_cannot_be_laid_onto_the_bed_is_refused(what: Any, known: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        laid(what, **known)
+    assert said in str(caught.value)
+
+
+def test_nothing_is_no_shape() -> None:
+    with pytest.raises(ParameterError, match=r"Shape\.file must be a sample shape's name.* \(got nothing\)"):
+        Shape(file="")
+
+
+# Heights as a text
+
+
+def test_heights_come_out_of_a_text_as_they_went_in() -> None:
+    heights = np.random.default_rng(4).uniform(0.0, STROKE, BED.count)
+    # 32 bits: half of 2^-24 of 0.1 m at most.
+    assert np.abs(unpacked(packed(heights), BED) - heights).max() <= 4e-9
+
+
+def test_heights_in_a_scene_are_displayed_as_they_are() -> None:
+    heights = np.linspace(-1e-3, 0.11, BED.count)
+    cells = given(Shape(file="Suzanne", heights=packed(heights)), BED, Actuator())
+    assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
+    assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
+    assert cells.told().startswith("Suzanne: heights from 0.0 to 100.0 mm")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("rubbish!", "must be heights packed as text (got 'rubbish!')"),
+        ("AAAA", "must be heights packed as text (got 'AAAA')"),
+        (packed(np.arange(325.0))[:40], "must be heights packed as text"),
+        (packed(np.ones(7)), "must hold the heights of the bed's 13 x 25 cells (got 7 heights)"),
+        (packed(np.ones(10**6)), "of the bed's 13 x 25 cells (got more than 325 heights)"),
+        (packed(np.where(np.arange(325) == 9, np.nan, 1.0)), "must be finite numbers (got nan at cell 9)"),
+    ],
+)
+def test_a_text_that_holds_other_heights_is_refused(text: str, said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        unpacked(text, BED)
+    assert said in str(caught.value)

@@ -1,0 +1,161 @@
+"""Rays down through meshes: the top surface at the pins, overhangs, and meshes that are none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.errors import ParameterError
+from digiclay.core.layout import Layout, grid
+from digiclay.core.relief import Placement, Tops
+from digiclay.core.shape_mesh import ShapeMesh, shape_mesh
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import Delaunay
+
+#: Meshes here are in mm and stand where they are.
+IN_PLACE = Placement(1e-3, 1e-3, 0.0, 0.0)
+#: Heights of a few mm, from products of a few numbers of 53 bits.
+ROUNDING = 1e-12
+
+
+def shape(mesh: trimesh.Trimesh, up: str = "z") -> ShapeMesh:
+    """Return a mesh of trimesh's as a shape."""
+    return shape_mesh("test.stl", mesh.vertices, mesh.faces, up, 1e-3)
+
+
+def tops(mesh: trimesh.Trimesh, arrangement: str = "aligned", side: int = 21) -> Tops:
+    """Return a mesh's tops on a bed 2 mm apart."""
+    return shape(mesh).tops(grid(Layout(side, side, 2e-3, arrangement)), IN_PLACE)
+
+
+@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement: str, seed: int) -> None:
+    chance = np.random.default_rng(seed)
+    plan, z = chance.uniform(-25.0, 25.0, (60, 2)), chance.uniform(-5.0, 5.0, 60)
+    cut = Delaunay(plan)
+    bed = grid(Layout(21, 17, 2e-3, arrangement))
+    found = shape_mesh("x", np.column_stack([plan, z]), cut.simplices, "z", 1e-3).tops(bed, IN_PLACE)
+    wanted = LinearNDInterpolator(cut, z)(bed.x * 1e3, bed.y * 1e3)
+    # The rim belongs to either: rounding decides.
+    inside = np.isfinite(wanted) & found.covered
+    assert np.count_nonzero(np.isfinite(wanted) != found.covered) <= 2
+    # Slivers of Delaunay's may be 1e4 times as long as wide.
+    assert np.abs(found.value - wanted)[inside].max(initial=0.0) < 1e-8
+    assert not found.overhang.any()
+
+
+def test_the_top_of_a_sphere_is_its_upper_half() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=15.0)
+    found, bed = tops(ball), grid(Layout(21, 21, 2e-3))
+    square = 225.0 - (bed.x**2 + bed.y**2) * 1e6
+    well_inside = square > 60.0
+    # Chords of 10 000 triangles: a sagitta of 15 mm (1 - cos 1°).
+    assert np.abs(found.value[well_inside] - np.sqrt(square[well_inside])).max() < 0.02
+    assert not found.covered[square < -1e-6].any()
+    assert not found.overhang.any()
+
+
+def test_a_box_covers_the_pins_on_its_outline_too() -> None:
+    # Pins stand on every edge and on the diagonals the faces are cut along.
+    found = tops(trimesh.creation.box((8.0, 8.0, 6.0)))
+    assert found.covered.sum() == 25
+    assert np.abs(found.value[found.covered] - 3.0).max() < ROUNDING
+    assert not found.overhang.any()
+
+
+def test_a_table_overhangs_where_there_is_room_below_its_top() -> None:
+    top = trimesh.creation.box((20.0, 20.0, 2.0))
+    top.apply_translation((0.0, 0.0, 10.0))
+    foot = trimesh.creation.box((30.0, 30.0, 2.0))
+    both = trimesh.util.concatenate([top, foot])
+    found = tops(both)
+    over = found.value > 5.0
+    assert np.array_equal(found.overhang, over)
+    assert over.sum() == 11 * 11
+
+
+def test_an_open_surface_above_another_overhangs() -> None:
+    sheet = np.array([[-9.0, -9.0], [9.0, -9.0], [0.0, 9.0]])
+    lower, upper = (np.column_stack([sheet, np.full(3, z)]) for z in (0.0, 4.0))
+    single = shape_mesh("x", lower, np.array([[0, 1, 2]]), "z", 1e-3)
+    double = shape_mesh("x", np.concatenate([lower, upper]), np.array([[0, 1, 2], [3, 4, 5]]), "z", 1e-3)
+    bed = grid(Layout(9, 9, 2e-3))
+    assert not single.tops(bed, IN_PLACE).overhang.any()
+    found = double.tops(bed, IN_PLACE)
+    assert np.array_equal(found.overhang, found.covered)
+    assert found.covered.any()
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z"])
+def test_every_direction_of_a_mesh_can_be_up(up: str) -> None:
+    # A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
+    vertices = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    turned = shape_mesh("x", vertices, faces, up, 1e-3).vertices
+    axis, sign = "xyz".index(up[-1]), -1 if up[0] == "-" else 1
+    assert np.array_equal(turned[:, 2], sign * vertices[:, axis])
+    assert trimesh.Trimesh(turned, faces, process=False).volume == pytest.approx(5 * 7 * 11 / 6)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "closed"),
+    [
+        (trimesh.creation.box(), True),
+        (trimesh.creation.icosphere(), True),
+        (trimesh.creation.torus(2.0, 1.0), True),
+        (trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), False),
+    ],
+)
+def test_a_mesh_is_known_as_closed_as_trimesh_knows_it(mesh: trimesh.Trimesh, closed: bool) -> None:
+    corners = np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+    soup = trimesh.Trimesh(mesh.triangles.reshape(-1, 3), corners, process=False)
+    assert mesh.is_watertight == closed
+    assert shape(mesh).closed == closed
+    assert shape(soup).closed == closed
+
+
+def test_three_faces_at_an_edge_are_displayed_all_the_same() -> None:
+    # Non-manifold: a roof with a keel hanging from its ridge.
+    vertices = [[-9.0, -9, 0], [-9, 9, 0], [9, -9, 0], [9, 9, 0], [0, -9, 5], [0, 9, 5], [0.5, 0, -5]]
+    faces = [[0, 4, 5], [0, 5, 1], [2, 5, 4], [2, 3, 5], [4, 5, 6]]
+    found = shape_mesh("x", np.array(vertices), np.array(faces), "z", 1e-3).tops(
+        grid(Layout(5, 5, 2e-3)), IN_PLACE
+    )
+    assert found.covered.all()
+    assert found.value.max() == 5.0
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "said"),
+    [
+        (np.zeros((0, 3)), np.zeros((0, 3), int), "surface made of faces (got odd.stl: no face)"),
+        (np.zeros((3, 3)), np.zeros((0, 3), int), "surface made of faces (got odd.stl: no face)"),
+        (
+            [[0, 0, 0], [1, np.nan, 0], [0, 1, 0]],
+            [[0, 1, 2]],
+            "finite numbers (got odd.stl: vertex 1 at 1, nan",
+        ),
+        (
+            [[0, 0, 0], [1, 0, np.inf], [0, 1, 0]],
+            [[0, 1, 2]],
+            "finite numbers (got odd.stl: vertex 1 at 1, 0",
+        ),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]], "among its vertices (got odd.stl: corner 3 of 3)"),
+    ],
+)
+def test_what_is_no_surface_is_refused(vertices: Any, faces: Any, said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        shape_mesh("odd.stl", np.array(vertices, float), np.array(faces), "z", 1e-3)
+    assert said in str(caught.value)
+
+
+def test_a_face_on_edge_covers_nothing() -> None:
+    upright = shape_mesh(
+        "x", np.array([[-9.0, 0, 0], [9, 0, 0], [0, 0, 9]]), np.array([[0, 1, 2]]), "z", 1e-3
+    )
+    assert not upright.tops(grid(Layout(9, 9, 2e-3)), IN_PLACE).covered.any()
