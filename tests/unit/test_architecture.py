@@ -19,20 +19,22 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "errors modes closed_form control.travel metrics_signal",
-    "keeping_memory quantity run_folder surface control.transitions metrics_path sweep_axis",
+    "body feature_region skin_spline errors modes closed_form control.travel metrics_signal",
+    "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
     "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "methods export metrics control.servo control.blister",
+    "formed methods export metrics control.servo control.blister",
+    "feature_crest pins_solid skin_membrane "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
-    "shape_file physics scene",
-    "system observer steppers.bernoulli steppers.explicit "
+    "skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
+    "sheet shape_file physics scene",
+    "features system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
     "control.drive control.neighbours control.shapes",
+    "feature_solids "
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
-    "simulation jobs control.handover",
+    "export_model simulation jobs control.handover",
     "assembly",
     "accuracy keeping live shadow",
     "session metrics_trial take",

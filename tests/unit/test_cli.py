@@ -113,7 +113,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     ),
     "file": (["run", "other.toml"], "other.toml: there is no such file."),
     "name": (["run", "ridge_mound_vally"], "Did you mean ridge_mound_valley?"),
-    "format": (["run", "my.toml", "--export", "stp"], "known are stl, obj, ply, glb"),
+    "format": (["run", "my.toml", "--export", "stp"], "known are stl, stl_ascii, obj, ply, glb, 3mf"),
     "surface": (
         ["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"],
         "needs at least 2 x 2 cells",

@@ -132,7 +132,7 @@ def test_positions_that_are_not_finite_are_refused_by_cell():
 
 
 def test_heights_that_do_not_fit_the_bed_are_refused():
-    with pytest.raises(ParameterError, match=r"each of the 3 x 3 pins \(got 8 heights at 9 positions\)\.$"):
+    with pytest.raises(ParameterError, match=r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$"):
         solid(pins(3, 3), np.full(8, 0.04), 3, 3)
 
 

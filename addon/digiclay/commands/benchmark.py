@@ -8,7 +8,14 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from . import benchmark_precision, benchmark_scale, benchmark_session, benchmark_stiff, benchmark_terms
+from . import (
+    benchmark_export,
+    benchmark_precision,
+    benchmark_scale,
+    benchmark_session,
+    benchmark_stiff,
+    benchmark_terms,
+)
 from .benchmark_session import PARTS, Clock, measured
 
 __all__ = ["PARTS", "Clock", "add", "measured"]
@@ -20,6 +27,7 @@ examples:
   digiclay benchmark precision      error against run time, beside SciPy
   digiclay benchmark terms tap      what each part of the model costs, and what leaving it out does
   digiclay benchmark scale          a control period from 625 pins to a million
+  digiclay benchmark export         writing a bed as a mesh, from 625 pins to a million
 """
 
 
@@ -33,5 +41,6 @@ def add(commands: Any) -> None:
     kinds = parser.add_subparsers(title="benchmarks", metavar="WHAT", required=True)
     for kind in (
         benchmark_session, benchmark_stiff, benchmark_precision, benchmark_terms, benchmark_scale,
+        benchmark_export,
     ):  # fmt: skip
         kind.add(kinds)

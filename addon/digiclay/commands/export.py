@@ -1,4 +1,4 @@
-"""``digiclay export``: the surface of a finished run as mesh files."""
+"""``digiclay export``: what was formed in a finished run, as mesh files."""
 
 from __future__ import annotations
 
@@ -10,29 +10,45 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from ..core.body import Body
 from ..core.errors import OutputError
-from ..core.export import FORMATS, UNITS, known_format, mesh, write
+from ..core.export import FORMATS, UNITS, known_format, suffix, write
+from ..core.export_model import KINDS, Model, bodies
+from ..core.features import Finding
+from ..core.formed import of_history
 from ..core.scene import Scene
 from .arguments import add_run, seconds
-from .finished import read, row_at
+from .finished import read
+from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
 __all__ = ["add", "exported", "formats", "refuse_what_has_no_surface", "refuse_without"]
 
 EXAMPLES = """\
 examples:
-  digiclay export ridge_mound_valley --format stl,glb
-  digiclay export ridge_mound_valley --format ply --unit m --time 10 --out meshes
+  digiclay export ridge_mound_valley --format stl,3mf
+  digiclay export ridge_mound_valley --skin smooth --resolution 6 --format obj
+  digiclay export ridge_mound_valley --kind features --separate --format stl --out parts
+  digiclay export ridge_mound_valley --kind pins --format ply --unit m --time 10 --out meshes
 """
+#: What a file of each kind is called; each of several features by its own name.
+STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "features"}
 
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_run(commands, "export", "write the formed surface of a run as a watertight solid", EXAMPLES)
+    parser = add_run(commands, "export", "write what was formed in a run as mesh files", EXAMPLES)
     shown = ", ".join(f"{name} ({said})" for name, said in FORMATS.items())
     parser.add_argument(
         "--format", metavar="F,...", type=formats, default=["stl"], help=f"{shown}; default stl"
     )
-    parser.add_argument("--unit", choices=tuple(UNITS), default="mm", help="of stl, obj and ply; default mm")
+    shown = "; ".join(f"{name}: {said}" for name, said in KINDS.items())
+    parser.add_argument("--kind", choices=tuple(KINDS), default="solid", help=f"{shown}; default solid")
+    add_surface(parser)
+    parser.add_argument(
+        "--base-thickness", metavar="L", help='material under the lowest point, such as "2 mm"; default 3 mm'
+    )
+    parser.add_argument("--separate", action="store_true", help="a file for each feature")
+    parser.add_argument("--unit", choices=tuple(UNITS), default="mm", help="of all but glb; default mm")
     parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the end")
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to; default the run's folder")
     parser.set_defaults(carry_out=carry_out)
@@ -68,22 +84,32 @@ def exported(
     folder: Path,
     unit: str = "mm",
 ) -> list[Path]:
-    """Write the surface of one row of a history in several formats; return the files."""
-    solid = mesh(history["position"], history["height"][row], scene.layout.rows, scene.layout.columns)
-    return [write(solid, folder / f"surface.{kind}", unit) for kind in kinds]
+    """Write the solid under one row of a history in several formats; return the files."""
+    model = Model(cap=scene.actuator.bore / 2.0)
+    made = bodies(of_history(history, row), model, Finding())
+    return [write(made, folder / f"surface{suffix(kind)}", unit, kind) for kind in kinds]
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Export."""
-    run = read(arguments.run, "height", "position")
+    if arguments.separate and arguments.kind != "features":
+        raise OutputError("--separate needs --kind features.")
+    run = read(arguments.run, "height", "position", "force", "mode")
     refuse_what_has_no_surface(run.scene, "export")
-    row = -1 if arguments.time is None else row_at(run.history, arguments.time)
+    model, finding = model_of(arguments, run.scene, arguments.kind), finding_of(arguments)
+    formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
+    made = bodies(formed, model, finding)
+    files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], made)]
+    if arguments.separate:
+        files = [(body.name, [body]) for body in made]
     folder = arguments.out or arguments.run
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from None
-    for path in exported(run.scene, run.history, row, arguments.format, folder, arguments.unit):
-        if not arguments.quiet:
-            print(path)
+    for stem, some in files:
+        for kind in arguments.format:
+            path = write(some, folder / f"{stem}{suffix(kind)}", arguments.unit, kind)
+            if not arguments.quiet:
+                print(path)
     return 0

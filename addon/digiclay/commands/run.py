@@ -47,7 +47,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the scene's name, here")
     parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
     parser.add_argument(
-        "--export", metavar="F,...", type=formats, default=[], help="also meshes: stl,obj,ply,glb"
+        "--export", metavar="F,...", type=formats, default=[], help="also meshes: stl,obj,ply,glb,3mf"
     )
     parser.add_argument(
         "--budget",
@@ -106,7 +106,6 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
             raise OutputError(f"--{name} needs a recorder, and the scene has recorder = 'absent'.")
     if arguments.export:
         refuse_what_has_no_surface(scene, "--export")
-        refuse_without("trimesh", "--export", "pip install trimesh")
     if arguments.plots:
         refuse_what_has_no_surface(scene, "--plots")
         refuse_without("matplotlib", "--plots", "pip install digiclay[plots]")

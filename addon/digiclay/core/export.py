@@ -1,30 +1,35 @@
-"""The formed surface as a mesh file: STL, OBJ, PLY or GLB."""
+"""Bodies as mesh files: STL, OBJ, PLY, GLB and 3MF, each whole or not at all."""
 
 from __future__ import annotations
 
-import importlib
 import os
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import BinaryIO
 
-import numpy as np
-from numpy.typing import ArrayLike
-
+from . import mesh_file_glb, mesh_file_obj, mesh_file_ply, mesh_file_stl, mesh_file_threemf
+from .body import Body
 from .errors import OutputError, ParameterError
-from .surface import BASE_THICKNESS, solid
 
-if TYPE_CHECKING:  # only named in annotations: trimesh is imported where it is used
-    import trimesh
+__all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write", "write_whole"]
 
-__all__ = ["FORMATS", "UNITS", "known_format", "mesh", "write", "write_whole"]
-
-#: File formats, by extension, with what is said of them in the help.
+#: File formats, by name, with what is said of them in the help.
 FORMATS: dict[str, str] = {
     "stl": "STL, binary",
-    "obj": "Wavefront OBJ",
-    "ply": "Stanford PLY, binary",
+    "stl_ascii": "STL as text",
+    "obj": "Wavefront OBJ, with a group for each feature",
+    "ply": "Stanford PLY, binary, with height, force and mode of each vertex",
     "glb": "binary glTF, in metres and y up as its standard says",
+    "3mf": "3MF, which names its unit",
+}
+WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
+    "stl": mesh_file_stl.write_binary,
+    "stl_ascii": mesh_file_stl.write_ascii,
+    "obj": mesh_file_obj.write,
+    "ply": mesh_file_ply.write,
+    "glb": mesh_file_glb.write,
+    "3mf": mesh_file_threemf.write,
 }
 
 #: Lengths a file can be written in: how many of them make a metre.
@@ -45,43 +50,25 @@ def known_format(name: str) -> str:
     return key
 
 
-def mesh(
-    position: ArrayLike,
-    height: ArrayLike,
-    rows: int,
-    columns: int,
-    *,
-    base: float | None = None,
-    base_thickness: float = BASE_THICKNESS,
-) -> trimesh.Trimesh:
-    """Return the formed surface as a watertight solid, in metres.
-
-    The parameters are those of `surface.solid`; vertices and faces keep its order.
-
-    Raises
-    ------
-    ParameterError
-        As `surface.solid`.
-    OutputError
-        When trimesh is not installed.
-    """
-    vertices, faces = solid(position, height, rows, columns, base=base, base_thickness=base_thickness)
-    made: trimesh.Trimesh = _trimesh().Trimesh(vertices=vertices, faces=faces, process=False)
-    return made
+def suffix(kind: str) -> str:
+    """Return how the name of a file of a format ends; text and binary STL do not share a name."""
+    return ".ascii.stl" if kind == "stl_ascii" else f".{kind}"
 
 
-def write(mesh: trimesh.Trimesh, path: str | Path, unit: str = "mm") -> Path:
-    """Write `mesh` to `path`, whose extension names the format.
+def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str | None = None) -> Path:
+    """Write bodies into one file, a few MB at a time.
 
     Parameters
     ----------
-    mesh : trimesh.Trimesh
-        In metres, z up, as `mesh` returns it; it is left as it is.
+    bodies : sequence of Body
+        One at least; they are left as they are.
     path : str or Path
         The file; an older one is replaced once the new one is complete.
     unit : {"mm", "m"}
-        Length unit of STL, OBJ and PLY, which do not name theirs. A GLB is always in metres
-        and y up, because its standard says so.
+        Length unit of all formats but GLB, which is always in metres and y up, because its
+        standard says so.
+    kind : str, optional
+        A key of `FORMATS`; by default the extension of `path`.
 
     Returns
     -------
@@ -91,21 +78,18 @@ def write(mesh: trimesh.Trimesh, path: str | Path, unit: str = "mm") -> Path:
     Raises
     ------
     OutputError
-        On an unknown format, or when the file cannot be written.
+        On an unknown format, nothing to write, or when the file cannot be written.
     ParameterError
         On an unknown unit.
     """
     target = Path(path)
-    kind = known_format(target.suffix)
+    writer = WRITERS[known_format(target.suffix if kind is None else kind)]
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    if kind == "glb":
-        vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
-    else:
-        vertices = vertices * UNITS[unit]
-    content = _trimesh().Trimesh(vertices=vertices, faces=mesh.faces, process=False).export(file_type=kind)
-    write_whole(target, content.encode("utf-8") if isinstance(content, str) else bytes(content))
+    if not any(len(body.faces) for body in bodies):
+        raise OutputError(f"There is nothing to write to {target}.")
+    with _whole(target) as file:
+        writer(file, bodies, UNITS[unit])
     return target
 
 
@@ -117,9 +101,17 @@ def write_whole(path: Path, content: bytes) -> None:
     OutputError
         When the file cannot be written.
     """
+    with _whole(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[BinaryIO]:
+    """Give a file under a temporary name to write into; on leaving it well, it becomes `path`."""
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        unfinished.write_bytes(content)
+        with unfinished.open("wb") as file:
+            yield file
         unfinished.replace(path)
     except BaseException as error:
         with suppress(OSError):  # what went wrong first is what the user has to hear
@@ -127,11 +119,3 @@ def write_whole(path: Path, content: bytes) -> None:
         if isinstance(error, OSError):
             raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
         raise
-
-
-def _trimesh() -> Any:
-    """Import trimesh, or say what to install."""
-    try:
-        return importlib.import_module("trimesh")
-    except ImportError:
-        raise OutputError("Exporting a mesh needs trimesh: run 'pip install trimesh'.") from None

@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
 
-__all__ = ["BASE_THICKNESS", "base_level", "grid_shape", "prism_volume", "skin", "solid"]
+__all__ = ["BASE_THICKNESS", "base_level", "check_heights", "grid_shape", "prism_volume", "skin", "solid"]
 
 Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Indices = NDArray[np.int32]
 
 #: Material left under the lowest pin top unless a base is asked for, m. Enough for a
 #: printed part to hold together, without 40 mm of plastic down to the bed's floor.
@@ -32,6 +32,8 @@ BASE_THICKNESS = 3e-3
 #: Two diagonals are as long as each other when their squares agree to this fraction:
 #: far above rounding, far below the smallest difference of a known arrangement (staggered, 4/5).
 SAME_LENGTH = 1e-6
+#: Pins whose triangles are worked out at once, so that a large bed takes little more memory than its result.
+BAND = 1 << 16
 
 
 def grid_shape(position: ArrayLike) -> tuple[int, int]:
@@ -85,21 +87,29 @@ def skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Ind
         On a single row or column, arrays that do not fit, numbers that are not finite, or
         pins out of order.
     """
-    place, top = _checked(position, height, rows, columns)
-    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    place, top = check_heights(position, height, rows, columns)
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    clockwise = _plan_area(place, index[:2, :2].ravel()[None, :3])[0] < 0.0  # a mirrored bed
+    faces = np.empty((rows - 1, 2 * (columns - 1), 3), np.int32)
+    band = max(1, BAND // columns)
+    for row in range(0, rows - 1, band):
+        some = _triangles(place, top, index[row : row + band + 1])
+        some = some[:, ::-1] if clockwise else some
+        if not np.all(_plan_area(place, some) > 0.0):
+            raise ParameterError("Surface", "position", "must order the pins row by row", "pins out of order")
+        faces[row : row + band] = some.reshape(-1, 2 * (columns - 1), 3)
+    return faces.reshape(-1, 3)
+
+
+def _triangles(place: Floats, top: Floats, index: Indices) -> Indices:
+    """Return the triangles between some rows of pins, two for every four of them."""
     # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the other.
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     along_ac = _cut_along_ac(place, top, a, b, c, d)
     first = np.stack([a, b, np.where(along_ac, c, d)], axis=1)
     second = np.stack([np.where(along_ac, a, b), c, d], axis=1)
-    faces: Indices = np.stack([first, second], axis=1).reshape(-1, 3)
-    area = _plan_area(place, faces)
-    if np.all(area < 0.0):  # the rows or the columns run the other way: a mirrored bed
-        faces = faces[:, ::-1].copy()
-        area = -area
-    if not np.all(area > 0.0):
-        raise ParameterError("Surface", "position", "must order the pins row by row", "pins out of order")
-    return faces
+    triangles: Indices = np.stack([first, second], axis=1).reshape(-1, 3)
+    return triangles
 
 
 def solid(
@@ -139,10 +149,10 @@ def solid(
     ParameterError
         As `skin`; also when the base is not below every pin top.
     """
-    place, top = _checked(position, height, rows, columns)
+    place, top = check_heights(position, height, rows, columns)
     level = base_level(top, base=base, base_thickness=base_thickness)
     over = skin(place, top, rows, columns)
-    n = len(place)
+    n, faced = len(place), len(over)
     vertices = np.empty((2 * n, 3))
     vertices[:n, :2] = vertices[n:, :2] = place
     vertices[:n, 2], vertices[n:, 2] = top, level
@@ -151,7 +161,10 @@ def solid(
         start = start[::-1]
     end = np.roll(start, -1)
     walls = np.stack([end, start, start + n, end, start + n, end + n], axis=1).reshape(-1, 3)
-    return vertices, np.concatenate([over, over[:, ::-1] + n, walls])
+    faces = np.empty((2 * faced + len(walls), 3), np.int32)
+    faces[:faced], faces[2 * faced :] = over, walls
+    np.add(over[:, ::-1], n, out=faces[faced : 2 * faced])
+    return vertices, faces
 
 
 def prism_volume(
@@ -168,7 +181,7 @@ def prism_volume(
     Exact: the sum over the triangles of area in plan times mean height above the base. The
     parameters are those of `solid`.
     """
-    place, top = _checked(position, height, rows, columns)
+    place, top = check_heights(position, height, rows, columns)
     level = base_level(top, base=base, base_thickness=base_thickness)
     faces = skin(place, top, rows, columns)
     return float(np.sum(_plan_area(place, faces) * (top[faces].mean(axis=1) - level)))
@@ -207,8 +220,15 @@ def _pins(position: ArrayLike) -> Floats:
     return place
 
 
-def _checked(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> tuple[Floats, Floats]:
-    """Return positions and heights as arrays, or refuse what cannot carry a skin."""
+def check_heights(
+    position: ArrayLike, height: ArrayLike, rows: int, columns: int, name: str = "height"
+) -> tuple[Floats, Floats]:
+    """Return positions and one value a pin as arrays, or refuse what cannot carry a skin.
+
+    Raises
+    ------
+    ParameterError
+    """
     if rows < 2 or columns < 2:
         raise ParameterError(
             "Surface", "", "must have 2 x 2 pins at least to carry a skin", f"{rows} x {columns}"
@@ -216,9 +236,9 @@ def _checked(position: ArrayLike, height: ArrayLike, rows: int, columns: int) ->
     place, top = _pins(position), np.asarray(height, dtype=np.float64)
     if top.shape != (rows * columns,) or len(place) != rows * columns:
         rule = f"must have one value for each of the {rows} x {columns} pins"
-        raise ParameterError("Surface", "height", rule, f"{top.size} heights at {len(place)} positions")
+        raise ParameterError("Surface", name, rule, f"{top.size} values at {len(place)} positions")
     if not np.all(np.isfinite(top)):
-        raise ParameterError("Surface", "height", "must be finite", _first_bad(top))
+        raise ParameterError("Surface", name, "must be finite", _first_bad(top))
     return place, top
 
 
@@ -247,5 +267,5 @@ def _plan_area(place: Floats, faces: Indices) -> Floats:
 
 def _outline(rows: int, columns: int) -> Indices:
     """Return the outer pins: along the first row, up the last column, back, and down the first."""
-    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])

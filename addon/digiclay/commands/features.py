@@ -1,0 +1,53 @@
+"""``digiclay features``: the bosses and creases a finished run has formed, listed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from ..core.export_model import features
+from ..core.features import summary, table
+from ..core.formed import of_history
+from .arguments import add_run, seconds
+from .benchmark_report import table as aligned
+from .export import refuse_what_has_no_surface
+from .finished import read
+from .surface_options import add_surface, finding_of, former_of, model_of, row_of
+
+__all__ = ["add"]
+
+EXAMPLES = """\
+examples:
+  digiclay features ridge_mound_valley
+  digiclay features ridge_mound_valley --time 13.3 --former 10.3 --threshold "1 mm"
+  digiclay features ridge_mound_valley --json > features.json
+
+Areas are in plan; a crest is measured in space. With --json everything is in SI units, with the pins of
+each feature and the points of its crest lines.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_run(commands, "features", "list the bosses and creases of a run", EXAMPLES)
+    add_surface(parser)
+    parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the end")
+    parser.add_argument("--json", action="store_true", help="write JSON")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """List the features."""
+    run = read(arguments.run, "height", "position", "force", "mode")
+    refuse_what_has_no_surface(run.scene, "features")
+    formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
+    found = features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
+    if arguments.json:
+        print(json.dumps([one.figures() for one in found], indent=1))
+        return 0
+    print(summary(found))
+    if found:
+        head, *rows = table(found)
+        print("\n".join(aligned(head, rows)))
+    return 0

@@ -1,0 +1,79 @@
+"""Options of what is made of a run's surface: its skin, and what counts as a feature."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..core.errors import OutputError
+from ..core.export_model import Model
+from ..core.features import Finding
+from ..core.quantity import parse
+from ..core.scene import Scene
+from ..core.skins import SKINS
+from .arguments import seconds
+from .finished import Run, row_at
+
+__all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]
+
+
+def add_surface(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    shown = "; ".join(f"{name}: {said}" for name, said in SKINS.items())
+    parser.add_argument("--skin", choices=tuple(SKINS), default="bilinear", help=f"{shown}; default bilinear")
+    parser.add_argument(
+        "--resolution", metavar="N", type=int, default=0, help="points a pitch; default 1, or 4 if curved"
+    )
+    known = Finding()
+    parser.add_argument(
+        "--threshold",
+        metavar="L",
+        help=f"how far off its former place a feature is; default {known.threshold * 1e3:g} mm",
+    )
+    parser.add_argument(
+        "--smallest", metavar="N", type=int, default=known.smallest,
+        help=f"pins a feature has at least; default {known.smallest}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--former", metavar="T", default="0",
+        help="the instant, s, whose surface features are measured from, or 'rest'; default the start",
+    )  # fmt: skip
+
+
+def finding_of(arguments: argparse.Namespace) -> Finding:
+    """Return what counts as a feature."""
+    told: dict[str, Any] = {"smallest": arguments.smallest}
+    if arguments.threshold is not None:
+        told["threshold"] = _length(arguments.threshold, "--threshold")
+    return Finding(**told)
+
+
+def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
+    """Return what is to be made."""
+    told: dict[str, Any] = {"kind": kind, "skin": arguments.skin, "resolution": arguments.resolution}
+    if getattr(arguments, "base_thickness", None) is not None:
+        told["base_thickness"] = _length(arguments.base_thickness, "--base-thickness")
+    return Model(cap=scene.actuator.bore / 2.0, **told)
+
+
+def row_of(run: Run, time: float | None) -> int:
+    """Return the row of an instant, s; the last one where none is given."""
+    return -1 if time is None else row_at(run.history, time)
+
+
+def former_of(run: Run, text: str) -> int | float:
+    """Return the row of what was before, or the rest height of all pins, m."""
+    if text.strip() == "rest":
+        return float(run.scene.actuator.rest_height)
+    try:
+        return row_at(run.history, seconds(text))
+    except argparse.ArgumentTypeError as error:
+        raise OutputError(f"--former must be a time or 'rest': {error}.") from None
+
+
+def _length(text: str, option: str) -> float:
+    """Read a length: a number of millimetres, or a quantity such as ``"500 um"``; in m."""
+    try:
+        return parse(text if " " in text.strip() else f"{text.strip()} mm", "m")
+    except ValueError as error:
+        raise OutputError(f"{option} {error} (got {text!r}).") from None

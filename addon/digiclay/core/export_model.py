@@ -1,0 +1,166 @@
+"""What is exported of a formed surface: its skin, a solid, the pins, or its features."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .body import NO_PIN, Body, Floats, Indices
+from .errors import OutputError, ParameterError
+from .feature_solids import solid as feature_solid
+from .features import Feature, Finding, find
+from .formed import Formed
+from .pins_solid import pins_solid
+from .quantity import Parameters, quantity
+from .sheet import Sheet, stretched
+from .skins import SKINS
+from .surface import BASE_THICKNESS, base_level, solid
+
+__all__ = ["KINDS", "Model", "bodies", "features", "sheet"]
+
+#: Kinds of mesh, by name, with what is said of them in the help.
+KINDS: dict[str, str] = {
+    "solid": "the skin with a base and walls, watertight",
+    "surface": "the skin alone, open",
+    "pins": "the stepped bed as one printable body, watertight",
+    "features": "each boss as a body, each crease as the body that fills it",
+}
+#: Points a pitch of a skin that is not straight between the pins, unless told otherwise.
+CURVED = 4
+#: More points than this no program takes in; it is also a few GB of memory.
+MOST_POINTS = 50_000_000
+
+
+@dataclass(frozen=True)
+class Model(Parameters):
+    """What is made of a formed surface."""
+
+    kind: str = quantity("solid", "kind of mesh", choices=tuple(KINDS))
+    skin: str = quantity("bilinear", "skin between the pins; pins have none", choices=tuple(SKINS))
+    resolution: int = quantity(
+        0, f"points a pitch; 0 is 1 for the bilinear skin and {CURVED} for the others", at_least=0, at_most=64
+    )
+    base_thickness: float = quantity(
+        BASE_THICKNESS, "material under the lowest point of solid and pins", unit="m", above=0.0, at_most=1.0
+    )
+    cap: float = quantity(
+        1e-3, "radius of a pin's flat end, on which the membrane lies", unit="m", above=0.0, at_most=1.0
+    )
+
+    @property
+    def parts(self) -> int:
+        """Points a pitch."""
+        return self.resolution or (1 if self.skin == "bilinear" else CURVED)
+
+
+def sheet(formed: Formed, model: Model) -> Sheet:
+    """Return the skin a model asks for.
+
+    Raises
+    ------
+    ParameterError
+        When it would have too many points.
+    """
+    points = model.parts**2 * len(formed.height)
+    if points > MOST_POINTS:
+        rule = f"must be low enough for {MOST_POINTS // 1_000_000} million points on this bed"
+        value = f"{model.parts}: {points / 1e6:.3g} million points"
+        raise ParameterError("Model", "resolution", rule, value)
+    return stretched(formed, model.skin, model.parts, model.cap)
+
+
+def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
+    """Return the features of the skin a model asks for."""
+    return find(sheet(formed, model), finding)
+
+
+def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
+    """Return what a model asks for as bodies, in m.
+
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+    finding : Finding, optional
+        How features are found; they become groups of faces. Without it there are no groups, which spares
+        a large bed the search; bodies of features are found by the defaults then.
+
+    Raises
+    ------
+    OutputError
+        When features are asked for and there are none.
+    ParameterError
+        When there would be too many points.
+    """
+    skin = sheet(formed, model)
+    if model.kind == "features":
+        found = find(skin, finding)
+        if not found:
+            known = finding or Finding()
+            wanted = f"at least {known.smallest} pins more than {known.threshold * 1e3:g} mm"
+            raise OutputError(
+                f"There is no feature of {wanted} off the former surface: lower the threshold or the "
+                "smallest number of pins."
+            )
+        return [_feature(formed, one) for one in found]
+    found = find(skin, finding) if finding else []
+    names = tuple(one.name for one in found)
+    label = np.zeros(len(formed.height), np.int32)
+    for number, one in enumerate(found, 1):
+        label[one.pins] = number
+    if model.kind == "pins":
+        return [_pins(formed, model, names, label)]
+    return [_skin(skin, model, names, label)]
+
+
+def _skin(sheet: Sheet, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+    """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
+    if model.kind == "surface":
+        vertices, faces = np.column_stack([sheet.place, sheet.height]), sheet.faces
+        values = sheet.values()
+    else:
+        level = base_level(sheet.height, base_thickness=model.base_thickness)
+        vertices, faces = solid(sheet.place, sheet.height, sheet.rows, sheet.columns, base=level)
+        values = sheet.values_with_base(level)
+    group = np.zeros(len(faces) if names else 0, np.int32)
+    if names:
+        over = faces[: 2 * (sheet.rows - 1) * (sheet.columns - 1)]
+        group[: len(over)] = sheet.nearest(label)[over].max(axis=1)
+    return Body("clay", vertices, faces, values, names, group, closed=model.kind != "surface")
+
+
+def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+    """Return the stepped bed; walls and undersides are in the feature of their pin."""
+    vertices, faces, pin = pins_solid(formed, base_thickness=model.base_thickness)
+    owner = np.full(len(vertices), NO_PIN)
+    level = vertices[:, 2].min()
+    # Every vertex above the base is a corner of some pin's top.
+    tops = (vertices[faces, 2] > level).all(axis=1)
+    owner[faces[tops]] = pin[tops, None]
+    owner[: len(formed.height)] = np.arange(len(formed.height))
+    group = label[pin] if names else np.empty(0, np.int32)
+    return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group)
+
+
+def _feature(formed: Formed, feature: Feature) -> Body:
+    """Return the body of a feature; its vertices have force and mode of the nearest of its pins."""
+    body = feature_solid(feature)
+    place = formed.position[feature.pins]
+    nearest = np.empty(len(body.vertices), np.int64)
+    for start in range(0, len(nearest), 1024):
+        some = slice(start, start + 1024)
+        away = ((body.vertices[some, None, :2] - place) ** 2).sum(axis=2)
+        nearest[some] = feature.pins[np.argmin(away, axis=1)]
+    return Body(body.name, body.vertices, body.faces, _of_pins(formed, body.vertices, nearest))
+
+
+def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict[str, Floats]:
+    """Return the values of vertices that belong to a pin each, or to none."""
+    pinned = owner >= 0
+    return {
+        "height": vertices[:, 2].copy(),
+        "force": np.where(pinned, formed.force[owner], 0.0),
+        "mode": np.where(pinned, formed.mode[owner], NO_PIN).astype(np.float64),
+    }

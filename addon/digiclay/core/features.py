@@ -1,0 +1,146 @@
+"""Formed features: the bosses and creases of a surface, found, measured and named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .feature_crest import Lattice, crests
+from .feature_region import Region, components, cut
+from .quantity import Parameters, quantity
+from .sheet import Sheet
+
+__all__ = ["Feature", "Finding", "find", "summary", "table"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Finding(Parameters):
+    """What counts as a feature."""
+
+    threshold: float = quantity(
+        0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", above=0.0
+    )
+    smallest: int = quantity(3, "pins a feature has at least", at_least=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A boss or a crease: a connected part of the skin more than the threshold off its former place.
+
+    Attributes
+    ----------
+    kind : {"boss", "crease"}
+    number : int
+        1 is the largest of its kind.
+    pins : ndarray of int (k,)
+        The pins in it, ascending.
+    region : Region
+        The part of the skin.
+    extreme : float
+        Largest height of a boss, or depth of a crease, off the former surface, m.
+    crests : tuple of ndarray (p, 3)
+        The lines along its top, or its bottom, m.
+    """
+
+    kind: str
+    number: int
+    pins: NDArray[np.int64]
+    region: Region
+    extreme: float
+    crests: tuple[Floats, ...]
+
+    @property
+    def name(self) -> str:
+        """The name it has in files and in Blender."""
+        return f"{self.kind}_{self.number}"
+
+    @property
+    def area(self) -> float:
+        """Area in plan, m²."""
+        return self.region.area
+
+    @property
+    def volume(self) -> float:
+        """Volume between the surface now and before, m³."""
+        return self.region.volume
+
+    @property
+    def crest_length(self) -> float:
+        """Length of all crest lines, in space, m."""
+        return float(sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in self.crests))
+
+    def figures(self) -> dict[str, object]:
+        """Return what is listed of it, in SI units."""
+        return {
+            "name": self.name, "kind": self.kind, "pins": self.pins.tolist(), "area": self.area,
+            "height" if self.kind == "boss" else "depth": self.extreme, "volume": self.volume,
+            "crest_length": self.crest_length, "crests": [line.tolist() for line in self.crests],
+        }  # fmt: skip
+
+
+def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
+    """Return the features of a skin: bosses, then creases, the largest of each first.
+
+    Points belong together that the skin's triangles join; so two bosses that only touch at
+    the threshold are two.
+    """
+    finding = finding or Finding()
+    lattice = Lattice.of(sheet.formed)
+    found = []
+    for kind, sign in (("boss", 1.0), ("crease", -1.0)):
+        some = sorted(_of_kind(sheet, finding, lattice, kind, sign), key=lambda one: -one.volume)
+        found += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
+    return found
+
+
+def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: float) -> Iterator[Feature]:
+    """Give the features of one kind, not yet numbered."""
+    off = sign * sheet.raised
+    inside = off > finding.threshold
+    faces = sheet.faces[inside[sheet.faces].any(axis=1)]
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    label = components(len(off), edges[inside[edges].all(axis=1)])
+    # All corners of a triangle that are inside are joined by it, and so have one label.
+    of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
+    order = np.argsort(of_face, kind="stable")
+    starts = np.flatnonzero(np.diff(of_face[order], prepend=-1))
+    pins = sheet.pins
+    of_pin = np.where(inside[pins], label[pins], -1)
+    at_pins = sign * sheet.formed.raised
+    names, counts = np.unique(of_pin, return_counts=True)
+    large = set(names[(counts >= finding.smallest) & (names >= 0)].tolist())
+    for block in np.split(order, starts[1:]) if starts.size else []:
+        name = int(of_face[block[0]])
+        if name not in large:
+            continue
+        mine = np.flatnonzero(of_pin == name)
+        region = cut(sheet.place, sheet.former, off, faces[block], finding.threshold)
+        lines = crests(sheet.formed, lattice, mine, at_pins)
+        yield Feature(kind, 0, mine, region, float(region.off.max()), lines)
+
+
+def table(features: list[Feature]) -> list[tuple[str, ...]]:
+    """Return what a person reads: a head, and a row of texts a feature, in mm."""
+    head = ("feature", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    rows = [
+        (
+            one.name, str(len(one.pins)), f"{one.area * 1e6:.1f}", f"{one.extreme * 1e3:.2f}",
+            f"{one.crest_length * 1e3:.1f}", f"{one.volume * 1e9:.0f}",
+        )
+        for one in features
+    ]  # fmt: skip
+    return [head, *rows]
+
+
+def summary(features: list[Feature]) -> str:
+    """Return how many there are in a few words."""
+    counts = [(sum(one.kind == kind for one in features), kind) for kind in ("boss", "crease")]
+    return " and ".join(
+        f"{n} {kind}{'' if n == 1 else 'es' if kind == 'boss' else 's'}" for n, kind in counts
+    )

@@ -1,0 +1,115 @@
+"""A formed surface: the pins as they are, and as they were before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import OutputError, ParameterError
+from .surface import check_heights, grid_shape
+
+__all__ = ["Formed", "of_history"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """All pins of a bed, row by row.
+
+    Attributes
+    ----------
+    position : ndarray (n, 2)
+        Axes of the pins, m.
+    height : ndarray (n,)
+        Pin tops, m.
+    former : ndarray (n,)
+        The same before the surface was formed, m; one number for all will do.
+    force : ndarray (n,)
+        Force on each pin, N.
+    mode : ndarray of int (n,)
+        Codes of `modes.Mode`.
+    rows, columns : int
+        Found from the positions.
+
+    Raises
+    ------
+    ParameterError
+        On fewer than 2 x 2 pins, arrays that do not fit, numbers that are not finite, or pins
+        out of order.
+    """
+
+    position: Floats
+    height: Floats
+    former: Floats
+    force: Floats
+    mode: NDArray[np.int64]
+    rows: int
+    columns: int
+
+    @classmethod
+    def of(
+        cls, position: ArrayLike, height: ArrayLike, former: ArrayLike, force: ArrayLike, mode: ArrayLike
+    ) -> Formed:
+        """Check and take the arrays."""
+        rows, columns = grid_shape(position)
+        place, top = check_heights(position, height, rows, columns)
+        _, before = check_heights(place, np.broadcast_to(former, top.shape), rows, columns, "former")
+        _, pressed = check_heights(place, np.broadcast_to(force, top.shape), rows, columns, "force")
+        codes = np.broadcast_to(np.asarray(mode, np.int64), top.shape)
+        return cls(place, top, before, pressed, codes, rows, columns)
+
+    @property
+    def pitch(self) -> float:
+        """Distance between neighbours in a row, m."""
+        return float(np.hypot(*(self.position[1] - self.position[0])))
+
+    @property
+    def shift(self) -> float:
+        """How far the second row is shifted along x against the first, m; 0 in an aligned bed."""
+        shift = float(self.position[self.columns, 0] - self.position[0, 0])
+        return shift if abs(shift) > 1e-3 * self.pitch else 0.0
+
+    @property
+    def row_spacing(self) -> float:
+        """Distance between rows, m."""
+        return float(abs(self.position[self.columns, 1] - self.position[0, 1]))
+
+    @property
+    def raised(self) -> Floats:
+        """How far each pin is above where it was before, m."""
+        return self.height - self.former
+
+
+def of_history(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
+    """Return one row of a history as a formed surface.
+
+    Parameters
+    ----------
+    history : mapping of arrays
+        `position`, `height`, `force` and `mode` as in ``history.npz``.
+    row : int
+        Negative rows count from the last one.
+    former : int or float
+        The row that tells what was before (an int), or one height of all pins, m (a float).
+
+    Raises
+    ------
+    OutputError
+        When the history has no such row.
+    ParameterError
+        As `Formed`.
+    """
+    count = len(history["height"])
+    for name, wanted in (("row", row), ("former", former)):
+        if isinstance(wanted, int) and not -count <= wanted < count:
+            raise OutputError(f"The history has {count} rows, 0 to {count - 1} (got {wanted} as {name}).")
+    before = history["height"][former] if isinstance(former, int) else former
+    if isinstance(former, float) and not np.isfinite(former):
+        raise ParameterError("Export", "former", "must be a finite height", f"{former} m")
+    arrays = (history[name][row] for name in ("force", "mode"))
+    return Formed.of(history["position"], history["height"][row], before, *arrays)

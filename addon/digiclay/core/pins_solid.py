@@ -1,0 +1,212 @@
+"""The stepped bed as one printable body: every pin a prism over its own part of the bed.
+
+The parts are those that are nearest to a pin: squares in an aligned bed, hexagons in a shifted one. Where
+neighbours differ in height a wall stands between them. Two squares that meet at a corner only, and are
+both higher than the other two there, would touch along a line without thickness, which no printer can
+make: they are joined by a bridge as narrow as `BRIDGE`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .formed import Formed
+from .surface import BASE_THICKNESS, base_level
+
+__all__ = ["BRIDGE", "Parts", "parts", "pins_solid"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Codes = NDArray[np.int64]
+
+#: Half the width of a bridge, in pitches along x and rows along y.
+BRIDGE = 0.05
+#: Who is beyond the edge of the bed.
+OUTSIDE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The bed divided into parts, one a pin.
+
+    Attributes
+    ----------
+    corner : ndarray (k, 2)
+        Where the parts meet, m.
+    start, end : ndarray of int (e,)
+        Corners of each side of each part; the part is to the left.
+    pin, other : ndarray of int (e,)
+        Whose side it is, and who is beyond it; -1 is nobody.
+    """
+
+    corner: Floats
+    start: Codes
+    end: Codes
+    pin: Codes
+    other: Codes
+
+
+def parts(formed: Formed) -> Parts:
+    """Divide a bed."""
+    corner, loops = _squares(formed) if not formed.shift else _hexagons(formed)
+    # Corners of one loop that coincide are one corner: the loop of a square has two at each.
+    start, end = loops.ravel(), np.roll(loops, -1, axis=1).ravel()
+    pin = np.repeat(np.arange(len(loops)), loops.shape[1])
+    real = start != end
+    start, end, pin = start[real], end[real], pin[real]
+    size = len(corner)
+    order = np.argsort(start * size + end)
+    sides = (start * size + end)[order]
+    found = np.minimum(np.searchsorted(sides, end * size + start), len(sides) - 1)
+    met = sides[found] == end * size + start
+    return Parts(corner, start, end, pin, np.where(met, pin[order[found]], OUTSIDE))
+
+
+def pins_solid(
+    formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
+) -> tuple[Floats, Indices, Codes]:
+    """Return the stepped bed, closed.
+
+    Parameters
+    ----------
+    formed : Formed
+    base, base_thickness : float
+        As for `surface.solid`.
+
+    Returns
+    -------
+    vertices : ndarray (v, 3)
+        m; first the middle of each pin's top in their order.
+    faces : ndarray of int (f, 3)
+        Counter-clockwise seen from outside.
+    pin : ndarray of int (f,)
+        Whose top, wall or underside a face is.
+    """
+    level = base_level(formed.height, base=base, base_thickness=base_thickness)
+    made, n = parts(formed), len(formed.height)
+    height = np.append(formed.height, level)  # of nobody, number -1
+    # Each corner has a vertex at the height of every part about it, and one of the base.
+    k = len(made.corner)
+    at = np.concatenate([made.start, np.arange(k)])
+    z = np.concatenate([height[made.pin], np.full(k, level)])
+    order = np.lexsort((z, at))
+    new = np.ones(len(order), bool)
+    new[1:] = (np.diff(at[order]) != 0) | (np.diff(z[order]) != 0.0)
+    number = np.empty(len(order), np.int64)
+    number[order] = np.cumsum(new) - 1 + 2 * n
+    own, ground = number[: len(made.start)], number[len(made.start) :]
+    kept = order[new]
+    middle = np.column_stack([formed.position, formed.height])
+    below = np.column_stack([formed.position, np.full(n, level)])
+    vertices = np.concatenate([middle, below, np.column_stack([made.corner[at[kept]], z[kept]])])
+    ahead = _following(made, own)
+    top = np.stack([made.pin, own, ahead], axis=1)
+    bottom = np.stack([made.pin + n, ground[made.end], ground[made.start]], axis=1)
+    walls, whose = _walls(made, height, own, ahead, ground)
+    faces = np.concatenate([top, bottom, walls]).astype(np.int32)
+    return vertices, faces, np.concatenate([made.pin, made.pin, whose])
+
+
+def _following(made: Parts, own: Codes) -> Codes:
+    """Return for each side the vertex of its part at its end: that at which the part's next side starts."""
+    size = len(made.corner)
+    key = made.pin * size + made.start
+    order = np.argsort(key)
+    following: Codes = own[order[np.searchsorted(key[order], made.pin * size + made.end)]]
+    return following
+
+
+def _walls(made: Parts, height: Floats, own: Codes, ahead: Codes, ground: Codes) -> tuple[Codes, Codes]:
+    """Return the triangles of the walls a part has above its neighbours, and whose they are.
+
+    The vertices of a corner have numbers in the order of their heights, so that those between the
+    neighbour's height and one's own stand in line.
+    """
+    side = np.flatnonzero(height[made.pin] > height[made.other])
+    pin, other = made.pin[side], made.other[side]
+    size = len(made.corner)
+    key = made.pin * size + made.start
+    order = np.argsort(key)
+
+    def foot(corner: Codes) -> Codes:
+        """Return the neighbour's vertex at a corner; beyond the bed that of the base."""
+        wanted = np.where(other >= 0, other, 0) * size + corner
+        theirs = own[order[np.minimum(np.searchsorted(key[order], wanted), len(order) - 1)]]
+        return np.where(other >= 0, theirs, ground[corner])
+
+    left, right = foot(made.start[side]), foot(made.end[side])
+    rise, climb = own[side] - left, ahead[side] - right
+    i, step = _counted(rise)
+    one = np.stack([left[i] + step, right[i], left[i] + step + 1], axis=1)
+    j, step = _counted(climb)
+    two = np.stack([right[j] + step, right[j] + step + 1, own[side][j]], axis=1)
+    return np.concatenate([one, two]), np.concatenate([pin[i], pin[j]])
+
+
+def _counted(counts: Codes) -> tuple[Codes, Codes]:
+    """Return each index as often as its count says, and which time it is."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    return index, np.arange(len(index)) - first[index]
+
+
+def _squares(formed: Formed) -> tuple[Floats, Codes]:
+    """Return corners and loops of an aligned bed: where four parts meet are two corners, mostly the same."""
+    rows, columns = formed.rows, formed.columns
+    place = formed.position.reshape(rows, columns, 2)
+    step_x, step_y = place[0, 1, 0] - place[0, 0, 0], place[1, 0, 1] - place[0, 0, 1]
+    x = place[0, 0, 0] + step_x * (np.arange(columns + 1) - 0.5)
+    y = place[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
+    corner = np.stack(np.meshgrid(x, y), axis=-1)
+    top = formed.height.reshape(rows, columns)
+    a, b, c, d = top[:-1, :-1], top[:-1, 1:], top[1:, 1:], top[1:, :-1]
+    ac = np.minimum(a, c) > np.maximum(b, d)
+    bd = np.minimum(b, d) > np.maximum(a, c)
+    apart = np.zeros((rows + 1, columns + 1), bool)
+    apart[1:-1, 1:-1] = ac | bd
+    # The lower one stands towards -y, and towards +x where a and c are joined, towards -x where b and d are.
+    lean = np.zeros(apart.shape)
+    lean[1:-1, 1:-1] = np.where(ac, 1.0, np.where(bd, -1.0, 0.0))
+    away = BRIDGE * np.stack([lean * step_x, -np.abs(lean) * step_y], axis=-1)
+    lower = np.arange(apart.size).reshape(apart.shape)
+    upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
+    corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
+    joined_ac, joined_bd = lean > 0.0, lean < 0.0
+    # What a, b, c and d have of the meeting, in the order of their loops.
+    of_a = lower, np.where(joined_ac, upper, lower)
+    of_b = np.where(joined_bd, upper, lower), lower
+    of_c = upper, np.where(joined_ac, lower, upper)
+    of_d = np.where(joined_bd, lower, upper), upper
+    loops = np.stack(
+        [
+            *(one[:-1, :-1] for one in of_c), *(one[:-1, 1:] for one in of_d),
+            *(one[1:, 1:] for one in of_a), *(one[1:, :-1] for one in of_b),
+        ],
+        axis=-1,
+    ).reshape(rows * columns, 8)  # fmt: skip
+    return corners, loops if step_x * step_y > 0.0 else loops[:, ::-1]
+
+
+def _hexagons(formed: Formed) -> tuple[Floats, Codes]:
+    """Return corners and loops of a bed whose rows are shifted by half a pitch."""
+    rows, columns = formed.rows, formed.columns
+    pitch = formed.position[1, 0] - formed.position[0, 0]
+    spacing = formed.position[columns, 1] - formed.position[0, 1]
+    near = (spacing**2 - pitch**2 / 4.0) / (2.0 * spacing)
+    side = np.sign(formed.shift * pitch).astype(int)
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    # Corners between two rows stand half a pitch apart; those of a pin are numbers q - 1, q and q + 1.
+    width = 2 * columns + 4
+    q = 2 * column + (row % 2) * side + 2
+    below, above = row * width + q, (row + 1) * width + q
+    loops = np.stack([below - 1, below, below + 1, above + 1, above, above - 1], axis=1)
+    x = np.array([-0.5, 0.0, 0.5, 0.5, 0.0, -0.5]) * pitch
+    y = np.array([-near, near - spacing, -near, near, spacing - near, near])
+    corner = np.empty(((rows + 1) * width, 2))
+    corner[loops] = formed.position[:, None] + np.column_stack([x, y])
+    used, loops = np.unique(loops, return_inverse=True)
+    loops = loops.reshape(-1, 6)
+    return corner[used], loops if pitch * spacing > 0.0 else loops[:, ::-1]
