@@ -1,44 +1,133 @@
-"""``digiclay render``: a picture of one instant of a finished run, drawn by Blender."""
+"""``digiclay render``: a picture, a turntable or a film of a finished run, drawn by Blender."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.scene import Scene
+from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size
+from .counted import Counted
 from .finished import last_touch, read, row_at
+from .stop import Stop
 
-__all__ = ["add", "picture", "refuse_without_blender"]
+__all__ = ["ARRAYS", "add", "draw_film", "draw_still", "draw_turntable", "picture", "refuse_without_blender"]
 
 EXAMPLES = """\
 examples:
   digiclay render ridge_mound_valley
   digiclay render ridge_mound_valley --time 10 --size 800x500 --out ridge.png
+  digiclay render ridge_mound_valley --film --speed 2 --colour force
+  digiclay render ridge_mound_valley --turntable --frames 48 --engine cycles
 """
+#: What drawing needs of a history.
+ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")
+#: Options of one kind of picture only.
+OF_FILMS = ("rate", "speed", "start", "stop", "strip")
+OF_TURNTABLES = ("rate", "frames")
 
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_run(
-        commands, "render", "draw an instant of a run as a PNG; needs Blender's module, bpy", EXAMPLES
+    said = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
+    parser = add_run(commands, "render", said, EXAMPLES)
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument(
+        "--film", action="store_true", help="the session as film.mp4, with a strip of the force"
     )
-    parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the last touch")
-    parser.add_argument("--out", metavar="PNG", type=Path, help="default pins.png in the run's folder")
-    parser.add_argument("--size", metavar="WxH", type=size, default=(1600, 1000), help="default 1600x1000")
-    parser.add_argument("--engine", choices=("cycles", "workbench"), default="cycles", help="default cycles")
+    kind.add_argument("--turntable", action="store_true", help="an instant turning once, as turntable.mp4")
+    parser.add_argument(
+        "--time", metavar="T", type=seconds,
+        help="the instant, s; default the last touch, and the end for a turntable",
+    )  # fmt: skip
+    parser.add_argument("--out", metavar="FILE", type=Path, help="default in the run's folder")
+    parser.add_argument("--size", metavar="WxH", type=size, help="default 1600x1000; 960x600 for films")
+    parser.add_argument("--engine", choices=ENGINES, help="default cycles; workbench for films")
+    parser.add_argument("--colour", choices=COLOURS, help="what the pins' colours tell; default mode")
+    parser.add_argument(
+        "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default in films only"
+    )
+    parser.add_argument("--rate", metavar="N", type=int, help="frames a second of film; default 25")
+    parser.add_argument("--frames", metavar="N", type=int, help="frames of a turn; default 75")
+    parser.add_argument(
+        "--speed", metavar="X", type=float, help="simulated seconds a second of film; default 1"
+    )
+    parser.add_argument("--start", metavar="T", type=seconds, help="first instant of the film, s")
+    parser.add_argument("--stop", metavar="T", type=seconds, help="last instant of the film, s")
+    parser.add_argument(
+        "--strip", action=argparse.BooleanOptionalAction, help="total force over time; default in films"
+    )
     parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Render."""
+    looks = _looks(arguments)
+    refuse_without_blender()
+    run = read(arguments.run, *ARRAYS)
+    row = None if arguments.time is None else row_at(run.history, arguments.time)
+    path: Path | None
+    if isinstance(looks, Still):
+        out = arguments.out or arguments.run / "pins.png"
+        path = draw_still(run.scene, run.history, looks, out, row)
+    else:
+        name = "film" if arguments.film else "turntable"
+        out = arguments.out or arguments.run / f"{name}.mp4"
+        with Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
+            told = None if arguments.quiet else bar
+            if isinstance(looks, Film):
+                path = draw_film(run.scene, run.history, looks, out, told, stop)
+            else:
+                path = draw_turntable(run.scene, run.history, looks, out, told, stop, row)
+    if path is None:
+        print("Stopped; nothing was written.", file=sys.stderr)
+        return 130
+    if not arguments.quiet:
+        print(path)
+    return 0
+
+
+def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
+    """Return what the picture is to look like; refuse options that mean nothing for it."""
+    kind: type[Still | Turntable | Film] = Still
+    own: tuple[str, ...] = ()
+    if arguments.film:
+        kind, own = Film, OF_FILMS
+    elif arguments.turntable:
+        kind, own = Turntable, OF_TURNTABLES
+    for name in {*OF_FILMS, *OF_TURNTABLES} - {*own}:
+        if getattr(arguments, name) is not None:
+            wanted = "--film" if name in OF_FILMS else "--turntable"
+            raise DigiclayError(f"--{name} must be given with {wanted} only.")
+    if arguments.film and arguments.time is not None:
+        raise DigiclayError("--time must not be given with --film: give --start and --stop.")
+    names = ("engine", "colour", "arrows", *own)
+    given = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
+    if kind is Still:
+        given = {"engine": "cycles", "width": 1600, "height": 1000, **given}
+    if arguments.size is not None:
+        given["width"], given["height"] = arguments.size
+    return kind(**given)
 
 
 def refuse_without_blender() -> None:
     """Say what to install, before any work is done."""
     importlib.import_module("..compat", __package__)
+
+
+def sizes(scene: Scene) -> dict[str, Any]:
+    """Return what drawing needs to know of the device."""
+    finger = scene.fingertip or Fingertip()
+    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": finger}
 
 
 def picture(
@@ -51,23 +140,56 @@ def picture(
     height: int = 1000,
     engine: str = "cycles",
 ) -> Path:
-    """Draw one row of a history; Blender is imported only now."""
+    """Draw one row of a history."""
+    return draw_still(scene, history, Still(width=width, height=height, engine=engine), out, row)
+
+
+def draw_still(
+    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still, out: Path, row: int | None = None
+) -> Path:
+    """Draw an instant, or one row of a history; Blender is imported only now."""
     from ..instant import Instant
     from ..render import still
 
-    finger = scene.fingertip or Fingertip()
-    instant = Instant.of(history, row, pitch=scene.layout.pitch, actuator=scene.actuator, finger=finger)
-    return still(instant, out, width=width, height=height, engine=engine)
+    instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
+    names = ("width", "height", "engine", "samples", "colour", "arrows")
+    return still(instant, out, **{name: getattr(looks, name) for name in names})
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
-    """Render."""
-    refuse_without_blender()
-    run = read(arguments.run, "height", "force", "mode", "fingertip", "position", "total_force")
-    row = last_touch(run.history) if arguments.time is None else row_at(run.history, arguments.time)
-    out = arguments.out or arguments.run / "pins.png"
-    width, height = arguments.size
-    path = picture(run.scene, run.history, row, out, width=width, height=height, engine=arguments.engine)
-    if not arguments.quiet:
-        print(path)
-    return 0
+def draw_turntable(
+    scene: Scene,
+    history: Mapping[str, NDArray[Any]],
+    looks: Turntable,
+    out: Path,
+    progress: Callable[[int, int], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+    row: int | None = None,
+) -> Path | None:
+    """Draw an instant, or one row of a history, turning once; None when it was stopped."""
+    from ..film import turntable
+    from ..instant import Instant
+
+    instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
+    return turntable(instant, out, looks, progress=progress, stopped=stopped)
+
+
+def draw_film(
+    scene: Scene,
+    history: Mapping[str, NDArray[Any]],
+    looks: Film,
+    out: Path,
+    progress: Callable[[int, int], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+) -> Path | None:
+    """Draw a session; None when it was stopped."""
+    from ..film import film
+
+    told = {"progress": progress, "stopped": stopped}
+    return film(history, out, looks, set_point=scene.set_point, **told, **sizes(scene))
+
+
+def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int:
+    """Return the row asked for, or that of an instant by its name."""
+    if row is not None:
+        return row
+    return last_touch(history) if when == "last touch" else len(history["time"]) - 1
