@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-matrix test-window clean
+.PHONY: help demo extension test lint test-matrix test-window clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -20,6 +20,10 @@ help: ## print this list
 demo: ## run the paper's session and leave its results and pictures in demo/
 	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
 	@.venv/bin/digiclay run ridge_mound_valley --out demo --overwrite --export stl,obj --plots --render
+
+extension: ## build the Blender extension and leave its zip in dist/
+	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
+	@.venv/bin/python tools/extension.py
 
 test: ## run all tests but those of the matrix and of the window
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)

@@ -1,0 +1,119 @@
+"""The zip: built and validated by this Blender's own tool, installed as a user does, and used."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import digiclay
+import pytest
+
+HERE = Path(__file__).parent
+TOOL = HERE.parents[1] / "tools" / "extension.py"
+#: Building takes 2 s and a use 8 s on two cores; a Blender that hangs at its end never comes back.
+LIMIT = 120
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The zip, built by the tool of this Blender."""
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, str(TOOL), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 0, done.stderr
+    (found,) = out.glob("*.zip")
+    return found
+
+
+@pytest.fixture(scope="module")
+def seen(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What a Blender of its own, with settings of its own, saw of the installed extension."""
+    folder = tmp_path_factory.mktemp("used")
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "settings")}
+    # Started elsewhere and without the checkout's path: it has the zip and nothing else of digiclay.
+    environment.pop("PYTHONPATH", None)
+    command = [sys.executable, "-P", str(HERE / "use_the_zip.py"), str(archive), str(folder)]
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    assert "Traceback" not in done.stderr
+    result: dict[str, Any] = json.loads((folder / "seen.json").read_text())
+    return result | {"files": sorted(file.name for file in folder.iterdir())}
+
+
+def test_the_zip_brings_trimesh_along_and_lists_it(archive: Path) -> None:
+    with zipfile.ZipFile(archive) as zipped:
+        names = zipped.namelist()
+        manifest = tomllib.loads(zipped.read("blender_manifest.toml").decode())
+    assert [f"./{name}" for name in names if name.endswith(".whl")] == manifest["wheels"]
+    assert any("trimesh" in wheel for wheel in manifest["wheels"])
+
+
+def test_the_zip_has_the_package_and_nothing_that_was_left_lying_about(archive: Path) -> None:
+    with zipfile.ZipFile(archive) as zipped:
+        names = zipped.namelist()
+    assert {"__init__.py", "LICENSE", "core/scene.py", "sample_shapes/sessions/tap.toml"} <= set(names)
+    assert [name for name in names if "__pycache__" in name or name.startswith(".")] == []
+    assert archive.stat().st_size < 5e6
+
+
+def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path: Path) -> None:
+    """The tags are looked at: they go unchecked unless the tool is told where they stand."""
+    copy = tmp_path / "checkout"
+    for name in ("addon", "tools", "requirements", "LICENSE"):
+        source = TOOL.parents[1] / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, copy / name)
+    subprocess.run(["git", "init", "-q", str(copy)], check=True)
+    wheels = TOOL.parents[1] / "build" / "wheels"
+    if wheels.is_dir():
+        shutil.copytree(wheels, copy / "build" / "wheels")
+    manifest = copy / "addon" / "digiclay" / "blender_manifest.toml"
+    manifest.write_text(manifest.read_text().replace('"Modeling"', '"Pottery"'))
+    command = [sys.executable, str(copy / "tools" / "extension.py")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode != 0
+    assert "Pottery" in done.stderr
+    assert not (copy / "dist").exists()
+
+
+def test_the_zip_installs_and_enables(seen: dict[str, Any]) -> None:
+    assert (seen["installed"], seen["enabled"]) == (["FINISHED"], True)
+
+
+def test_installing_puts_the_bundled_trimesh_into_the_users_blender(seen: dict[str, Any]) -> None:
+    assert seen["bundled"] == 1
+
+
+def test_enabling_imports_no_heavy_library(seen: dict[str, Any]) -> None:
+    assert seen["imported at once"] == []
+
+
+def test_the_installed_operator_adds_a_bed_with_its_settings(seen: dict[str, Any]) -> None:
+    assert (seen["added"], seen["scene"]) == (["FINISHED"], 36)
+
+
+def test_the_preferences_are_those_blender_shows(seen: dict[str, Any]) -> None:
+    assert seen["redraw rate"] == 24
+
+
+@pytest.mark.parametrize("command", ["describe", "run", "export", "render"])
+def test_the_installed_command_carries_out(command: str, seen: dict[str, Any]) -> None:
+    assert seen[command] == 0
+
+
+def test_the_commands_leave_a_run_a_mesh_and_a_picture(seen: dict[str, Any]) -> None:
+    assert {"a tap", "surface.stl", "still.png"} <= set(seen["files"])
+
+
+def test_disabling_leaves_nothing_behind_and_enabling_again_works(seen: dict[str, Any]) -> None:
+    assert (seen["left behind"], seen["added again"]) == ([], ["FINISHED"])
+
+
+def test_the_zip_is_named_after_the_version_of_the_package(archive: Path) -> None:
+    assert archive.name == f"digiclay-{digiclay.__version__}.zip"

@@ -1,0 +1,63 @@
+"""Runs in a Blender of its own: installs the extension's zip as a user does, uses it, takes it back.
+
+usage: use_the_zip.py ZIP FOLDER. What was seen is written as JSON to FOLDER/seen.json.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+EXTENSION = "bl_ext.user_default.digiclay"
+ARCHIVE, FOLDER = Path(sys.argv[1]), Path(sys.argv[2])
+
+
+def part(name: str) -> object:
+    """Import a module of the installed extension."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def main() -> None:
+    """Install, use, disable, enable again, remove."""
+    import addon_utils  # Blender's own, found once Blender is there
+
+    seen: dict[str, object] = {}
+    install = bpy.ops.extensions.package_install_files
+    seen["installed"] = sorted(
+        install(repo="user_default", filepath=str(ARCHIVE), enable_on_install=True, overwrite=True)
+    )
+    seen["enabled"] = EXTENSION in bpy.context.preferences.addons
+    # Looked for where Blender puts it: the Python that runs this may have a trimesh of its own.
+    wheels = Path(bpy.utils.user_resource("EXTENSIONS"), ".local", "lib")
+    seen["bundled"] = len(list(wheels.glob("python*/site-packages/trimesh")))
+    seen["imported at once"] = sorted(
+        name for name in sys.modules if name.split(".")[0] in ("trimesh", "matplotlib", "scipy")
+    )
+    seen["added"] = sorted(bpy.ops.mesh.digital_clay_add(rows=6, columns=6))
+    bed = bpy.context.object
+    seen["scene"] = part("properties").scene_of(bed).cells
+    chosen = part("preferences").of(bpy.context)
+    chosen.redraw_rate = 24
+    seen["redraw rate"] = bpy.context.preferences.addons[EXTENSION].preferences.redraw_rate
+
+    command = part("command_line").run
+    run = FOLDER / "a tap"
+    seen["describe"] = command(["describe", "tap"])
+    seen["run"] = command(["run", "tap", "--out", str(run)])
+    seen["export"] = command(["export", str(run), "--out", str(FOLDER), "--format", "stl"])
+    still = ["--out", str(FOLDER / "still.png"), "--size", "160x100", "--engine", "workbench"]
+    seen["render"] = command(["render", str(run), *still])
+    addon_utils.disable(EXTENSION, default_set=True)
+    names = [name for name in dir(bpy.types) if "digi" in name.lower()]
+    seen["left behind"] = names + ["Object.digiclay"] * hasattr(bpy.types.Object, "digiclay")
+    addon_utils.enable(EXTENSION, default_set=True)
+    seen["added again"] = sorted(bpy.ops.mesh.digital_clay_add(rows=6, columns=6))
+    addon_utils.disable(EXTENSION, default_set=True)
+    (FOLDER / "seen.json").write_text(json.dumps(seen))
+
+
+main()
