@@ -13,8 +13,8 @@ from .core.fingertip import Fingertip
 from .device_shapes import Shape
 
 __all__ = [
-    "SCALE", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells", "resize_fingertip",
-    "uniform", "write_cells",
+    "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",
+    "resize_fingertip", "uniform", "write_cells",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -120,6 +120,11 @@ def resize_fingertip(tip: Any, finger: Fingertip) -> None:
             ball.scale = axes * SCALE
 
 
+def finger_of(tip: Any) -> Fingertip:
+    """Return the size of a fingertip, as `resize_fingertip` has given it."""
+    return Fingertip(*tip[AXES])
+
+
 def pose(tip: Any) -> Floats:
     """Return the pose (7,) of a fingertip in the space of its bed: lowest point, m, and quaternion.
 
@@ -142,7 +147,7 @@ def pose(tip: Any) -> Floats:
     centre, turn, _ = local.decompose()
     quaternion = np.array(turn.normalized())
     # The centre of a finger whose lowest point is the origin, taken away again.
-    above = Fingertip(*tip[AXES]).outline(np.array([[0.0, 0.0, 0.0, *quaternion]]))[0, :3]
+    above = finger_of(tip).outline(np.array([[0.0, 0.0, 0.0, *quaternion]]))[0, :3]
     return np.array([*(np.array(centre) / SCALE - above), *quaternion])
 
 

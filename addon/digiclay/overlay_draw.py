@@ -13,7 +13,7 @@ from gpu_extras.batch import batch_for_shader
 from .overlay_look import Colour
 from .overlay_picture import Box, Dot, Floats, Line, Picture, Words
 
-__all__ = ["draw", "stroke"]
+__all__ = ["cursor", "draw"]
 
 #: Corners of a dot.
 CORNERS = 20
@@ -29,7 +29,7 @@ def draw(picture: Picture, width: float, height: float) -> None:
         for box in picture.boxes:
             _fill(_corners(box), [(0, 1, 2), (0, 2, 3)], box.colour, box.alpha)
         for line in picture.lines:
-            stroke(line, width, height)
+            _stroke(line, (width, height))
         for dot in picture.dots:
             _dot(dot)
         for words in picture.words:
@@ -38,16 +38,27 @@ def draw(picture: Picture, width: float, height: float) -> None:
         gpu.state.blend_set("NONE")
 
 
-def stroke(line: Line, width: float, height: float, alpha: float = 1.0) -> None:
+def cursor(lines: list[Line]) -> None:
+    """Draw lines about the mouse, in pixels of the window."""
+    _, _, width, height = gpu.state.viewport_get()
+    gpu.state.blend_set("ALPHA")
+    try:
+        for line in lines:
+            _stroke(line, (width, height))
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def _stroke(line: Line, size: tuple[float, float]) -> None:
     """Draw a line into a region of a size in pixels, with smooth edges."""
     kind, points = ("LINES", _dashes(line)) if line.dashed else ("LINE_STRIP", line.points)
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     flat = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
     batch = batch_for_shader(shader, kind, {"pos": flat})
     shader.bind()
-    shader.uniform_float("viewportSize", (width, height))
+    shader.uniform_float("viewportSize", size)
     shader.uniform_float("lineWidth", line.width)
-    shader.uniform_float("color", (*line.colour, alpha))
+    shader.uniform_float("color", (*line.colour, 1.0))
     batch.draw(shader)
 
 

@@ -35,6 +35,10 @@ def session(bed: Any) -> Iterator[running.Running]:
     begun = sculpting.advanced(begun, above, 0.0, 100)
     for tick in range(1, 11):
         begun = sculpting.advanced(begun, pressed, tick / 30, 100, pins=display.picked(bed))
+    # The trace keeps every other period: it ends with this state.
+    while begun.state.period % begun.trace.every:
+        begun = sculpting.advanced(sculpting.stepped(begun), pressed, 1.0, 100)
+    begun = replace(begun, paused=False)
     running.put(begun)
     yield begun
     running.drop(begun.uid)
