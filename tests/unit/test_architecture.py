@@ -35,7 +35,7 @@ LEVELS = (
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
     "export_model simulation jobs control.handover",
-    "assembly",
+    "assembly form",
     "accuracy keeping live shadow",
     "session metrics_trial take",
     "metrics_speed sweep budget",

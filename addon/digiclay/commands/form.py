@@ -1,0 +1,152 @@
+"""``digiclay form``: a shape in, clay, a finger, a shape out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..core.assembly import assemble
+from ..core.errors import OutputError
+from ..core.form import GESTURES, shaped
+from ..core.layout import grid
+from ..core.run_folder import may_be_written, written
+from ..core.scene import Scene
+from ..core.scene_file import Setting
+from ..core.session import Result, run, save
+from ..core.shape_file import Fitted, find_shape, fitted_to, sample_shapes
+from ..core.shape_text import packed
+from .arguments import add_scene, scene_of
+from .export import exported, formats, refuse_what_has_no_surface
+from .progress import Bar
+from .stop import Stop
+
+__all__ = ["add"]
+
+EXAMPLES = f"""\
+examples:
+  digiclay form crater                                   displayed, a peak pulled out of it, surface.stl
+  digiclay form "my relief.png" --set shape.rise="20 mm" --finger press --export obj,glb
+  digiclay form part.stl --set shape.fit=actual --set shape.unit=inch --out part
+  digiclay form letters --finger scene --scene my.toml   the finger goes the scene's own way
+
+sample shapes: {", ".join(sample_shapes())}
+
+The folder is a run's: scene.toml (the shape's heights are in it), history.npz, metrics.json. Beside the
+formed surface stands the displayed one, in the folder 'displayed'.
+"""
+#: Bed, method and finger unless --scene names others.
+SCENE = "dome_peaked"
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "form", help="display a shape, form it with the finger, export it",
+        description="Display a mesh, a picture or an array of heights, form it with the finger, export it.",
+        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    parser.add_argument("shape", metavar="SHAPE", help="a sample shape's name, or a file")
+    add_scene(parser, SCENE)
+    parser.add_argument(
+        "--finger", choices=(*GESTURES, "scene"), default="pull",
+        help="press: into the highest part; pull: press, and draw a peak out of it (default); away: "
+        "no touch; scene: as the scene says",
+    )  # fmt: skip
+    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the shape's name, here")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
+    parser.add_argument(
+        "--export", metavar="F,...", type=formats, default=["stl"], help="mesh formats; default stl"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Fit, display, form, export, and tell in a few lines what came of it."""
+    out: Path = arguments.out or Path(find_shape(arguments.shape).stem)
+    may_be_written(out, overwrite=arguments.overwrite)
+    word = json.dumps(arguments.shape, ensure_ascii=False)
+    arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
+    scene, laid = _laid(scene_of(arguments)[0])
+    if not arguments.quiet:
+        print(laid.told())
+    if arguments.finger != "scene":
+        scene = shaped(scene, assemble(scene), arguments.finger)
+    with Stop() as stop:
+        with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
+            versions = {"digiclay": __version__}
+            progress = None if arguments.quiet else bar
+            result = run(scene, progress=progress, stopped=stop, versions=versions)
+        result, lines = _judged(result, laid)
+        with written(out, overwrite=arguments.overwrite) as folder:
+            save(result, folder)
+            _export(result, arguments.export, folder)
+    if not arguments.quiet:
+        print("\n".join([*lines, result.summary(), f"written to {out}"]))
+    return 130 if stop() else 0
+
+
+def _laid(scene: Scene) -> tuple[Scene, Fitted]:
+    """Return the scene with the shape's heights in it, and what is to be said of them."""
+    refuse_what_has_no_surface(scene, "form")
+    if scene.recorder is None:
+        raise OutputError("form needs a recorder, and the scene has recorder = 'absent'.")
+    if scene.shape is None:
+        raise OutputError("form needs a shape, and the scene has shape = 'absent'.")
+    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
+    # The run's folder says all there is to say, whatever becomes of the shape's file.
+    shape = replace(scene.shape, heights=packed(laid.heights))
+    name = Path(scene.shape.file).stem
+    return replace(scene, shape=shape, name=name, description=f"{name}, displayed and then formed."), laid
+
+
+def before_the_finger(result: Result) -> int:
+    """Return the last row before the finger touches."""
+    assert result.history is not None
+    touching = np.flatnonzero(result.history["total_force"] > 0.0)
+    return int(touching[0]) - 1 if touching.size else len(result.history["time"]) - 1
+
+
+def _judged(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
+    """Return the result with what is known of its shape, and lines that say so."""
+    history, layout = result.history, result.scene.layout
+    assert history is not None
+    row = max(before_the_finger(result), 0)
+    height = history["height"]
+    error = float(np.abs(height[row] - laid.heights).max())
+    stands = next(i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9)
+    change = height[-1] - height[row]
+    area = layout.pitch * layout.row_spacing
+    raised, lowered = (
+        float(np.maximum(change, 0.0).sum() * area),
+        float(np.maximum(-change, 0.0).sum() * area),
+    )
+    known = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
+    counts = {
+        "shape_covered": laid.covered, "shape_clipped": laid.too_low + laid.too_high,
+        "shape_overhanging": laid.overhanging,
+    }  # fmt: skip
+    units = dict(zip(known, ("m", "m3", "m3"), strict=True))
+    metrics = {**result.metrics, **known, **counts, "units": {**result.metrics["units"], **units}}
+    lines = [
+        f"displayed to within {error * 1e6:.2g} µm in {history['time'][stands]:.1f} s",
+        f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(change.max(), 0.0) * 1e3:.2g} mm, "
+        f"{lowered * 1e6:.2g} cm³ lowered by up to {max(-change.min(), 0.0) * 1e3:.2g} mm",
+    ]
+    return replace(result, metrics=metrics), lines
+
+
+def _export(result: Result, kinds: list[str], folder: Path) -> None:
+    """Write the formed surface, and the displayed one."""
+    assert result.history is not None
+    exported(result.scene, result.history, -1, kinds, folder)
+    before = folder / "displayed"
+    before.mkdir()
+    exported(result.scene, result.history, max(before_the_finger(result), 0), kinds, before)
