@@ -14,6 +14,8 @@ __all__ = ["folder", "names", "path", "remove", "save"]
 
 #: Longest name, so that the file's stays within what file systems take.
 LONGEST = 60
+#: What no file's name can have on one system or another.
+FORBIDDEN = frozenset('<>:"/\\|?*')
 
 
 def folder() -> Path:
@@ -38,8 +40,9 @@ def path(name: str) -> Path:
     if not plain or len(plain) > LONGEST or plain.startswith("."):
         rule = f"must be a name of 1 to {LONGEST} letters that does not start with a dot"
         raise OutputError(f"The preset's name {rule} (got {name!r}).")
-    if plain != bpy.path.clean_name(plain, replace=" ") or not plain.isprintable():
-        raise OutputError(f"The preset's name must be of letters a file's name can have (got {name!r}).")
+    if not plain.isprintable() or set(plain) & FORBIDDEN or plain.endswith("."):
+        rule = "must be of letters that a file's name can have on every system"
+        raise OutputError(f"The preset's name {rule} (got {name!r}).")
     if plain.casefold() in PRESETS:
         raise OutputError(f"The preset's name must not be {', '.join(PRESETS)} (got {name!r}).")
     return folder() / f"{plain}.toml"

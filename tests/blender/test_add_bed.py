@@ -1,0 +1,128 @@
+"""Add > Mesh > Digital Clay: what its redo panel offers, and that the bed is what was asked for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge, own_presets, properties, view
+from digiclay.core.methods import METHODS
+from digiclay.core.scene_table import PRESETS, resolve
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture
+def preset() -> Iterator[str]:
+    """A preset of the user's own, and the name it goes by."""
+    table = {"control": {"method": "cell_states", "force_setpoint": 0.03}, "valve": {"stroke": 41e-6}}
+    own_presets.save("Stiff clay", resolve(table))
+    yield "Stiff clay"
+    own_presets.remove("Stiff clay")
+
+
+def add(**chosen: Any) -> Any:
+    """Add a bed; return it."""
+    assert bpy.ops.mesh.digital_clay_add(**chosen) == {"FINISHED"}
+    return bpy.context.object
+
+
+def test_a_bed_added_without_choices_is_that_of_an_empty_scene_file() -> None:
+    bed = add()
+    assert properties.scene_of(bed) == resolve({}, bed.name)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_method_chosen_is_the_bed_s(method: str) -> None:
+    bed = add(method=method)
+    assert properties.scene_of(bed) == resolve({"control": {"method": method}}, bed.name)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_preset_chosen_is_the_bed_s(name: str) -> None:
+    bed = add(preset=name)
+    assert properties.scene_of(bed) == resolve({"preset": name}, bed.name)
+
+
+def test_a_preset_of_the_user_s_own_is_offered_and_taken(preset: str) -> None:
+    bed = add(preset=preset, method="cell_states", rows=30)
+    scene = properties.scene_of(bed)
+    assert (scene.layout.rows, scene.valve.stroke, scene.control.force_setpoint) == (30, 41e-6, 0.03)
+
+
+def test_another_method_than_the_preset_s_brings_its_own_gains(preset: str) -> None:
+    scene = properties.scene_of(add(preset=preset, method="elastic"))
+    plain = resolve({"control": {"method": "elastic"}})
+    assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
+
+
+def test_the_pitch_is_the_number_typed_and_not_its_32_bits() -> None:
+    assert properties.scene_of(add(pitch=2.7)).layout.pitch == 2.7e-3
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows: int, columns: int, method: str) -> None:
+    scene = properties.scene_of(add(rows=rows, columns=columns, method=method))
+    assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
+    assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 2.5])
+def test_a_bed_shown_in_another_scale_still_stands_on_the_cursor(scale: float) -> None:
+    bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
+    bed = add(rows=6, columns=6, scale=scale)
+    bpy.context.view_layer.update()
+    case = next(child for child in bed.children if child.get(view.ROLE) == view.HOUSING)
+    # float32 at 3 units.
+    assert min((case.matrix_world @ vertex.co).z for vertex in case.data.vertices) == pytest.approx(
+        3.0, abs=1e-5
+    )
+    assert bridge.uniform(bed) == pytest.approx(scale, rel=1e-6)
+
+
+def test_the_scale_shown_leaves_the_device_as_it_is() -> None:
+    small, large = add(rows=6, columns=6), add(rows=6, columns=6, scale=3.0)
+    bpy.context.view_layer.update()
+    poses = [bridge.pose(view.fingertip_of(bed)) for bed in (small, large)]
+    # Blender's matrices are float32, here of lengths up to 0.5 units: 0.05 m of the device.
+    np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-7)
+    assert properties.scene_of(large).layout == properties.scene_of(small).layout
+
+
+def test_two_beds_each_have_a_fingertip_and_settings_of_their_own() -> None:
+    first, second = add(rows=6, columns=6), add(rows=7, columns=7, method="elastic")
+    assert view.fingertip_of(first) != view.fingertip_of(second)
+    assert (properties.scene_of(first).method, properties.scene_of(second).method) == (
+        "virtual_master",
+        "elastic",
+    )
+
+
+def test_a_pitch_at_which_cylinders_would_overlap_cannot_be_chosen() -> None:
+    assert properties.scene_of(add(rows=6, columns=6, pitch=0.5)).layout.pitch == pytest.approx(2e-3)
+
+
+def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset: str) -> None:
+    own_presets.path(preset).write_text("valve = 3\n")
+    before = len(bpy.data.objects)
+    with pytest.raises(RuntimeError, match=r"valve must be a section") as caught:
+        bpy.ops.mesh.digital_clay_add(preset=preset)
+    assert "Traceback" not in str(caught.value)
+    assert len(bpy.data.objects) == before
+
+
+def test_an_imported_run_has_the_settings_it_was_run_with(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "digiclay", "run", "tap", "--quiet", "--out", str(tmp_path / "run")]
+    command += ["--set", "valve.stroke=41 um", "--set", "simulation.duration=0.05"]
+    subprocess.run(command, check=True, timeout=60, cwd=Path(view.__file__).parents[1])
+    path = str(tmp_path / "run" / "history.npz")
+    assert bpy.ops.import_scene.digital_clay_run(filepath=path) == {"FINISHED"}
+    scene = properties.scene_of(bpy.context.object)
+    assert (scene.valve.stroke, scene.layout.rows) == (41e-6, 11)
