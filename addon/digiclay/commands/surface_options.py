@@ -66,9 +66,13 @@ def former_of(run: Run, text: str) -> int | float:
     if text.strip() == "rest":
         return float(run.scene.actuator.rest_height)
     try:
-        return row_at(run.history, seconds(text))
+        time = seconds(text)
     except argparse.ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
+    try:
+        return row_at(run.history, time)
+    except OutputError as error:
+        raise OutputError(str(error).replace("--time", "--former")) from None
 
 
 def _length(text: str, option: str) -> float:

@@ -150,7 +150,8 @@ def _way(
     count = lattice.neighbour.shape[1]
     way: list[int] = []
     while pin not in others:
-        turns = range(count) if direction is None else range(-(count // 4), count // 4 + 1)
+        # It bends by one direction a step at most: at the end of a ridge it does not turn back along its flank.
+        turns = range(count) if direction is None else (-1, 0, 1)
         ahead = [(direction or 0) + turn for turn in turns]
         steps = [(turn % count, int(lattice.neighbour[pin, turn % count])) for turn in ahead]
         steps = [(turn, to) for turn, to in steps if to >= 0 and member[to] and to not in known]

@@ -70,8 +70,9 @@ class Formed:
 
     @property
     def shift(self) -> float:
-        """How far the second row is shifted along x against the first, m; 0 in an aligned bed."""
-        shift = float(self.position[self.columns, 0] - self.position[0, 0])
+        """How far every other row is shifted the way the columns run, m; 0 in an aligned bed."""
+        way = np.sign(self.position[1, 0] - self.position[0, 0])
+        shift = float(way * (self.position[self.columns, 0] - self.position[0, 0]))
         return shift if abs(shift) > 1e-3 * self.pitch else 0.0
 
     @property

@@ -196,7 +196,7 @@ def _hexagons(formed: Formed) -> tuple[Floats, Codes]:
     pitch = formed.position[1, 0] - formed.position[0, 0]
     spacing = formed.position[columns, 1] - formed.position[0, 1]
     near = (spacing**2 - pitch**2 / 4.0) / (2.0 * spacing)
-    side = np.sign(formed.shift * pitch).astype(int)
+    side = 1 if formed.shift > 0.0 else -1
     row, column = np.divmod(np.arange(rows * columns), columns)
     # Corners between two rows stand half a pitch apart; those of a pin are numbers q - 1, q and q + 1.
     width = 2 * columns + 4

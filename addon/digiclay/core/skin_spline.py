@@ -39,7 +39,8 @@ def natural(knot: Floats, value: Floats, at: Floats) -> Floats:
     beyond = (at - inside)[:, None]
     straight = (value[cell + 1] - value[cell]) / width
     turned = (1.0 - 3.0 * left**2) * bend[cell] + (3.0 * right**2 - 1.0) * bend[cell + 1]
-    return curve + np.asarray(beyond, np.float64) * (straight + turned * width / 6.0)
+    whole: Floats = curve + beyond * (straight + turned * width / 6.0)
+    return whole
 
 
 def _second_derivatives(knot: Floats, value: Floats) -> Floats:

@@ -1,0 +1,159 @@
+"""Kinds of mesh: what is made of a formed surface, with values of vertices and groups of faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.body import NO_PIN, VALUES, Body, volume
+from digiclay.core.errors import OutputError, ParameterError
+from digiclay.core.export_model import KINDS, Model, bodies
+from digiclay.core.features import Finding
+from digiclay.core.formed import Formed, of_history
+from digiclay.core.layout import Layout, grid
+from digiclay.core.surface import prism_volume
+
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+
+
+def formed(arrangement: str = "aligned") -> Formed:
+    """A boss, a crease, level ground between them; every pin with a force and a mode of its own."""
+    place = grid(Layout(rows=12, columns=14, arrangement=arrangement)).positions
+    x, y = place.T * 1e3
+    raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
+    force, mode = np.arange(168) / 100.0, np.arange(168) % 8
+    return Formed.of(place, 0.04 + raised * 1e-3, 0.04, force, mode)
+
+
+def mesh(body: Body) -> trimesh.Trimesh:
+    return trimesh.Trimesh(body.vertices, body.faces, process=False)
+
+
+@pytest.mark.parametrize("skin", ["bilinear", "smooth", "membrane"])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight(kind, arrangement, skin):
+    for body in bodies(formed(arrangement), Model(kind=kind, skin=skin), Finding()):
+        made = mesh(body)
+        assert made.is_watertight == body.closed == (kind != "surface")
+        assert made.is_winding_consistent
+        if body.closed:
+            assert made.volume > 0.0
+            assert volume(body) == pytest.approx(made.volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_the_solid_of_the_bilinear_skin_has_the_volume_of_its_prisms(arrangement):
+    bed = formed(arrangement)
+    (body,) = bodies(bed, Model())
+    known = prism_volume(bed.position, bed.height, bed.rows, bed.columns)
+    assert volume(body) == pytest.approx(known, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_vertex_knows_height_force_and_mode(kind):
+    bed = formed()
+    for body in bodies(bed, Model(kind=kind)):
+        assert tuple(body.values) == VALUES
+        np.testing.assert_array_equal(body.values["height"], body.vertices[:, 2])
+        assert set(np.unique(body.values["mode"])) <= {NO_PIN, *range(8)}
+        assert 0.0 <= body.values["force"].min() <= body.values["force"].max() <= bed.force.max()
+
+
+@pytest.mark.parametrize("kind", ["surface", "solid", "pins"])
+def test_the_pin_tops_have_the_values_of_their_pins(kind):
+    bed = formed()
+    (body,) = bodies(bed, Model(kind=kind))
+    np.testing.assert_array_equal(body.values["force"][:168], bed.force)
+    np.testing.assert_array_equal(body.values["mode"][:168], bed.mode)
+
+
+@pytest.mark.parametrize("kind", ["solid", "pins"])
+def test_the_base_belongs_to_no_pin(kind):
+    (body,) = bodies(formed(), Model(kind=kind))
+    base = body.vertices[:, 2] == body.vertices[:, 2].min()
+    assert base.any()
+    assert set(body.values["mode"][base]) == {NO_PIN}
+    assert NO_PIN not in body.values["mode"][~base]
+
+
+@pytest.mark.parametrize("kind", ["surface", "solid", "pins"])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
+    bed = formed()
+    (body,) = bodies(bed, Model(kind=kind, resolution=parts), Finding())
+    assert body.groups == ("boss_1", "crease_1")
+    assert len(body.group) == len(body.faces)
+    middle = body.vertices[body.faces].mean(axis=1)
+    for number, x in ((1, -9e-3), (2, 9e-3)):
+        mine = middle[body.group == number]
+        assert len(mine) > 20
+        assert np.linalg.norm(mine[:, :2] - (x, 0.0), axis=1).max() < 12e-3
+
+
+def test_without_a_search_there_are_no_groups():
+    (body,) = bodies(formed(), Model())
+    assert (body.groups, body.group.size) == ((), 0)
+
+
+def test_features_are_bodies_of_their_own_name():
+    assert [body.name for body in bodies(formed(), Model(kind="features"))] == ["boss_1", "crease_1"]
+
+
+def test_a_surface_without_features_says_what_was_looked_for():
+    place = formed().position
+    with pytest.raises(OutputError, match=r"no feature of at least 3 pins more than 0\.5 mm off the former"):
+        bodies(Formed.of(place, np.full(168, 0.04), 0.04, 0.0, 0), Model(kind="features"))
+
+
+def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
+    place = grid(Layout(rows=400, columns=400)).positions
+    bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
+    with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
+        bodies(bed, Model(resolution=40))
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"kind": "cloud"}, "kind must be one of solid, surface, pins, features"),
+        ({"skin": "silk"}, "skin must be one of bilinear, smooth, membrane"),
+        ({"resolution": -1}, "resolution must be at least 0"),
+        ({"resolution": 65}, "resolution must be at most 64"),
+        ({"base_thickness": 0.0}, "base_thickness must be above 0 m"),
+        ({"base_thickness": np.nan}, "base_thickness must be a finite number"),
+        ({"cap": -1.0}, "cap must be above 0 m"),
+    ],
+)
+def test_a_model_that_makes_no_sense_is_refused(told, said):
+    with pytest.raises(ParameterError, match=f"^Model\\.{said}"):
+        Model(**told)
+
+
+def history() -> dict[str, np.ndarray]:
+    bed = formed()
+    rows = {"height": [np.full(168, 0.04), bed.height], "force": [bed.force] * 2, "mode": [bed.mode] * 2}
+    return {"position": bed.position} | {name: np.stack(both) for name, both in rows.items()}
+
+
+def test_the_former_surface_is_a_row_or_one_height():
+    np.testing.assert_allclose(of_history(history(), -1, 0).raised, formed().raised)
+    np.testing.assert_allclose(of_history(history(), -1, 0.035).raised, formed().raised + 0.005, atol=1e-15)
+    assert not of_history(history(), 1, 1).raised.any()
+
+
+@pytest.mark.parametrize(("row", "former"), [(2, 0), (-3, 0), (0, 2), (0, -3)])
+def test_a_row_the_history_does_not_have_is_refused(row, former):
+    with pytest.raises(OutputError, match=r"^The history has 2 rows, 0 to 1 \(got -?\d as (row|former)\)\.$"):
+        of_history(history(), row, former)
+
+
+@pytest.mark.parametrize("name", ["height", "former", "force"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_refused_by_cell(name, bad):
+    known = {"height": np.full(168, 0.04), "former": 0.04, "force": 0.0, "mode": 0}
+    known[name] = np.where(np.arange(168) == 7, bad, 0.04)
+    with pytest.raises(
+        ParameterError, match=rf"^Surface\.{name} must be finite \(got (nan|inf) at cell 7\)\.$"
+    ):
+        Formed.of(formed().position, **known)

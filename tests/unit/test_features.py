@@ -1,0 +1,222 @@
+"""Bosses and creases found, measured and traced, on surfaces whose figures are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.errors import ParameterError
+from digiclay.core.feature_solids import solid
+from digiclay.core.features import Feature, Finding, find, summary, table
+from digiclay.core.formed import Formed
+from digiclay.core.layout import Layout, grid
+from digiclay.core.sheet import stretched
+
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+LEVEL = 0.04
+
+
+def formed(
+    raised, arrangement: str = "aligned", rows: int = 41, columns: int = 41, pitch: float = 1e-3
+) -> Formed:
+    """A bed formed from level to a function of x and y, mm in and mm out."""
+    place = grid(Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)).positions
+    height = LEVEL + 1e-3 * np.asarray(raised(*(place.T * 1e3)), float)
+    return Formed.of(place, height, LEVEL, 0.0, 0)
+
+
+def features(
+    bed: Formed, finding: Finding | None = None, skin: str = "bilinear", parts: int = 1
+) -> list[Feature]:
+    return find(stretched(bed, skin, parts, 1e-3), finding)
+
+
+def ridge(x, y, half: float = 12.0, height: float = 6.0, angle: float = 0.0):
+    """A round ridge 2 x 4 mm wide about a straight line, with round ends."""
+    along = x * np.cos(angle) + y * np.sin(angle)
+    across = y * np.cos(angle) - x * np.sin(angle)
+    away = np.hypot(np.clip(np.abs(along) - half, 0.0, None), across)
+    return height * np.clip(1.0 - (away / 4.0) ** 2, 0.0, None)
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_level_bed_has_no_features(arrangement):
+    assert features(formed(lambda x, y: 0.0 * x, arrangement)) == []
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
+    # A paraboloid 8 mm high and 12 mm in radius, of which the part above 0.5 mm counts.
+    (dome,) = features(
+        formed(lambda x, y: np.clip(8.0 * (1.0 - (x * x + y * y) / 144.0), 0.0, None), arrangement)
+    )
+    cut = 144.0 * (1.0 - 0.5 / 8.0)
+    assert (dome.kind, dome.name) == ("boss", "boss_1")
+    # Pins 1 mm apart see a curve of 12 mm radius as chords: 1 % is a few times their sagitta.
+    assert dome.area * 1e6 == pytest.approx(np.pi * cut, rel=0.01)
+    assert dome.volume * 1e9 == pytest.approx(np.pi * cut * (0.5 + 8.0) / 2.0, rel=0.01)
+    assert dome.extreme * 1e3 == pytest.approx(8.0, abs=0.05)  # the top may lie between pins
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_dome_has_no_crest(arrangement):
+    (dome,) = features(
+        formed(lambda x, y: np.clip(8.0 * (1.0 - (x * x + y * y) / 144.0), 0.0, None), arrangement)
+    )
+    assert dome.crests == ()
+    assert dome.crest_length == 0.0
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("angle", [0, 20, 45, 90, 130])
+def test_a_ridge_has_a_crest_as_long_as_its_spine(arrangement, angle):
+    (boss,) = features(formed(lambda x, y: ridge(x, y, angle=np.radians(angle)), arrangement))
+    assert len(boss.crests) == 1
+    # Its ends may be off by two pins in all, of 24 mm, and an oblique line of pins is up to 3 % too long.
+    assert boss.crest_length * 1e3 == pytest.approx(24.0, abs=2.7)
+    away = np.abs(
+        boss.crests[0][:, 1] * np.cos(np.radians(angle)) - boss.crests[0][:, 0] * np.sin(np.radians(angle))
+    )
+    assert away.max() <= 1e-3  # a pitch off the spine at most
+
+
+def test_a_flat_topped_ridge_has_its_crest_in_the_middle():
+    (boss,) = features(formed(lambda x, y: 5.0 * ((np.abs(y - 3.0) < 3.5) & (np.abs(x) < 15.5))))
+    (crest,) = boss.crests
+    # The ends are the half width short of the region's, where the flat top falls off on three sides.
+    assert np.abs(crest[:, 1] - 3e-3).max() <= 1e-3
+    assert 24.0 <= boss.crest_length * 1e3 <= 31.0
+
+
+def test_a_slope_along_the_crest_counts_in_its_length():
+    (boss,) = features(formed(lambda x, y: ridge(x, y) / 6.0 * (9.0 + x / 2.0)))
+    span = boss.crests[0][-1] - boss.crests[0][0]
+    # From 3 mm high at one end to 15 mm at the other: along the slope it is longer than in plan.
+    assert boss.crest_length >= np.linalg.norm(span) - 1e-9
+    assert abs(span[2]) > 0.4 * abs(span[0])
+
+
+def test_a_ring_is_one_boss_with_a_closed_crest():
+    (boss,) = features(formed(lambda x, y: np.clip(5.0 - (np.hypot(x, y) - 12.0) ** 2 / 2.0, 0.0, None)))
+    (crest,) = boss.crests
+    np.testing.assert_array_equal(crest[0], crest[-1])
+    assert boss.crest_length * 1e3 == pytest.approx(2.0 * np.pi * 12.0, rel=0.06)  # through pins 1 mm apart
+
+
+def test_a_crossing_has_the_crests_of_both_its_ridges():
+    def cross(x, y):
+        return np.maximum(ridge(x, y, half=15.0), ridge(x, y, half=15.0, angle=np.pi / 2))
+
+    (boss,) = features(formed(cross))
+    assert boss.crest_length * 1e3 == pytest.approx(60.0, abs=6.0)  # four ends, a pin and a half each
+
+
+def test_a_crease_is_measured_as_the_boss_it_mirrors():
+    (up,) = features(formed(lambda x, y: ridge(x, y)))
+    (down,) = features(formed(lambda x, y: -ridge(x, y)))
+    assert (up.kind, down.kind, down.name) == ("boss", "crease", "crease_1")
+    assert down.volume == pytest.approx(up.volume, rel=1e-9)
+    assert down.extreme == pytest.approx(up.extreme, rel=1e-9)
+    assert down.crest_length == pytest.approx(up.crest_length, rel=1e-9)
+
+
+def test_features_are_numbered_by_volume_bosses_first():
+    def three(x, y):
+        return ridge(x, y - 12.0, height=3.0) + ridge(x, y) - ridge(x, y + 12.0)
+
+    found = features(formed(three))
+    assert [one.name for one in found] == ["boss_1", "boss_2", "crease_1"]
+    assert found[0].volume > found[1].volume
+    assert summary(found) == "2 bosses and 1 crease"
+
+
+def test_features_are_measured_from_the_surface_as_it_was():
+    bed = formed(lambda x, y: ridge(x, y))
+    before = LEVEL + bed.position @ (0.1, 0.2)
+    moved = Formed.of(bed.position, before + bed.raised, before, 0.0, 0)
+    (one,), (other,) = features(bed), features(moved)
+    # Squares may be cut along their other diagonal, which moves the surface within them.
+    assert other.volume == pytest.approx(one.volume, rel=1e-3)
+    np.testing.assert_array_equal(other.pins, one.pins)
+
+
+@pytest.mark.parametrize(("smallest", "count"), [(1, 2), (2, 1), (6, 1), (9, 1), (10, 0)])
+def test_a_feature_of_too_few_pins_is_none(smallest, count):
+    def bumps(x, y):
+        return 2.0 * ((np.abs(x) < 1.5) & (np.abs(y) < 1.5)) + 2.0 * (
+            (np.abs(x - 9) < 0.5) & (np.abs(y) < 0.5)
+        )
+
+    assert len(features(formed(bumps), Finding(smallest=smallest))) == count
+
+
+def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
+    place = grid(Layout(rows=5, columns=5)).positions
+    height = np.full(25, 0.0)
+    height[[11, 12]] = 0.5, 1.0
+    bed = Formed.of(place, height, 0.0, 0.0, 0)
+    (boss,) = features(bed, Finding(threshold=0.5, smallest=1))
+    np.testing.assert_array_equal(boss.pins, [12])
+
+
+def test_the_table_is_in_millimetres():
+    head, row = table(features(formed(lambda x, y: ridge(x, y))))
+    assert head == ("feature", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    assert row[0] == "boss_1"
+    assert row[3] == "6.00"
+
+
+@pytest.mark.parametrize("bad", [0.0, -1e-3, np.nan, np.inf, "wide"])
+def test_a_threshold_that_makes_no_sense_is_refused(bad):
+    with pytest.raises(
+        ParameterError, match=r"^Finding\.threshold must be (above 0 m|a finite number|a number)"
+    ):
+        Finding(threshold=bad)
+
+
+@pytest.mark.parametrize("bad", [0, -1, 2.5])
+def test_a_smallest_size_that_makes_no_sense_is_refused(bad):
+    with pytest.raises(ParameterError, match=r"^Finding\.smallest must be"):
+        Finding(smallest=bad)
+
+
+def rough(seed: int, arrangement: str) -> Formed:
+    """Bosses and creases of every shape, pinched, holed and side by side."""
+    place = grid(Layout(rows=14, columns=13, arrangement=arrangement)).positions
+    random = np.random.default_rng(seed)
+    return Formed.of(place, LEVEL + random.integers(-2, 3, len(place)) * 0.5e-3, LEVEL, 0.0, 0)
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("seed", range(4))
+def test_every_body_is_closed_and_of_the_volume_that_is_listed(arrangement, seed):
+    found = features(rough(seed, arrangement), Finding(threshold=0.3e-3, smallest=1))
+    assert len(found) > 2
+    for one in found:
+        body = solid(one)
+        mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
+        _, counts = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+        assert set(counts) == {2}
+        assert mesh.is_winding_consistent
+        assert mesh.volume == pytest.approx(one.volume, rel=1e-9)
+        assert len(np.unique(body.faces)) == len(body.vertices)
+
+
+@pytest.mark.parametrize("skin", ["smooth", "membrane"])
+def test_bodies_follow_the_skin_that_is_asked_for(skin):
+    bed = formed(lambda x, y: ridge(x, y), rows=21, columns=21, pitch=2e-3)
+    (coarse,), (fine,) = features(bed), features(bed, skin=skin, parts=4)
+    mesh = trimesh.Trimesh(solid(fine).vertices, solid(fine).faces, process=False)
+    assert mesh.is_watertight
+    assert len(mesh.faces) > 8 * len(solid(coarse).faces)
+    # Top and bottom of every point are the skin now and before.
+    assert mesh.bounds[0, 2] == pytest.approx(LEVEL, abs=1e-12)
+    assert mesh.bounds[1, 2] == pytest.approx(LEVEL + fine.extreme, abs=1e-12)
+
+
+def test_a_boss_and_a_crease_put_the_former_surface_right():
+    # What is formed is what was there, plus the boss, minus the crease, but for the rim below the threshold.
+    bed = formed(lambda x, y: ridge(x, y - 8.0) - ridge(x, y + 8.0, height=4.0))
+    boss, crease = features(bed, Finding(threshold=1e-6))
+    # A pin stands for 1 mm²; along the outline the skin is straight where the sum over pins has a corner.
+    assert boss.volume - crease.volume == pytest.approx(bed.raised.sum() * 1e-6, rel=5e-3)

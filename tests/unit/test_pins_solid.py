@@ -1,0 +1,102 @@
+"""The stepped bed as one body, beside trimesh's judgement and volumes worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.errors import ParameterError
+from digiclay.core.formed import Formed
+from digiclay.core.layout import Layout, grid
+from digiclay.core.pins_solid import BRIDGE, parts, pins_solid
+from hypothesis import given
+from hypothesis import strategies as st
+
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+
+
+def formed(heights_mm, rows: int, columns: int, arrangement: str = "aligned") -> Formed:
+    place = grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    return Formed.of(place, np.asarray(heights_mm, float) * 1e-3, 0.04, 0.0, 0)
+
+
+@st.composite
+def beds(draw):
+    """Beds with steps of all kinds, many of them of equal height."""
+    layout = Layout(
+        rows=draw(st.integers(2, 9)),
+        columns=draw(st.integers(2, 9)),
+        arrangement=draw(st.sampled_from(ARRANGEMENTS)),
+    )
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    levels = draw(st.sampled_from([1, 2, 3, 5, 1000]))
+    height = 0.03 + 1e-3 * random.integers(0, levels, layout.rows * layout.columns)
+    turned = draw(st.sampled_from([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]))
+    return Formed.of(grid(layout).positions * turned, height, 0.04, 0.0, 0)
+
+
+@given(beds())
+def test_every_edge_has_two_faces_and_all_face_outward(bed):
+    vertices, faces, _ = pins_solid(bed)
+    # Merged by place, as a reader of STL does it: so parts that only touch would be found.
+    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    edges = np.sort(mesh.edges, axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    assert set(counts) == {2}
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0.0
+    assert mesh.body_count == 1
+    assert mesh.area_faces.min() > 0.0
+
+
+@given(beds())
+def test_every_vertex_is_used_and_the_first_are_the_pin_tops(bed):
+    vertices, faces, _ = pins_solid(bed)
+    assert len(np.unique(faces)) == len(vertices)
+    np.testing.assert_array_equal(vertices[: len(bed.height)], np.column_stack([bed.position, bed.height]))
+
+
+@pytest.mark.parametrize("arrangement", ["staggered", "hexagonal"])
+def test_a_shifted_bed_has_the_volume_of_its_prisms(arrangement):
+    layout = Layout(rows=4, columns=5, arrangement=arrangement)
+    heights = np.random.default_rng(2).uniform(30.0, 60.0, 20)
+    vertices, faces, _ = pins_solid(formed(heights, 4, 5, arrangement), base=0.01)
+    prisms = (heights * 1e-3 - 0.01).sum() * layout.pitch * layout.row_spacing
+    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(prisms, rel=1e-12)
+
+
+def test_an_aligned_bed_without_bridges_has_the_volume_of_its_prisms():
+    heights = np.arange(12.0).reshape(3, 4) + 30.0  # a stair: no two corners are above both others
+    vertices, faces, _ = pins_solid(formed(heights.ravel(), 3, 4), base=0.0)
+    prisms = heights.sum() * 1e-3 * 9e-6
+    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(prisms, rel=1e-12)
+
+
+def test_squares_that_meet_at_a_corner_are_joined_by_a_bridge():
+    bed = formed([50, 40, 40, 50], 2, 2)
+    made = parts(bed)
+    assert len(made.corner) == 10  # nine and one more: the middle is two
+    between = made.corner[np.abs(made.corner).max(axis=1) < 0.5e-3]
+    np.testing.assert_allclose(np.abs(between), BRIDGE * 3e-3, rtol=1e-9)
+    high = {0, 3}
+    assert any({int(p), int(o)} == high for p, o in zip(made.pin, made.other, strict=True))
+
+
+def test_the_parts_cover_the_bed_without_a_gap():
+    for arrangement in ARRANGEMENTS:
+        layout = Layout(rows=4, columns=5, arrangement=arrangement)
+        made = parts(formed(np.full(20, 40.0), 4, 5, arrangement))
+        a, b = made.corner[made.start], made.corner[made.end]
+        area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        each = np.bincount(made.pin, area)
+        np.testing.assert_allclose(each, layout.pitch * layout.row_spacing, rtol=1e-9)
+        outer = made.other < 0
+        assert area[outer].sum() == pytest.approx(each.sum(), rel=1e-9)
+
+
+def test_the_base_is_3_mm_under_the_lowest_pin_unless_told_otherwise():
+    bed = formed([40, 45, 50, 55], 2, 2)
+    assert pins_solid(bed)[0][:, 2].min() == pytest.approx(0.037, abs=1e-15)
+    assert pins_solid(bed, base_thickness=0.01)[0][:, 2].min() == pytest.approx(0.03, abs=1e-15)
+    with pytest.raises(ParameterError, match=r"^Surface\.base must be below the lowest pin top at 40 mm"):
+        pins_solid(bed, base=0.04)
