@@ -9,7 +9,20 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from . import __version__
-from .commands import benchmark, compare, describe, export, features, form, paper, render, run, sweep
+from .commands import (
+    batch,
+    benchmark,
+    compare,
+    describe,
+    export,
+    features,
+    form,
+    job,
+    paper,
+    render,
+    run,
+    sweep,
+)
 from .core.errors import DigiclayError
 
 __all__ = ["WRONG", "console", "main", "parser"]
@@ -46,7 +59,8 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    for command in (run, form, describe, export, features, render, benchmark, sweep, compare, paper):
+    every = (run, batch, job, form, describe, export, features, render, benchmark, sweep, compare, paper)
+    for command in every:
         command.add(commands)
     return top
 

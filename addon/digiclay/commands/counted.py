@@ -19,10 +19,12 @@ class Counted:
         Written to only if it is a terminal.
     label, unit : str
         What is going on, and what is counted.
+    before : int, optional
+        How many were done beforehand: they say nothing about the time the others take.
     """
 
-    def __init__(self, stream: TextIO, label: str, unit: str) -> None:
-        self._stream, self._label, self._unit = stream, label, unit
+    def __init__(self, stream: TextIO, label: str, unit: str, before: int = 0) -> None:
+        self._stream, self._label, self._unit, self._before = stream, label, unit, before
         self._started, self._drawn, self._shown = time.monotonic(), 0.0, False
 
     def __enter__(self) -> Counted:
@@ -34,7 +36,8 @@ class Counted:
         if now - self._drawn < PAUSE or not self._stream.isatty():
             return
         filled = int(WIDTH * done / total)
-        left = f", {duration((now - self._started) * (total - done) / done)} left" if done else ""
+        here = done - self._before
+        left = f", {duration((now - self._started) * (total - done) / here)} left" if here > 0 else ""
         bar = "#" * filled + "." * (WIDTH - filled)
         said = f"\r{self._label} [{bar}] {int(done)} of {total} {self._unit}{left}{note}\033[K"
         self._stream.write(said)

@@ -18,12 +18,14 @@ from .job_outputs import KEYS, Outputs, outputs, word
 from .methods import METHODS
 from .part_table import refuse_unknown, shown
 from .scene import Scene
-from .scene_file import Setting, find, load, read_table
+from .scene_file import SAMPLES, Setting, find, load, read_table
 
-__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "job_outputs"]
+__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_outputs"]
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
+#: Where the sample batches are.
+BATCHES = SAMPLES.parent / "batches"
 #: More jobs than this, or a longer name of one, are a slip of the keyboard.
 MOST, LONGEST = 10_000, 120
 #: What decides which jobs there are; all other keys say what is made of each.
@@ -83,6 +85,25 @@ def batch(path: Path) -> Batch:
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
     return Batch(path.stem, jobs, made)
+
+
+def find_jobs(said: str) -> Path:
+    """Return a JOBS file: a sample's name, or a file.
+
+    Raises
+    ------
+    SceneError
+        When there is none.
+    """
+    names = sorted(path.stem for path in BATCHES.glob("*.toml"))
+    if said in names:
+        return BATCHES / f"{said}.toml"
+    path = Path(said)
+    if path.is_file():
+        return path
+    if path.suffix == ".toml" or path.name != said:
+        raise SceneError(f"{path}: there is no such file.")
+    raise SceneError(f"{said} is neither a file nor a sample batch ({', '.join(names)}).")
 
 
 def job_outputs(path: Path) -> Outputs:

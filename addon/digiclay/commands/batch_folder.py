@@ -1,0 +1,190 @@
+"""A batch's folder: the jobs' files, their finished runs, their logs, and the page about them."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from .. import __version__
+from ..core.errors import OutputError
+from ..core.export import write_whole
+from ..core.jobs import JOB, SCENE, Batch, Job
+from ..core.scene_table import text
+from ..gallery import Card, page
+from .counted import duration
+from .job import RUNS, TIMING
+from .thumbnail import NAMES
+
+__all__ = ["JOBS", "LOGS", "MARK", "Folder", "opened"]
+
+#: The file by which a folder is known as a batch's, its other folders, and its page.
+MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
+#: What is told of a run: its figure, what it is called, factor and unit.
+FACTS: tuple[tuple[str, str, float, str], ...] = (
+    ("method", "method", 0.0, ""),
+    ("simulated", "simulated", 1.0, "s"),
+    ("run_time", "run time", 1.0, "s"),
+    ("rfd", "force deviation (RFD)", 1e3, "mN"),
+    ("lag_mean", "lag", 1e3, "mm"),
+    ("height_error", "height error ≤", 1e6, "µm"),
+    ("force_error", "force error ≤", 1e3, "mN"),
+)
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Where a batch is kept."""
+
+    path: Path
+    batch: Batch
+
+    def job(self, job: Job) -> Path:
+        """Return the folder of a job's files."""
+        return self.path / JOBS / job.name
+
+    def run(self, job: Job) -> Path:
+        """Return the folder of a job's run."""
+        return self.path / RUNS / job.name
+
+    def log(self, job: Job) -> Path:
+        """Return the file of what a job's process said."""
+        return self.path / LOGS / f"{job.name}.log"
+
+    def files(self, job: Job) -> dict[str, bytes]:
+        """Return the files that describe a job."""
+        assert job.scene is not None
+        return {SCENE: text(job.scene).encode(), JOB: self.batch.outputs.text().encode()}
+
+    def is_done(self, job: Job) -> bool:
+        """Tell whether there is a finished run of just this job, and not of one it once was."""
+        if job.scene is None:
+            return False
+        try:
+            return all(
+                (self.run(job) / name).read_bytes() == content for name, content in self.files(job).items()
+            )
+        except OSError:
+            return False
+
+    def describe(self, job: Job) -> None:
+        """Write the files of a job."""
+        if job.scene is None:
+            return
+        try:
+            self.job(job).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.job(job)} cannot be made: {error.strerror or error}.") from None
+        for name, content in self.files(job).items():
+            write_whole(self.job(job) / name, content)
+
+    def clear(self, job: Job) -> None:
+        """Take away what a killed process left of a job."""
+        for path in self.run(job).parent.glob(f".{job.name}.*"):
+            name, _, ending = path.name[1:].rpartition(".")
+            if ending in ("part", "old") and name.rpartition(".")[0] == job.name:
+                shutil.rmtree(path, ignore_errors=True)
+
+    def start_up(self) -> float | None:
+        """Return the seconds it usually took until a job's process began to work."""
+        timings = (_json(self.run(job) / TIMING) for job in self.batch.jobs)
+        known = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
+        return median(known) if known else None
+
+    def write_index(self, failed: Mapping[str, str], said: str) -> Path:
+        """Write the page about all jobs; `failed` says why, by name."""
+        cards = []
+        for job in self.batch.jobs:
+            error = failed.get(job.name, "") or job.error
+            if error:
+                log = self.log(job)
+                links = [("log", f"{LOGS}/{log.name}")] if log.is_file() else []
+                cards.append(Card(job.name, links=links, error=error))
+            elif self.is_done(job):
+                cards.append(self._card(job))
+            else:
+                cards.append(Card(job.name, facts=[("not done yet", "")]))
+        path = self.path / INDEX
+        write_whole(path, page(f"Batch {self.batch.name}", said, cards).encode())
+        return path
+
+    def _card(self, job: Job) -> Card:
+        """Return what the page says of a finished job."""
+        run = self.run(job)
+        thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
+        metrics, timing = _json(run / "metrics.json"), _json(run / TIMING)
+        facts = [(said, _value(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
+        took = sum(value for value in timing.values() if isinstance(value, float))
+        facts.append(("whole job", duration(took)))
+        hidden = {*NAMES, TIMING, JOB}
+        links = [
+            (path.name, f"{RUNS}/{job.name}/{path.name}")
+            for path in sorted(run.iterdir())
+            if path.name not in hidden
+        ]
+        return Card(job.name, thumbnail, [fact for fact in facts if fact[1]], links)
+
+
+@contextmanager
+def opened(path: Path, batch: Batch) -> Iterator[Folder]:
+    """Make a batch's folder, or go on with one; nobody else may work in it meanwhile.
+
+    Raises
+    ------
+    OutputError
+        When it holds other things, cannot be written, or another batch works in it.
+    """
+    try:
+        if path.exists() and not path.is_dir():
+            raise OutputError(f"{path} is a file: choose another folder with --out.")
+        if path.exists() and any(path.iterdir()) and not (path / MARK).is_file():
+            raise OutputError(f"{path} holds other things than a batch: choose another folder with --out.")
+        for name in (JOBS, RUNS, LOGS):
+            (path / name).mkdir(parents=True, exist_ok=True)
+        with (path / ".lock").open("ab") as lock:
+            if not _locked(lock):
+                raise OutputError(f"{path} is being worked in by another batch: wait until it has ended.")
+            known = {"batch": batch.name, "digiclay": __version__}
+            write_whole(path / MARK, (json.dumps(known, indent=1, ensure_ascii=False) + "\n").encode())
+            yield Folder(path, batch)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be used: {error.strerror or error}.") from None
+
+
+def _locked(file: Any) -> bool:
+    """Take a lock that ends with this process, however it ends; tell whether it was to be had."""
+    try:
+        if os.name == "nt":
+            windows = importlib.import_module("msvcrt")
+            windows.locking(file.fileno(), windows.LK_NBLCK, 1)
+        else:
+            unix = importlib.import_module("fcntl")
+            unix.flock(file, unix.LOCK_EX | unix.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _json(path: Path) -> dict[str, Any]:
+    """Return what a small file says; nothing where it cannot be read."""
+    try:
+        read = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return read if isinstance(read, dict) else {}
+
+
+def _value(value: Any, factor: float, unit: str) -> str:
+    """Write a figure with its unit; nothing where there is none."""
+    if value is None:
+        return ""
+    if not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value * factor:.3g} {unit}".rstrip()

@@ -1,0 +1,192 @@
+"""``digiclay job``: one job of a batch, from its own two files alone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..core.accuracy import can_be_estimated, estimated
+from ..core.errors import DigiclayError, OutputError
+from ..core.export import write_whole
+from ..core.job_outputs import Outputs
+from ..core.jobs import JOB, SCENE, job_outputs
+from ..core.run_folder import may_be_written, written
+from ..core.scene import Scene
+from ..core.scene_file import load
+from ..core.session import Result, run, save
+from .counted import Counted
+from .export import exported, formats, refuse_what_has_no_surface, refuse_without
+from .render import draw_film, draw_still, draw_turntable, refuse_without_blender
+from .stop import Stop
+from .thumbnail import of_heights, of_picture
+from .worker import ERROR, PROGRESS, follow
+
+__all__ = ["RUNS", "TIMING", "add", "check_outputs"]
+
+EXAMPLES = """\
+examples:
+  digiclay batch first --prepare            write the jobs' files, and run none
+  digiclay job first/jobs/tap-cell_states   do one of them, on any machine: into first/runs
+  digiclay batch first                      take up what is done, do the rest, and write first/index.html
+
+A job is a folder with scene.toml, every parameter of its session, and job.toml, what is made of it.
+"""
+#: Where a batch keeps its runs, beside its jobs; and what each took.
+RUNS, TIMING = "runs", "timing.json"
+#: Seconds between two lines of progress.
+PAUSE = 0.2
+
+#: Told of a step, and of how much of the whole job is done.
+Tell = Callable[[str, float], None]
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    said = "do one job of a batch, from its files alone; for render farms"
+    parser = commands.add_parser(
+        "job", help=said, description=said, epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="default ../../runs/JOB, as a batch has it")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    # How a batch starts it: at what time, and that it is to stop when its standard input ends.
+    parser.add_argument("--since", type=float, help=argparse.SUPPRESS)
+    parser.add_argument("--follow", action="store_true", help=argparse.SUPPRESS)
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Do the job."""
+    if not arguments.follow:
+        with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
+            out = _done(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+        if not arguments.quiet:
+            print(f"written to {out}")
+        return 0
+    ended = follow()
+    try:
+        _done(arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True))
+        return 0
+    except KeyboardInterrupt:
+        return 130
+    except DigiclayError as error:
+        print(f"{ERROR}{' '.join(str(error).split())}", flush=True)
+        return 2
+    except MemoryError:
+        print(f"{ERROR}There is not enough memory: use fewer cells, or a higher recorder.every.", flush=True)
+        return 2
+    except Exception as error:  # the batch goes on, and has to tell what this was
+        traceback.print_exc()
+        print(f"{ERROR}{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
+        return 1
+
+
+def check_outputs(scene: Scene, outputs: Outputs) -> None:
+    """Refuse, before any work, what is bound to fail after it."""
+    if outputs.export:
+        try:
+            formats(",".join(outputs.export))
+        except argparse.ArgumentTypeError as error:
+            raise OutputError(f"export: {error}.") from None
+        refuse_what_has_no_surface(scene, "export")
+        refuse_without("trimesh", "export", "pip install trimesh")
+    if (outputs.drawn or outputs.export) and scene.recorder is None:
+        raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
+    if outputs.drawn:
+        refuse_without_blender()
+
+
+def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> Path:
+    """Do the job, and return its folder; KeyboardInterrupt when it was stopped."""
+    folder: Path = arguments.job
+    scene, outputs = load(folder / SCENE), job_outputs(folder / JOB)
+    name = folder.resolve().name
+    out: Path = arguments.out or folder.resolve().parents[1] / RUNS / name
+    may_be_written(out, overwrite=arguments.overwrite)
+    check_outputs(scene, outputs)
+    started = time.time()
+    timing = {"start_up": started - arguments.since if arguments.since else None}
+    with written(out, overwrite=arguments.overwrite) as staged:
+        for step, work in _steps(scene, outputs, staged, stopped, tell):
+            began = time.perf_counter()
+            if stopped() or not work():
+                raise KeyboardInterrupt
+            timing[step] = time.perf_counter() - began
+        write_whole(staged / TIMING, (json.dumps(timing, indent=1) + "\n").encode())
+        for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
+            shutil.copyfile(folder / file, staged / file)
+    return out
+
+
+def _steps(
+    scene: Scene, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
+) -> Iterator[tuple[str, Callable[[], bool]]]:
+    """Give each step by its name; a step returns False when it was stopped."""
+    results: list[Result] = []
+    names = ["run", *(n for n in ("errors", "export", "still", "turntable", "film") if getattr(outputs, n))]
+    said = [0.0]
+
+    def telling(step: str) -> Callable[[int, int], None]:
+        before = names.index(step)
+
+        def told(done: int, total: int) -> None:
+            now = time.monotonic()
+            if now - said[0] >= PAUSE:
+                said[0] = now
+                tell(step, (before + done / total) / len(names))
+
+        return told
+
+    def simulate() -> bool:
+        versions = {"digiclay": __version__}
+        results.append(run(scene, progress=telling("run"), stopped=stopped, versions=versions))
+        return not results[-1].incomplete
+
+    def judge() -> bool:
+        result = results[-1]
+        if result.history is not None and can_be_estimated(scene):
+            errors = estimated(scene, result.history, progress=telling("errors"), stopped=stopped)
+            if errors is None:
+                return False
+            results.append(result.with_errors(errors))
+        return True
+
+    def keep() -> bool:
+        save(results[-1], out)
+        return True
+
+    yield "run", simulate
+    if outputs.errors:
+        yield "errors", judge
+    yield "save", keep
+    history = results[-1].history
+    if history is None:
+        return
+    if outputs.export:
+        yield "export", lambda: bool(exported(scene, history, -1, outputs.export, out))
+    still, turning, film = outputs.still, outputs.turntable, outputs.film
+    if still:
+        yield "still", lambda: bool(draw_still(scene, history, still, out / "still.png"))
+    if turning:
+        path, turns = out / "turntable.mp4", telling("turntable")
+        yield "turntable", lambda: bool(draw_turntable(scene, history, turning, path, turns, stopped))
+    if film:
+        whole, plays = out / "film.mp4", telling("film")
+        yield "film", lambda: bool(draw_film(scene, history, film, whole, plays, stopped))
+    if still:
+        yield "thumbnail", lambda: bool(of_picture(out / "still.png", out))
+    else:
+        yield (
+            "thumbnail",
+            lambda: bool(of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)),
+        )

@@ -1,0 +1,62 @@
+"""The small picture by which a run is known on an index page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import OutputError
+from ..core.export import write_whole
+from ..core.png import png
+from ..heat import COLOURS
+
+__all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]
+
+#: Files that can be one; and its width, pixels.
+NAMES = ("thumbnail.jpg", "thumbnail.png")
+WIDTH = 320
+
+
+def of_picture(still: Path, folder: Path) -> Path:
+    """Make one of a picture that Blender has drawn."""
+    from ..compat import bpy, scratch
+
+    out = folder / NAMES[0]
+    with scratch():
+        image = bpy.data.images.load(str(still))
+        wide, high = image.size
+        image.scale(WIDTH, max(1, round(WIDTH * high / wide)))
+        image.file_format = "JPEG"
+        try:
+            image.save(filepath=str(out), quality=85)
+        except RuntimeError as error:
+            raise OutputError(f"{out} cannot be written: {' '.join(str(error).split())}") from None
+    return out
+
+
+def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> Path:
+    """Make one of heights (n,), seen from above."""
+    out = folder / NAMES[1]
+    write_whole(out, png(height_map(height.reshape(rows, columns))))
+    return out
+
+
+def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uint8]:
+    """Return a bed seen from above as pixels (rows, columns, 3): dark is low, bright is high.
+
+    Parameters
+    ----------
+    height : ndarray (rows, columns)
+        Pin tops, the nearest row first.
+    wide : int, optional
+        About how many pixels the longer side has; large beds leave pins out.
+    """
+    every = max(1, -(-max(height.shape) // wide))
+    shown = height[::every, ::every][::-1]
+    times = max(1, wide // max(shown.shape))
+    level = (shown - shown.min()) / max(float(np.ptp(shown)), 1e-9) * (len(COLOURS) - 1)
+    known = np.arange(len(COLOURS))
+    colours = np.stack([np.interp(level, known, channel) for channel in np.array(COLOURS).T], axis=-1)
+    return (colours * 255.0 + 0.5).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)

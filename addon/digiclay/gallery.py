@@ -1,0 +1,106 @@
+"""The index page of a batch: one HTML file that needs nothing but itself, links aside."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import quote
+
+__all__ = ["Card", "page"]
+
+STYLE = """\
+:root { color-scheme: light dark; --ink: #1a1f26; --faded: #5a626d; --paper: #f4f5f6; --card: #fff;
+  --edge: #d5d9de; --bad: #b3261e; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e8eaed; --faded: #9aa3ae; --paper: #15181c; --card: #1f2429;
+    --edge: #353c44; --bad: #ff8a80; } }
+body { font: 15px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--paper); margin: 2rem auto;
+  max-width: 1400px; padding: 0 1rem; }
+h1 { font-size: 1.5rem; margin: 0 0 .2rem; } p { color: var(--faded); margin: 0 0 1.2rem; }
+main { display: grid; gap: 1rem; grid-template-columns: repeat(auto-fill, minmax(280px, 1fr)); }
+article { background: var(--card); border: 1px solid var(--edge); border-radius: 8px; overflow: hidden; }
+article img { display: block; width: 100%; aspect-ratio: 8 / 5; object-fit: contain; background: #cbced1; }
+article div { padding: .6rem .8rem .8rem; }
+h2 { font-size: 1rem; margin: 0 0 .3rem; overflow-wrap: anywhere; }
+dl { display: grid; grid-template-columns: auto 1fr; gap: .1rem .8rem; margin: 0 0 .5rem; font-size: .87rem; }
+dt { color: var(--faded); } dd { margin: 0; text-align: right; font-variant-numeric: tabular-nums; }
+a { color: inherit; margin-right: .7rem; font-size: .87rem; }
+.failed { border-color: var(--bad); } .failed strong { color: var(--bad); }
+.failed span { overflow-wrap: anywhere; }
+"""
+
+
+@dataclass(frozen=True)
+class Card:
+    """What the page says of one job.
+
+    Attributes
+    ----------
+    name : str
+    thumbnail : bytes
+        A small JPEG or PNG; empty where there is none.
+    facts : sequence of (str, str)
+        What is measured, and its value with unit.
+    links : sequence of (str, str)
+        What a file is, and its path from the page.
+    error : str
+        Why the job was not done; empty where it was.
+    """
+
+    name: str
+    thumbnail: bytes = b""
+    facts: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    links: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    error: str = ""
+
+
+def page(title: str, summary: str, cards: Sequence[Card]) -> str:
+    """Return the page of a batch."""
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{_safe(title)}</title>",
+            f"<style>\n{STYLE}</style></head><body>",
+            f"<h1>{_safe(title)}</h1>",
+            f"<p>{_safe(summary)}</p>",
+            "<main>",
+            *(_card(card) for card in cards),
+            "</main></body></html>",
+            "",
+        ]
+    )
+
+
+def _card(card: Card) -> str:
+    """Return one job's part of the page."""
+    if card.error:
+        links = _links(card.links)
+        said = f"<strong>failed</strong> <span>{_safe(card.error)}</span>"
+        return f'<article class="failed"><div><h2>{_safe(card.name)}</h2>{said}<br>{links}</div></article>'
+    facts = "".join(f"<dt>{_safe(name)}</dt><dd>{_safe(value)}</dd>" for name, value in card.facts)
+    inside = f"<div><h2>{_safe(card.name)}</h2><dl>{facts}</dl>{_links(card.links)}</div>"
+    return f"<article>{_picture(card)}{inside}</article>"
+
+
+def _picture(card: Card) -> str:
+    """Return the thumbnail, within the page."""
+    if not card.thumbnail:
+        return ""
+    kind = "png" if card.thumbnail.startswith(b"\x89PNG") else "jpeg"
+    data = base64.b64encode(card.thumbnail).decode("ascii")
+    return f'<img alt="{_safe(card.name)}" src="data:image/{kind};base64,{data}">'
+
+
+def _links(links: Sequence[tuple[str, str]]) -> str:
+    """Return links to files beside the page."""
+    return "".join(f'<a href="{_safe(quote(path))}">{_safe(said)}</a>' for said, path in links)
+
+
+def _safe(said: Any) -> str:
+    """Return a text as HTML."""
+    return html.escape(str(said))
