@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 from .core.errors import DigiclayError
 from .core.take import Take, from_bytes, to_bytes
+from .running import Running
 
-__all__ = ["Entry", "entries", "keep", "read", "remove"]
+__all__ = ["Entry", "entries", "keep", "last", "read", "recorded", "remove"]
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
@@ -35,6 +36,27 @@ def entries(bed: Any) -> list[Entry]:
     held = bed.get(PROPERTY)
     numbers = sorted(held.keys(), key=int) if held else []
     return [Entry(number, held[number]["name"], held[number]["seconds"]) for number in numbers]
+
+
+def last(bed: Any) -> str:
+    """Return the number of a bed's last take.
+
+    Raises
+    ------
+    DigiclayError
+        When it has none.
+    """
+    known = entries(bed)
+    if not known:
+        raise DigiclayError(f"{bed.name} has no take: record one in a session first.")
+    return known[-1].number
+
+
+def recorded(session: Running) -> Take | None:
+    """Return what a session has recorded, or None when that is nothing yet."""
+    if session.recording is None or len(session.recording.path) < 2:
+        return None
+    return Take(session.scene, session.recording.start, session.recording.path.copy(), session.kept)
 
 
 def keep(bed: Any, take: Take, name: str = "") -> Entry:

@@ -1,0 +1,124 @@
+"""Bake a take, or the session an animated fingertip would make, into the bed; and take a bake away."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .. import bake, properties, running, takes
+from ..compat import bpy
+from ..core.assembly import assemble
+from ..core.fingertip import Fingertip
+from ..core.keeping import packed
+from ..core.simulation import begin
+from ..core.take import Take
+from ..panels.base import bed_of
+from .long_work import LongWork
+
+__all__ = ["Bake", "FreeBake"]
+
+
+def needs_idle_bed(operator: Any, context: Any) -> bool:
+    """Tell whether a bed is active that no session runs on; if not, the operator says why."""
+    bed = bed_of(context)
+    if bed is None:
+        operator.poll_message_set("Select a Digital Clay bed or its fingertip first")
+        return False
+    if running.of(bed) is not None:
+        operator.poll_message_set("Stop the session on this bed first")
+        return False
+    return True
+
+
+class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
+    """Turn a session into ordinary animation of the bed, which plays and renders without simulating"""
+
+    bl_idname = "digiclay.bake"
+    bl_label = "Bake Session"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    source: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Source",
+        description="What moves the fingertip",
+        items=[
+            ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
+            ("TAKE", "Take", "The fingertip as it was recorded in a session"),
+        ],
+        default="FINGERTIP",
+    )
+    take: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Take", description="Number of the take; empty: the last one"
+    )
+    first: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="First Frame", description="Frame the session begins at", default=1
+    )
+    last: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Last Frame",
+        description="Frame the session ends at; a take has its own length",
+        default=250,
+    )
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed without a running session is needed."""
+        return needs_idle_bed(cls, context)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Take the scene's frames where none are asked for, and begin."""
+        if not self.properties.is_property_set("first"):
+            self.first = context.scene.frame_start
+        if not self.properties.is_property_set("last"):
+            self.last = context.scene.frame_end
+        return super().invoke(context, event)
+
+    def begun(self, context: Any) -> Iterator[float]:
+        """Read the finger's path, simulate it, and write the bake."""
+        bed, scene = bed_of(context), context.scene
+        own = self.source == "TAKE"
+        if own:
+            take = takes.read(bed, self.take or takes.last(bed))
+        else:
+            made = properties.scene_of(bed)
+            period = made.simulation.control_period
+            poses = np.empty((0, 7))
+            for step in bake.sampled(scene, bed, self.first, self.last, period):
+                if isinstance(step, float):
+                    yield 0.3 * step
+                else:
+                    poses = step
+            system = assemble(made)
+            # How a path ends is not known before it is simulated, and nobody asks.
+            take = Take(made, packed(system, begin(system)), poses, b"")
+        rate = scene.render.fps / scene.render.fps_base
+        for step in bake.moments_of(take, rate):
+            if isinstance(step, float):
+                yield 0.3 + 0.7 * step
+            else:
+                moments = step
+        finger = take.scene.fingertip or Fingertip()
+        bake.apply(bed, moments, self.first, finger, keyframe_finger=own)
+        count = len(moments.height)
+        self.report({"INFO"}, f"Baked {count} frames, {self.first} to {self.first + count - 1}")
+
+
+class FreeBake(bpy.types.Operator):  # type: ignore[misc]
+    """Take the bake away: the bed shows its own state again. Keyframes of the fingertip stay"""
+
+    bl_idname = "digiclay.bake_free"
+    bl_label = "Free Bake"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed with a bake is needed."""
+        bed = bed_of(context)
+        if bed is None or not bake.is_baked(bed):
+            cls.poll_message_set("The bed has no bake")
+            return False
+        return True
+
+    def execute(self, context: Any) -> set[str]:
+        """Free it."""
+        bake.free(bed_of(context))
+        return {"FINISHED"}

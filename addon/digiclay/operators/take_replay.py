@@ -1,0 +1,182 @@
+"""Play a take again: the finger and the pins go through it once more, and the end is compared bit for bit."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+import time
+from typing import Any
+
+import numpy as np
+
+from .. import bed_state, bridge, preferences, properties, sculpting, takes, view
+from ..compat import bpy
+from ..core.assembly import assemble
+from ..core.errors import DigiclayError
+from ..core.fingertip import Fingertip
+from ..core.keeping import packed, unpacked
+from ..core.live import Clock, due, lived
+from ..core.take import MOST_PARTS, Take, finer
+from ..panels.base import bed_of
+from ..running import Running
+from .bake import needs_idle_bed
+from .take_export import needs_take
+
+__all__ = ["ReplayTake"]
+
+
+class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
+    """Play a take again at the speed it was recorded at. Esc stops, and the bed is as it was"""
+
+    bl_idname = "digiclay.take_replay"
+    bl_label = "Replay Take"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    take: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Take", description="Number of the take; empty: the last one"
+    )
+    parts: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Finer Steps",
+        description="Parts each physics step is cut into: 1 replays the take bit for bit",
+        default=1,
+        min=1,
+        max=MOST_PARTS,
+    )
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed with a take and without a session is needed."""
+        return needs_idle_bed(cls, context) and needs_take(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Play it without showing anything but its end."""
+        try:
+            self._begin(context)
+            for state in self._states:
+                self._state, self._at = state, self._at + 1
+            return self._finish(context)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Play it in the window."""
+        try:
+            self._begin(context)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        manager, rate = context.window_manager, preferences.of(context).redraw_rate
+        self._timer = manager.event_timer_add(1.0 / rate, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Go on by what the wall's clock says."""
+        if event.type == "ESC" and event.value == "PRESS":
+            return self._left(context)
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        bed = bed_of(context)
+        if bed is None or bed.session_uid != self._uid:
+            return self._left(context)
+        period = self._system.period
+        count, self._clock = due(
+            self._clock, time.perf_counter(), period, preferences.of(context).most_periods
+        )
+        try:
+            for _ in range(min(count, self._took.periods - self._at)):
+                self._state = next(self._states)
+                self._at += 1
+            if self._at == self._took.periods:
+                self._ended(context)
+                return self._finish(context)
+        except DigiclayError as error:
+            self._left(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        view.show_state(bed, self._system, self._state)
+        self._place(bed)
+        seconds, whole = self._at * period, self._took.duration
+        context.workspace.status_text_set(f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: Any) -> None:
+        """Stop when Blender takes the operator away, such as at the loading of a file."""
+        self._ended(context)
+
+    def _begin(self, context: Any) -> None:
+        """Read the take and put everything to its start."""
+        bed = bed_of(context)
+        self._uid = bed.session_uid
+        self._took: Take = takes.read(bed, self.take or takes.last(bed))
+        self._system = assemble(finer(self._took.scene, self.parts))
+        if self._system.grid.count != len(bed.data.vertices):
+            here, there = len(bed.data.vertices), self._system.grid.count
+            raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
+        self._state = unpacked(self._system, self._took.start)
+        self._states = lived(self._system, self._state, self._took.poses)
+        self._clock, self._at = Clock(), 0
+
+    def _place(self, bed: Any) -> None:
+        """Put the fingertip to where the take has it; one that is animated goes its own way."""
+        tip = view.fingertip_of(bed)
+        if tip is not None:
+            finger = self._took.scene.fingertip or Fingertip()
+            bridge.place_fingertip(tip, self._took.poses[self._at], finger)
+
+    def _finish(self, context: Any) -> set[str]:
+        """Leave the bed as the take left it, and tell how the two compare."""
+        bed, system = bed_of(context), self._system
+        state = packed(system, self._state)
+        self._place(bed)
+        bed_state.write(bed, self._came_to(bed, state))
+        view.show_state(bed, system, self._state)
+        seconds = f"{self._took.duration:.1f} s"
+        if state == self._took.end:
+            self.report({"INFO"}, f"Replayed {seconds}: it ends in the same state, bit for bit")
+        elif self.parts == 1:
+            self.report(
+                {"WARNING"},
+                f"Replayed {seconds}: it ends {self._off():.3g} µm away, as another version may",
+            )
+        else:
+            said = f"steps {self.parts} times finer end {self._off():.3g} µm away"
+            self.report({"INFO"}, f"Replayed {seconds}: {said}")
+        return {"FINISHED"}
+
+    def _off(self) -> float:
+        """Return the largest difference of a height at the end from the take's, µm."""
+        ended = unpacked(self._system, self._took.end)
+        return 1e6 * float(np.abs(self._state.row(0) - ended.row(0)).max())
+
+    def _came_to(self, bed: Any, state: bytes) -> Running:
+        """Return the session that would go on from here."""
+        session, _ = sculpting.begun(
+            bed.session_uid, bed.name, self._took.scene, self._took.poses[-1], state, bed_state.moment(bed)
+        )
+        return session
+
+    def _left(self, context: Any) -> set[str]:
+        """Show the bed as it was before."""
+        self._ended(context)
+        bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
+        if bed is not None:
+            try:
+                scene = properties.scene_of(bed)
+                tip = view.fingertip_of(bed)
+                at = bed_state.pose(bed)
+                before, _ = sculpting.begun(
+                    bed.session_uid, bed.name, scene,
+                    bridge.pose(tip) if at is None else at, bed_state.kept(bed),
+                )  # fmt: skip
+                view.show_state(bed, before.system, before.state)
+                if at is not None and tip is not None:
+                    bridge.place_fingertip(tip, at, scene.fingertip or Fingertip())
+            except DigiclayError as error:
+                self.report({"WARNING"}, str(error))
+        self.report({"INFO"}, "Replay stopped: the bed is as it was")
+        return {"CANCELLED"}
+
+    def _ended(self, context: Any) -> None:
+        """Take back what the replay needs of Blender."""
+        self._states.close()
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)

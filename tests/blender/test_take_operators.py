@@ -1,0 +1,181 @@
+"""What the buttons of the Takes panel do, in the background: record, keep, replay, bake, export, remove."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bake, bed_state, bridge, running, sculpting, takes, tick, view
+from digiclay.core.scene_file import load
+from numpy.typing import NDArray
+
+pytestmark = pytest.mark.usefixtures("extension")
+#: Time between two ticks, s: a session follows ten control periods in each.
+TICK = 0.05
+
+
+@pytest.fixture
+def bed() -> Any:
+    """Return a bed added as a user adds it, active, in a file that plays 40 frames a second."""
+    bpy.ops.mesh.digital_clay_add(rows=12, columns=12)
+    bpy.context.scene.render.fps = 40
+    return bpy.context.object
+
+
+def begin(bed: Any) -> None:
+    """Start a session without a window's loop."""
+    tick.start(bpy.context, bed)
+
+
+def press(bed: Any, ticks: int = 12, *, deep: float = 8e-3) -> None:
+    """Let a session live while the finger goes down from 2 mm above the pins."""
+    tip = view.fingertip_of(bed)
+    top = bridge.read_cells(bed.data)["height"].max() * bridge.SCALE
+    reach = bridge.pose(tip)[2] * bridge.SCALE - tip.location.z
+    for count in range(ticks + 1):
+        tip.location.z = top - reach + (2e-3 - deep * count / ticks) * bridge.SCALE
+        bpy.context.view_layer.update()
+        tick.tick(bpy.context, 100.0 + TICK * count)
+
+
+def heights(bed: Any) -> NDArray[np.float64]:
+    """Return the heights drawn."""
+    return bridge.read_cells(bed.data)["height"]
+
+
+def record(bed: Any) -> str:
+    """Record a press and keep it; return the take's number. The session is stopped."""
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    press(bed)
+    assert bpy.ops.digiclay.take_keep(name="A press") == {"FINISHED"}
+    tick.stop(bed.session_uid)
+    return takes.entries(bed)[-1].number
+
+
+def test_what_is_recorded_becomes_a_take_of_the_bed(bed: Any) -> None:
+    record(bed)
+    (entry,) = takes.entries(bed)
+    assert entry.name == "A press"
+    # Twelve ticks of ten periods: the first look at the clock starts it.
+    assert entry.seconds == pytest.approx(0.6)
+
+
+def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(bed: Any) -> None:
+    number = record(bed)
+    kept, drawn = bed_state.kept(bed), heights(bed)
+    begin(bed)
+    press(bed, deep=11e-3)
+    tick.stop(bed.session_uid)
+    assert bed_state.kept(bed) != kept
+    assert bpy.ops.digiclay.take_replay(take=number) == {"FINISHED"}
+    assert bed_state.kept(bed) == kept == takes.read(bed, number).end
+    assert np.array_equal(heights(bed), drawn)
+
+
+def test_finer_steps_end_near_but_not_at_the_same_heights(bed: Any) -> None:
+    number = record(bed)
+    drawn = heights(bed)
+    assert bpy.ops.digiclay.take_replay(take=number, parts=8) == {"FINISHED"}
+    apart = np.abs(heights(bed) - drawn).max()
+    assert 0.0 < apart < 20e-6  # what steps of 5 ms leave
+
+
+def test_the_session_goes_on_from_a_replayed_take(bed: Any) -> None:
+    number = record(bed)
+    bpy.ops.digiclay.take_replay(take=number)
+    begin(bed)
+    session = running.of(bed)
+    assert session.state.period == takes.read(bed, number).periods
+    tick.stop(bed.session_uid)
+
+
+def test_baking_a_take_shows_its_end_at_its_last_frame(bed: Any) -> None:
+    record(bed)
+    drawn = heights(bed)
+    assert bpy.ops.digiclay.bake(source="TAKE", first=10) == {"FINISHED"}
+    bpy.context.scene.frame_set(10 + 24)  # 0.6 s at 40 frames a second
+    next(one for one in bed.modifiers if one.name == view.MODIFIER).show_viewport = False
+    bpy.context.view_layer.update()
+    mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert np.abs(bridge.read_cells(mesh)["height"] - drawn).max() < 1e-7  # float32
+
+
+def test_an_animated_fingertip_bakes_in_the_background_without_a_session(bed: Any) -> None:
+    tip = view.fingertip_of(bed)
+    for frame, down in ((1, 0.0), (21, 14e-3)):
+        tip.location.z -= down * bridge.SCALE
+        tip.keyframe_insert("location", frame=frame)
+    curves = len([curve for group in bake.curves(tip) for curve in group])
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=41) == {"FINISHED"}
+    assert bake.is_baked(bed)
+    assert len([curve for group in bake.curves(tip) for curve in group]) == curves  # its own animation stays
+    bpy.context.scene.frame_set(21)
+    mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert mesh is not None
+    assert bpy.ops.digiclay.bake_free() == {"FINISHED"}
+    assert not bake.is_baked(bed)
+
+
+def test_a_session_does_not_start_on_a_baked_bed(bed: Any) -> None:
+    record(bed)
+    bpy.ops.digiclay.bake(source="TAKE")
+    with pytest.raises(Exception, match="free the bake"):
+        begin(bed)
+
+
+def test_an_exported_take_is_a_scene_that_runs_as_long(bed: Any, tmp_path: Path) -> None:
+    record(bed)
+    file = tmp_path / "ein Täke.toml"
+    assert bpy.ops.digiclay.take_export(filepath=str(file)) == {"FINISHED"}
+    scene = load(file)
+    assert scene.name == "A press"
+    assert scene.simulation.duration == pytest.approx(0.6)
+    assert scene.cells == 144
+
+
+def test_a_take_from_a_formed_bed_is_not_exported_and_the_file_is_not_made(bed: Any, tmp_path: Path) -> None:
+    record(bed)
+    record(bed)
+    file = tmp_path / "late.toml"
+    with pytest.raises(RuntimeError, match="begins on a bed that is formed already"):
+        bpy.ops.digiclay.take_export(filepath=str(file))
+    assert not file.exists()
+
+
+def test_a_removed_take_is_gone(bed: Any) -> None:
+    number = record(bed)
+    assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
+    assert takes.entries(bed) == []
+
+
+def test_keeping_a_take_of_nothing_says_so(bed: Any) -> None:
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    assert bpy.ops.digiclay.take_keep() == {"CANCELLED"}
+    assert running.of(bed).recording is None
+    tick.stop(bed.session_uid)
+
+
+def test_a_session_that_is_stopped_while_it_records_keeps_the_take(bed: Any) -> None:
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    press(bed)
+    tick.stop(bed.session_uid)
+    assert [one.seconds for one in takes.entries(bed)] == [pytest.approx(0.6)]
+
+
+@pytest.mark.parametrize("name", ["take_record", "take_keep", "take_replay", "take_export", "take_remove"])
+def test_a_button_without_what_it_needs_is_disabled(bed: Any, name: str) -> None:
+    assert not getattr(bpy.ops.digiclay, name).poll()
+
+
+def test_the_session_recorded_by_hand_is_the_one_sculpting_records(bed: Any) -> None:
+    begin(bed)
+    running.put(sculpting.recording(running.of(bed), True))
+    press(bed, 3)
+    assert takes.recorded(running.of(bed)).periods == 30
+    tick.stop(bed.session_uid)
