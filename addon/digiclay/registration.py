@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import command_line, display, operators, panels, preferences, properties
+from . import command_line, display, handlers, operators, panels, preferences, press_tool, properties
 
 __all__ = ["MODULES", "register", "unregister"]
 
@@ -15,7 +15,9 @@ MODULES: tuple[ModuleType, ...] = (
     preferences,
     operators,
     panels,
+    press_tool,
     command_line,
+    handlers,  # the last to come and the first to go: it ends what runs
 )
 
 

@@ -15,7 +15,7 @@ from .core.state import State
 from .core.system import System
 from .core.trace import Trace
 
-__all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put"]
+__all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put", "said", "say"]
 
 Floats = NDArray[np.float64]
 
@@ -176,3 +176,17 @@ def put(running: Running) -> None:
 def drop(uid: int) -> Running | None:
     """Forget a session; return what it was."""
     return _SESSIONS.pop(uid, None)
+
+
+#: What was told last: some of it cannot be reported where it happens, such as while a file is loaded.
+_SAID = [""]
+
+
+def say(words: str) -> None:
+    """Keep what was told last, for the Session panel."""
+    _SAID[0] = words
+
+
+def said() -> str:
+    """Return what was told last."""
+    return _SAID[0]

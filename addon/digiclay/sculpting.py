@@ -20,6 +20,7 @@ from .core.state import State
 from .core.system import System
 from .core.trace import begun as trace_begun
 from .core.trace import extended, felt, picked, row
+from .instant import CLEARANCE
 from .running import Gesture, Recording, Running
 
 __all__ = ["adapted", "advanced", "begun", "recording", "reset", "restored", "rewound", "stepped"]
@@ -201,9 +202,11 @@ def rewound(running: Running) -> Running:
     return replace(back, coming=last)
 
 
-def reset(running: Running, pose: Floats) -> Running:
-    """Bring the bed back to rest; the gestures stay, so that this can be rewound as well."""
+def reset(running: Running) -> Running:
+    """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
     before = Gesture(0, running.kept, running.pose)
+    pose = running.pose.copy()
+    pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
     back = restored(replace(running, gestures=()), None, pose, moment=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 

@@ -141,7 +141,7 @@ def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     hand = Hand()
     session = hand.press(started())
     formed = heights(session)
-    back = sculpting.reset(session, pose())
+    back = sculpting.reset(session)
     assert (heights(back) == 40e-3).all()
     assert back.state.period == 0
     assert np.array_equal(heights(sculpting.rewound(back)), formed)

@@ -3,7 +3,24 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import add_bed, import_run, pick_pins, presets, rebuild
+from . import (
+    add_bed,
+    bake,
+    import_run,
+    pick_pins,
+    presets,
+    press,
+    rebuild,
+    session,
+    session_pause,
+    session_reset,
+    session_rewind,
+    session_step,
+    session_stop,
+    take_export,
+    take_record,
+    take_replay,
+)
 
 __all__ = ["register", "unregister"]
 
@@ -16,6 +33,20 @@ CLASSES: tuple[type, ...] = (
     rebuild.Rebuild,
     pick_pins.PickPins,
     pick_pins.ClearPins,
+    press.Press,
+    session.Session,
+    session_stop.StopSession,
+    session_pause.PauseSession,
+    session_step.StepSession,
+    session_rewind.RewindSession,
+    session_reset.ResetSession,
+    take_record.RecordTake,
+    take_record.KeepTake,
+    take_replay.ReplayTake,
+    take_export.ExportTake,
+    take_export.RemoveTake,
+    bake.Bake,
+    bake.FreeBake,
 )
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import control, device, display, finger
+from . import control, device, display, finger, session, takes
 
 __all__ = ["register", "unregister"]
 
@@ -13,7 +13,9 @@ CLASSES: tuple[type, ...] = (
     *device.CLASSES,
     *finger.CLASSES,
     *control.CLASSES,
+    *session.CLASSES,
     *display.CLASSES,
+    *takes.CLASSES,
 )
 
 

@@ -1,0 +1,66 @@
+"""What a bed's object keeps of its session: properties that copies, appends, undo and files carry along."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .running import Floats, Running
+
+__all__ = ["MOMENT", "POSE", "STATE", "clear", "kept", "moment", "pose", "write"]
+
+#: The state by `core.keeping`, the finger's pose at it, and the tick it is of.
+STATE, POSE, MOMENT = "digiclay_state", "digiclay_pose", "digiclay_moment"
+
+
+def write(bed: Any, running: Running, before: Running | None = None) -> None:
+    """Write a session into its bed's properties.
+
+    The moment changes with every tick, even while nothing moves: undo puts back an object only
+    where it differs from one step to the next.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    running : Running
+    before : Running, optional
+        What was written last; what has not changed since is left alone.
+    """
+    bed[MOMENT] = running.moment
+    if before is not None and running.kept is before.kept:
+        return
+    # Blender corrupts its memory when bytes are assigned over others of another length.
+    if STATE in bed:
+        del bed[STATE]
+    bed[STATE] = running.kept
+    bed[POSE] = running.pose.tobytes()
+
+
+def clear(bed: Any) -> None:
+    """Forget all that is kept: the bed is at rest."""
+    for name in (STATE, POSE, MOMENT):
+        if name in bed:
+            del bed[name]
+
+
+def kept(bed: Any) -> bytes | None:
+    """Return the kept state, or None for a bed at rest; it may be anything a file can hold."""
+    value = bed.get(STATE)
+    return value if value is None or isinstance(value, bytes) else b""
+
+
+def pose(bed: Any) -> Floats | None:
+    """Return the finger's pose (7,) at the kept state, or None where there is none that can be used."""
+    value = bed.get(POSE)
+    if not isinstance(value, bytes) or len(value) != 7 * 8:
+        return None
+    at = np.frombuffer(value, np.float64).copy()
+    turned = np.linalg.norm(at[3:])
+    return at if np.isfinite(at).all() and abs(turned - 1.0) < 1e-6 else None
+
+
+def moment(bed: Any) -> int:
+    """Return the tick the kept state is of; 0 where none is kept."""
+    value = bed.get(MOMENT)
+    return value if isinstance(value, int) and value > 0 else 0

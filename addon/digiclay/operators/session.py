@@ -1,0 +1,101 @@
+"""Start a session: the bed follows its fingertip, however that is moved, until Esc is pressed."""
+
+# No postponed annotations here, as in the other operators.
+import time
+from typing import Any
+
+from .. import handlers, loop, overlay, running, tick
+from ..bake import is_baked
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..panels.base import bed_of
+
+__all__ = ["Session", "end_all"]
+
+
+class Session(bpy.types.Operator):  # type: ignore[misc]
+    """Start to sculpt: the pins follow the fingertip while you move it by any means. Esc stops"""
+
+    bl_idname = "digiclay.session"
+    bl_label = "Start Session"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed in object mode is needed, with no session yet, and a window."""
+        bed = bed_of(context)
+        if bed is None:
+            why = "Select a bed or its fingertip first"
+        elif running.of(bed) is not None:
+            why = "A session runs on this bed already: Esc stops it"
+        elif context.mode != "OBJECT":
+            why = "Go back to Object Mode first"
+        elif bed.library is not None or bed.data.library is not None:
+            why = "The bed is linked from another file: make it local first (Object > Relations)"
+        elif is_baked(bed):
+            why = "The bed plays a baked session: free the bake in the Takes panel first"
+        elif bpy.app.background:
+            why = "A live session needs a window; takes can be baked without"
+        else:
+            return True
+        cls.poll_message_set(why)
+        return False
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Start as `execute` does."""
+        return self.execute(context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Start the session, and the loop unless another session's drives this one as well."""
+        bed = bed_of(context)
+        try:
+            notes = tick.start(context, bed)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
+        handlers.watch()
+        overlay.follow()
+        # The state stands in the bed by now, so that undoing the first gesture finds it.
+        bpy.ops.ed.undo_push(message="Start Session")
+        if loop.runs():
+            return {"FINISHED"}
+        self.token = loop.begin(context)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Tick with the timer; leave every other event to whoever it is for."""
+        if self.token != loop.token():
+            return {"CANCELLED"}
+        if event.type == "ESC" and event.value == "PRESS":
+            end_all()
+            return {"FINISHED"}
+        now = time.perf_counter()
+        if event.type != "TIMER" or not loop.due(context, now):
+            return {"PASS_THROUGH"}
+        self._tell(tick.tick(context, now))
+        loop.drawn(context, now)
+        if running.all():
+            return {"PASS_THROUGH"}
+        end_all()
+        return {"FINISHED"}
+
+    def cancel(self, context: Any) -> None:
+        """End with the window the loop was started in."""
+        if self.token == loop.token():
+            handlers.ended("its window was closed")
+
+    def _tell(self, notes: list[tick.Note]) -> None:
+        """Report what there is to tell, and keep it for the panel."""
+        for note in notes:
+            self.report({note.level}, note.words)
+            running.say(note.words)
+
+
+def end_all() -> None:
+    """End all sessions; one undo step holds what they came to."""
+    beds = [tick.stop(session.uid) for session in running.all()]
+    if any(bed is not None for bed in beds):
+        running.say("The session was stopped; the bed keeps its state")
+        bpy.ops.ed.undo_push(message="Stop Session")
+    handlers.ended("")

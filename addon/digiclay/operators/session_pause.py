@@ -1,0 +1,31 @@
+"""Pause a session, and let it go on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from .. import loop, running
+from ..compat import bpy
+from .session_context import decline_without, session_of
+
+__all__ = ["PauseSession"]
+
+
+class PauseSession(bpy.types.Operator):  # type: ignore[misc]
+    """Let the bed stand still, or go on: it then takes the straight way to where the fingertip is"""
+
+    bl_idname = "digiclay.session_pause"
+    bl_label = "Pause or Resume"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A session is needed."""
+        return decline_without(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Turn it over."""
+        _, session = session_of(context)
+        running.put(replace(session, paused=not session.paused))
+        loop.status_changed()
+        return {"FINISHED"}

@@ -1,0 +1,30 @@
+"""Let a paused session do one control period."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import loop, running, sculpting
+from ..compat import bpy
+from .session_context import decline_without, session_of
+
+__all__ = ["StepSession"]
+
+
+class StepSession(bpy.types.Operator):  # type: ignore[misc]
+    """Let the bed do one control period and stand still; a session that runs is paused"""
+
+    bl_idname = "digiclay.session_step"
+    bl_label = "Single Step"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A session is needed."""
+        return decline_without(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Ask for one more; the next tick does it."""
+        _, session = session_of(context)
+        running.put(sculpting.stepped(session))
+        loop.status_changed()
+        return {"FINISHED"}

@@ -1,0 +1,58 @@
+"""Why a session has to stand still: what is missing or in the way, in words that say what to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import bridge, view
+from .compat import bpy
+from .core.errors import DigiclayError
+
+__all__ = ["found", "obstacle"]
+
+
+def found(uid: int, name: str) -> Any | None:
+    """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.
+
+    Parameters
+    ----------
+    uid : int
+    name : str
+        Its name when last seen: looked up first.
+    """
+    bed = bpy.data.objects.get(name)
+    if bed is None or bed.session_uid != uid:
+        bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
+    return bed if bed is not None and view.is_bed(bed) and bed.users_scene else None
+
+
+def obstacle(context: Any, bed: Any) -> str:
+    """Return why the session of a bed cannot go on now, or an empty text.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
+    if bpy.app.is_job_running("RENDER"):
+        return "a render is under way"
+    layers = [window.view_layer for window in context.window_manager.windows]
+    if not any(layer.objects.get(bed.name) == bed for layer in layers):
+        return "no window shows its scene, or its collection is left out: show it to go on"
+    if bed.mode != "OBJECT":
+        return "the bed is being edited: go back to Object Mode to go on"
+    tip = view.fingertip_of(bed)
+    if tip is None:
+        return "its fingertip is deleted: undo that, or start the session anew to get another one"
+    if not any(layer.objects.get(tip.name) == tip for layer in layers):
+        return "its fingertip stands in no scene shown: link it to a collection to go on"
+    try:
+        bridge.uniform(bed)
+    except DigiclayError as error:
+        return str(error)
+    matrix = np.array(tip.matrix_world)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        return "its fingertip is scaled to nothing: clear its scale to go on"
+    return ""

@@ -1,0 +1,53 @@
+"""Plays a script in a real Blender window, and returns what it saw."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+BLENDER = os.environ.get("DIGICLAY_BLENDER_WINDOW", "")
+HERE = Path(__file__).parent
+ADDON = HERE.parents[1] / "addon" / "digiclay"
+#: A run takes half a minute under a virtual screen with software GL; beyond this it hangs.
+LIMIT = 240
+
+
+def played(script: str, out: Path) -> dict[str, Any]:
+    """Play a script of this folder in a Blender with a copy of the extension installed.
+
+    Parameters
+    ----------
+    script : str
+        Its file's name.
+    out : Path
+        An empty folder for what is installed, seen and shot.
+
+    Returns
+    -------
+    dict
+        What the script saw; and as "output" all that Blender said, which holds no traceback.
+    """
+    installed = out / "extensions" / "user_default" / "digiclay"
+    shutil.copytree(ADDON, installed, ignore=shutil.ignore_patterns("__pycache__", ".*"))
+    # `timeout` ends Blender with SIGTERM, so that a launcher can take its children along.
+    command = ["timeout", "--kill-after=10", str(LIMIT), BLENDER]
+    command += ["--factory-startup", "--enable-event-simulate", "--python-exit-code", "3"]
+    command += ["--python", str(HERE / "driver.py"), "--", str(out), str(HERE / script)]
+    environment = os.environ | {"BLENDER_USER_EXTENSIONS": str(out / "extensions")}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    kept = os.environ.get("DIGICLAY_SCREENSHOTS")
+    if kept:
+        Path(kept).mkdir(parents=True, exist_ok=True)
+        for picture in out.glob("*.png"):
+            shutil.copy(picture, kept)
+    said = f"{done.stdout[-6000:]}\n{done.stderr[-6000:]}"
+    assert (out / "seen.json").is_file(), f"Blender ended with {done.returncode} and no result:\n{said}"
+    result: dict[str, Any] = json.loads((out / "seen.json").read_text())
+    assert "error" not in result, f"{result['error']}\n{said}"
+    assert "Traceback" not in said, said
+    assert done.returncode == 0, f"Blender ended with {done.returncode}:\n{said}"
+    return result | {"output": done.stdout + done.stderr}

@@ -1,0 +1,237 @@
+"""Runs inside a Blender window and plays a script there, with simulated keys and mouse moves.
+
+Started by `blender_window.played`, with the folder for the results and the script after ``--``.
+A script is a file with a generator function ``script(blender)``, which is given this module. It is
+stepped from a timer, so that Blender handles each batch of events before the next; it may
+yield how long to wait, s.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import addon_utils
+import bpy
+import numpy as np
+
+EXTENSION = "bl_ext.user_default.digiclay"
+OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
+#: Time between steps, s: software GL draws a window of this size in a third of it.
+PAUSE = 0.4
+#: What the script has seen, by name; `blender_window.played` returns it.
+SEEN: dict[str, Any] = {}
+
+
+def part(name: str) -> Any:
+    """Return a module of the extension."""
+    return importlib.import_module(f"{EXTENSION}.{name}")
+
+
+def window() -> Any:
+    """Return the first window."""
+    return bpy.context.window_manager.windows[0]
+
+
+def event(kind: str, value: str = "PRESS", at: tuple[int, int] = (0, 0), **modifiers: Any) -> None:
+    """Simulate one event in the first window."""
+    window().event_simulate(kind, value, x=at[0], y=at[1], **modifiers)
+
+
+def key(kind: str, at: tuple[int, int], **modifiers: Any) -> None:
+    """Press and release a key."""
+    event(kind, "PRESS", at, **modifiers)
+    event(kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"})
+
+
+def view() -> tuple[Any, Any]:
+    """Return the first 3D view's area and its main region."""
+    area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
+    return area, next(r for r in area.regions if r.type == "WINDOW")
+
+
+def middle() -> tuple[int, int]:
+    """Return the middle of the 3D view, window pixels."""
+    _, region = view()
+    return region.x + region.width // 2, region.y + region.height // 2
+
+
+def pixel(place: Any) -> tuple[int, int]:
+    """Return where a place in the world is seen, window pixels."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+    area, region = view()
+    at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
+    return region.x + round(at.x), region.y + round(at.y)
+
+
+def call(operator: Any, *how: str, **properties: Any) -> set[str]:
+    """Call an operator as the 3D view would."""
+    area, region = view()
+    with bpy.context.temp_override(window=window(), area=area, region=region):
+        done: set[str] = operator(*how, **properties)
+    return done
+
+
+def open_sidebar(tab: str = "Digital Clay") -> Iterator[float | None]:
+    """Show a tab of the sidebar."""
+    area, _ = view()
+    area.spaces.active.show_region_ui = True
+    yield None
+    sidebar = next(r for r in area.regions if r.type == "UI")
+    sidebar.active_panel_category = tab
+    area.tag_redraw()
+    yield None
+
+
+def empty_scene() -> Iterator[float | None]:
+    """Take Blender's cube, camera and lamp away."""
+    call(bpy.ops.object.select_all, action="SELECT")
+    call(bpy.ops.object.delete)
+    bpy.ops.ed.undo_push(message="Empty scene")
+    event("MOUSEMOVE", "NOTHING", middle())
+    yield None
+
+
+def add_bed() -> Iterator[float | None]:
+    """Add a bed from the Add menu, by typing its name, and look at all of it."""
+    key("A", middle(), shift=True)
+    yield None
+    for letter in "digital clay":
+        key("SPACE" if letter == " " else letter.upper(), middle(), unicode=letter)
+        yield 0.15
+    key("RET", middle())
+    yield None
+    yield None
+    key("HOME", middle())
+    yield None
+
+
+def beds() -> list[Any]:
+    """Return the beds of the scene shown."""
+    return [thing for thing in window().scene.objects if part("view").is_bed(thing)]
+
+
+def fingertip(number: int = 0) -> Any:
+    """Return the fingertip of a bed."""
+    return part("view").fingertip_of(beds()[number])
+
+
+def select(thing: Any) -> None:
+    """Select one object alone, as one undo step."""
+    call(bpy.ops.object.select_all, action="DESELECT")
+    thing.select_set(True)
+    window().view_layer.objects.active = thing
+    bpy.ops.ed.undo_push(message="Select")
+
+
+def grab(
+    offset: tuple[float, float, float], axis: str, steps: int = 6, look_as: str = "", end: str = "LEFTMOUSE"
+) -> Iterator[float | None]:
+    """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
+
+    With `look_as` what stands in the scene is written down during the move, after each step.
+    """
+    start = bpy.context.view_layer.objects.active.matrix_world.translation.copy()
+    scale = part("bridge").SCALE * 1e-3
+    key_at = pixel(start)
+    event("MOUSEMOVE", "NOTHING", key_at)
+    yield None
+    key("G", key_at)
+    yield 0.2
+    key(axis, key_at)
+    yield 0.2
+    for step in range(1, steps + 1):
+        place = [a + scale * step / steps * d for a, d in zip(start, offset, strict=True)]
+        key_at = pixel(place)
+        event("MOUSEMOVE", "NOTHING", key_at)
+        yield None
+        if look_as:
+            look(f"{look_as} {step}")
+    key(end, key_at)
+    yield None
+
+
+def look(name: str) -> None:
+    """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
+    bridge, running = part("bridge"), part("running")
+    found: dict[str, Any] = {"beds": len(beds()), "sessions": len(running.all()), "said": running.said()}
+    for bed in beds()[:1]:
+        session, cells = running.of(bed), bridge.read_cells(bed.data)
+        found |= {
+            "heights": [float(cells["height"].min()), float(cells["height"].max())],
+            "modes": np.bincount(cells["mode"], minlength=8).tolist(),
+            "kept": len(bed.get("digiclay_state", b"")),
+        }
+        tip = part("view").fingertip_of(bed)
+        if tip is not None:
+            found["pose"] = bridge.pose(tip).tolist()
+        if session is not None:
+            found |= {
+                "period": session.state.period,
+                "factor": session.factor,
+                "paused": session.paused,
+                "waits": session.waits,
+                "gestures": len(session.gestures),
+                "force": float(session.trace.force[-1]) if len(session.trace.rows) else 0.0,
+            }
+    SEEN[name] = found
+
+
+def shot(name: str) -> None:
+    """Leave a picture of the screen, and note how many colours it has."""
+    # Blender's own screenshot reads a buffer that software GL leaves black.
+    file = OUT / f"{name}.png"
+    command = ["import", "-window", "root", str(file)]
+    subprocess.run(command, check=True, timeout=30, capture_output=True)
+    image = bpy.data.images.load(str(file))
+    SEEN.setdefault("colours", {})[name] = len(
+        np.unique(np.array(image.pixels[:], np.float32).reshape(-1, image.channels), axis=0)
+    )
+    bpy.data.images.remove(image)
+
+
+def finish() -> None:
+    """Hand over what was seen, and leave with the extension taken back."""
+    (OUT / "seen.json").write_text(json.dumps(SEEN))
+    addon_utils.disable(EXTENSION)
+    bpy.ops.wm.quit_blender()
+
+
+def main() -> None:
+    """Enable the extension under the name Blender gives it, and play the script."""
+    bpy.context.preferences.view.show_splash = False
+    # Whoever is asked whether to save waits for ever.
+    bpy.context.preferences.view.use_save_prompt = False
+    if addon_utils.enable(EXTENSION) is None:
+        SEEN["error"] = f"{EXTENSION} cannot be enabled"
+    found = importlib.util.spec_from_file_location("script", SCRIPT)
+    assert found is not None
+    assert found.loader is not None
+    played = importlib.util.module_from_spec(found)
+    found.loader.exec_module(played)
+    steps = played.script(sys.modules[__name__])
+
+    def step() -> float | None:
+        try:
+            if "error" not in SEEN:
+                return next(steps) or PAUSE
+        except StopIteration:
+            pass
+        except Exception:
+            # Whatever went wrong is the test's to report; without this Blender would sit there for ever.
+            SEEN["error"] = traceback.format_exc()
+        finish()
+        return None
+
+    bpy.app.timers.register(step, first_interval=2.0, persistent=True)
+
+
+main()
