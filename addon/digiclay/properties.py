@@ -15,10 +15,11 @@ from .core.methods import METHODS
 from .core.quantity import Parameters
 from .core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
 from .core.scene_table import ABSENT, resolve
+from .pins_drawn import differs
 from .settings_group import CLASSES, SETTINGS
 from .settings_words import named
 
-__all__ = ["adopt", "described", "part_group", "register", "scene_of", "table_of", "unregister"]
+__all__ = ["adopt", "described", "part_group", "register", "scene_of", "stale", "table_of", "unregister"]
 
 
 def scene_of(bed: Any) -> Scene:
@@ -34,10 +35,11 @@ def scene_of(bed: Any) -> Scene:
         Its owner and field are those of the panels.
     """
     scene = described(bed)
-    pins = len(bed.data.vertices)
-    if scene.cells != pins:
-        rule, remedy = f"must give the {pins} pins the bed has", "Press Rebuild in the Device panel."
-        raise ParameterError("Layout", "", rule, str(scene.cells), remedy)
+    reason = differs(bed, scene.layout)
+    if reason:
+        plan = scene.layout
+        rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in the Device panel."
+        raise ParameterError("Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy)
     return scene
 
 
@@ -96,6 +98,14 @@ def adopt(bed: Any, scene: Scene) -> None:
             own = part_group(settings, section)
             notes[_key(section, scene.method)] = settings_table.write(own, part)
     settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
+
+
+def stale(bed: Any) -> str:
+    """Return why a bed no longer shows the pins its settings describe, or an empty text."""
+    settings = bed.digiclay
+    notes = _notes(settings).get("layout", {})
+    kind = parameters("layout", settings.method)
+    return differs(bed, kind(**settings_table.read(settings.layout, kind, notes, "layout")))
 
 
 def part_group(settings: Any, section: str) -> Any:

@@ -2,52 +2,19 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Iterable
 from typing import Any
-
-import numpy as np
 
 from . import bridge, properties, view
 from .compat import bpy
 from .core.fingertip import Fingertip
-from .core.layout import Layout, grid
-from .core.scene import Scene, parameters
+from .core.scene import Scene
 from .instant import Instant
-from .settings_table import read
 
-__all__ = ["STATE", "differs", "rebuild"]
+__all__ = ["STATE", "rebuild"]
 
 #: What a bed keeps of a session; it is of no use to other pins.
 STATE = "digiclay_state"
-#: How far a pin may stand from its place before the bed counts as another one, m: above what 32 bits lose
-#: on a bed as wide as Blender's own limit of rows and columns, below any change of pitch worth making.
-AWAY = 1e-6
-
-
-def differs(bed: Any) -> str:
-    """Return why a bed is not the one its layout describes, or an empty text.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    """
-    values = read(bed.digiclay.layout, parameters("layout", bed.digiclay.method), {}, "layout")
-    layout = Layout(**values)
-    pins = len(bed.data.vertices)
-    if pins != layout.rows * layout.columns:
-        return f"The bed has {pins} pins, not {layout.rows * layout.columns}"
-    for index, place in _corners(layout):
-        if np.abs(np.array(bed.data.vertices[index].co[:2]) / bridge.SCALE - place).max() > AWAY:
-            return "The pins stand elsewhere than Layout says"
-    return ""
-
-
-@lru_cache(maxsize=32)
-def _corners(layout: Layout) -> tuple[tuple[int, np.ndarray], ...]:
-    """Return index and place of the pins that tell layouts of as many pins apart."""
-    places = grid(layout).positions
-    last = layout.rows * layout.columns - 1
-    return tuple((index, places[index]) for index in sorted({0, min(layout.columns, last), last}))
 
 
 def rebuild(bed: Any) -> Scene:
@@ -67,8 +34,9 @@ def rebuild(bed: Any) -> Scene:
     instant = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
     collection = bed.users_collection[0]
     made = view.build(instant, collection, lowest=0.0)
-    old = bed.data
+    old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _nodes(bed)]
     bed.data = made.data
+    # The modifier stays, and with it how the bed is coloured; only what it draws is another.
     for kept, new in zip(_nodes(bed), _nodes(made), strict=False):
         kept.node_group = new.node_group
     tip = view.fingertip_of(bed)
@@ -80,7 +48,11 @@ def rebuild(bed: Any) -> Scene:
     for child in made.children:
         if child.get(view.ROLE) == view.HOUSING:
             child.parent = bed
-    bpy.data.batch_remove([*cases, *made.children_recursive, made, *([] if old.users else [old])])
+    _remove([*cases, *made.children_recursive, made])
+    for tree in old_trees:
+        _discard(tree)
+    if not old_mesh.users:
+        bpy.data.meshes.remove(old_mesh)
     if STATE in bed:
         del bed[STATE]
     return scene
@@ -89,3 +61,23 @@ def rebuild(bed: Any) -> Scene:
 def _nodes(bed: Any) -> list[Any]:
     """Return the modifiers that draw a bed's pins."""
     return [modifier for modifier in bed.modifiers if modifier.type == "NODES" and modifier.node_group]
+
+
+def _discard(tree: Any) -> None:
+    """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
+    if tree.users:
+        return
+    held = [getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs]
+    collections = {thing for thing in held if isinstance(thing, bpy.types.Collection)}
+    objects = {thing for thing in held if isinstance(thing, bpy.types.Object)}
+    objects.update(*(collection.objects for collection in collections))
+    bpy.data.batch_remove([tree, *collections])
+    _remove(objects)
+
+
+def _remove(objects: Iterable[Any]) -> None:
+    """Remove objects, and the meshes only they have."""
+    objects = list(objects)
+    meshes = {thing.data for thing in objects if thing.type == "MESH"}
+    bpy.data.batch_remove(objects)
+    bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])

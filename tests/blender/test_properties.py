@@ -6,9 +6,11 @@ import dataclasses
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
-from digiclay import properties, settings_table
+from digiclay import bridge, properties, settings_table
 from digiclay.core.errors import ParameterError
+from digiclay.core.layout import Layout, grid
 from digiclay.core.methods import METHODS
 from digiclay.core.quantity import quantities
 from digiclay.core.scene import OPTIONAL, SECTIONS, Scene, parameters
@@ -22,10 +24,11 @@ EVERY = [(section, "virtual_master") for section in SECTIONS if section != "cont
 EVERY += [("control", method) for method in METHODS]
 
 
-def thing(cells: int = 625) -> Any:
-    """Return an object with as many loose vertices as a bed has pins."""
-    mesh = bpy.data.meshes.new("Bed")
-    mesh.vertices.add(cells)
+def thing(layout: Layout | None = None) -> Any:
+    """Return an object with the pins of a layout, by default the default's."""
+    places = grid(layout or Layout())
+    mesh = bridge.points("Bed", places.count)
+    bridge.write_cells(mesh, places.positions, np.zeros(places.count))
     return bpy.data.objects.new("Bed", mesh)
 
 
@@ -76,7 +79,7 @@ def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str)
 @pytest.mark.parametrize("sample", sample_names())
 def test_a_sample_scene_comes_back_bit_for_bit(sample: str) -> None:
     scene = load(find(sample))
-    bed = thing(scene.cells)
+    bed = thing(scene.layout)
     properties.adopt(bed, scene)
     assert properties.scene_of(bed) == told(bed, scene)
 
@@ -105,7 +108,7 @@ def test_a_value_changed_by_hand_is_no_longer_the_one_adopted() -> None:
 def test_a_length_typed_in_mm_is_that_length_exactly(typed: float, meant: float) -> None:
     bed = thing()
     bed.digiclay.layout.pitch = typed
-    assert properties.scene_of(bed).layout.pitch == meant
+    assert properties.described(bed).layout.pitch == meant
 
 
 @pytest.mark.parametrize("section", OPTIONAL)
@@ -138,7 +141,7 @@ def test_choosing_an_arrangement_gives_the_contact_it_needs(arrangement: str) ->
     bed = thing()
     bed.digiclay.layout.arrangement = "hexagonal"
     bed.digiclay.layout.arrangement = arrangement
-    assert properties.scene_of(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
+    assert properties.described(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
 
 
 def test_each_method_keeps_parameters_of_its_own() -> None:
@@ -175,8 +178,11 @@ def test_a_list_of_numbers_out_of_bounds_is_refused(typed: str) -> None:
 
 
 def test_a_bed_whose_pins_are_not_those_of_its_settings_is_told_how_to_mend_it() -> None:
-    bed = thing(624)
-    with pytest.raises(ParameterError, match=r"624 pins the bed has \(got 625\)\. Press Rebuild"):
+    bed = thing(Layout(rows=24))
+    wanted = (
+        r"^Layout must be that of the bed's pins \(got 25 x 25, aligned\)\. The bed has 600 pins, not 625"
+    )
+    with pytest.raises(ParameterError, match=wanted):
         properties.scene_of(bed)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import own_presets, rebuild
+from .. import own_presets, properties
 from ..compat import bpy
 from ..core.scene_table import PRESETS
 from ..property_groups import title
@@ -66,7 +66,7 @@ class Device(Panel, bpy.types.Panel):  # type: ignore[misc]
         row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
         row.operator("digiclay.preset_save", text="", icon="ADD")
         row.operator("digiclay.preset_remove", text="", icon="REMOVE")
-        reason = rebuild.differs(bed)
+        reason = properties.stale(bed)
         if reason:
             column = self.layout.column()
             column.alert = True

@@ -1,0 +1,108 @@
+"""The sidebar's tab: which panels there are, and which bed they are about. Drawn they are in tests/window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import pytest
+from digiclay import panels, view
+from digiclay.core.methods import METHODS
+from digiclay.core.scene import SECTIONS
+from digiclay.panels.base import CATEGORY, bed_of
+from digiclay.panels.section import in_use
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: Sections drawn by a panel of another kind: a shape is chosen rather than typed.
+ELSEWHERE = {"shape"}
+
+
+@pytest.fixture
+def bed() -> Any:
+    """A small bed, active."""
+    bpy.ops.mesh.digital_clay_add(rows=6, columns=6)
+    return bpy.context.object
+
+
+def parts(bed: Any) -> list[Any]:
+    """Return the objects a user can make active: the bed, its housing, the fingertip, its ellipsoid."""
+    return [bed, *bed.children_recursive]
+
+
+def panel(name: str) -> Any:
+    """Return a panel by the end of its idname."""
+    return getattr(bpy.types, f"DIGICLAY_PT_{name}")
+
+
+def test_whichever_part_is_active_the_panels_are_about_its_bed(bed: Any) -> None:
+    assert len(parts(bed)) == 4
+    for part in parts(bed):
+        bpy.context.view_layer.objects.active = part
+        assert bed_of(bpy.context) == bed
+
+
+def test_of_two_beds_the_panels_are_about_the_active_one(bed: Any) -> None:
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    other = bpy.context.object
+    assert bed_of(bpy.context) == other
+    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
+    assert bed_of(bpy.context) == bed
+
+
+def test_something_parented_to_a_bed_belongs_to_it(bed: Any) -> None:
+    cube = bpy.data.objects["Cube"]
+    cube.parent = view.fingertip_of(bed)
+    bpy.context.view_layer.objects.active = cube
+    assert bed_of(bpy.context) == bed
+
+
+@pytest.mark.parametrize("active", ["Cube", None])
+def test_without_a_bed_there_is_only_the_panel_that_offers_one(active: str | None, bed: Any) -> None:
+    bpy.context.view_layer.objects.active = bpy.data.objects[active] if active else None
+    shown = [
+        kind.bl_idname for kind in panels.CLASSES if hasattr(kind, "bl_category") and kind.poll(bpy.context)
+    ]
+    assert shown == ["DIGICLAY_PT_start"]
+
+
+def test_with_a_bed_there_is_no_panel_that_offers_one(bed: Any) -> None:
+    assert not panel("start").poll(bpy.context)
+    assert panel("device").poll(bpy.context)
+
+
+def test_every_part_of_a_scene_has_a_panel() -> None:
+    names = [name for name in SECTIONS if name not in ELSEWHERE]
+    assert [name for name in names if not hasattr(bpy.types, f"DIGICLAY_PT_part_{name}")] == []
+
+
+def test_every_panel_stands_in_the_tab_in_an_order_of_its_own() -> None:
+    drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
+    assert {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn} == {
+        ("VIEW_3D", "UI", CATEGORY)
+    }
+    orders = [(getattr(kind, "bl_parent_id", ""), kind.bl_order) for kind in drawn]
+    assert len(set(orders)) == len(orders)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_blister_is_shown_where_the_method_forms_one(method: str, bed: Any) -> None:
+    bed.digiclay.method = method
+    assert panel("part_blister").poll(bpy.context) == (METHODS[method].blister is not None)
+
+
+@pytest.mark.parametrize(
+    ("switch", "greyed"),
+    [
+        ("fingertip", {"fingertip", "contact", "relaxation"}),
+        ("control", {"control", "blister"}),
+        ("delay", {"delay"}),
+    ],
+)
+def test_what_is_left_out_is_greyed_with_all_that_belongs_to_it(
+    switch: str, greyed: set[str], bed: Any
+) -> None:
+    settings = bed.digiclay
+    used = {name for name in SECTIONS if in_use(settings, name)}
+    setattr(settings, f"use_{switch}", False)
+    assert used - {name for name in SECTIONS if in_use(settings, name)} == greyed
