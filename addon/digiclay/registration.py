@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import command_line, display, handlers, operators, panels, preferences, press_tool, properties
+from . import (
+    command_line,
+    display,
+    handlers,
+    image_reader,
+    operators,
+    panels,
+    preferences,
+    press_tool,
+    properties,
+)
 
 __all__ = ["MODULES", "register", "unregister"]
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (
     properties,
+    image_reader,
     display,
     preferences,
     operators,

@@ -7,6 +7,7 @@ from . import (
     add_bed,
     bake,
     import_run,
+    open_scene,
     pick_pins,
     presets,
     press,
@@ -17,6 +18,8 @@ from . import (
     session_rewind,
     session_step,
     session_stop,
+    shape_in,
+    shape_keep,
     take_export,
     take_record,
     take_replay,
@@ -40,6 +43,17 @@ CLASSES: tuple[type, ...] = (
     session_step.StepSession,
     session_rewind.RewindSession,
     session_reset.ResetSession,
+    shape_in.ShapeFromObject,
+    shape_in.ShapeFromFile,
+    shape_in.ShapeSample,
+    shape_keep.KeepShape,
+    shape_keep.RemoveShape,
+    open_scene.OpenScene,
+    open_scene.AddSample,
+    open_scene.SessionSamples,
+    open_scene.ShapeSamples,
+    open_scene.Samples,
+    open_scene.SceneFiles,
     take_record.RecordTake,
     take_record.KeepTake,
     take_replay.ReplayTake,
@@ -52,6 +66,7 @@ CLASSES: tuple[type, ...] = (
 MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
     ("TOPBAR_MT_file_import", import_run.entry),
+    *open_scene.MENUS,
 )
 
 

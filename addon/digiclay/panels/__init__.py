@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import control, device, display, finger, session, takes
+from . import control, device, display, finger, session, shapes, takes
 
 __all__ = ["register", "unregister"]
 
@@ -15,6 +15,7 @@ CLASSES: tuple[type, ...] = (
     *control.CLASSES,
     *session.CLASSES,
     *display.CLASSES,
+    *shapes.CLASSES,
     *takes.CLASSES,
 )
 

@@ -1,0 +1,187 @@
+"""Shapes onto a bed: from an object of the scene, from a file, or one of the samples."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from pathlib import Path
+from typing import Any
+
+from .. import running, shape_show
+from ..bake import is_baked
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..core.shape import LENGTHS, UPWARDS, Shape
+from ..core.shape_file import KINDS, sample_shapes
+from ..panels.base import bed_of
+from ..property_groups import title
+from ..shown_units import SHOWN, si
+
+__all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
+
+DEFAULT = Shape()
+FITS = (
+    ("contain", "Whole", "As large as the bed allows, all of it on the bed"),
+    ("cover", "Fill the Bed", "As small as fills the bed; what stands out is left away"),
+    ("stretch", "Stretch", "Exactly as large as the bed, whatever its proportions"),
+    ("actual", "Own Size", "As large as it is, in the middle of the bed"),
+    ("placed", "Where It Is", "As large and where it is; what is below the floor or above the stroke is cut"),
+)
+RELIEFS = (
+    ("rise", "Given Rise", "From its lowest to its highest point by the rise given"),
+    ("stroke", "Whole Stroke", "Its highest point at the end of the stroke"),
+    ("true", "True", "As high as its plan is large: proportions are kept"),
+)
+
+
+def millimetres(name: str, default: float, words: str) -> Any:
+    """Make a property of a length."""
+    return bpy.props.FloatProperty(
+        name=f"{name} (mm)", description=words, default=default * 1e3, soft_min=-100.0, soft_max=100.0,
+        min=-1e5, max=1e5, precision=2, step=20,
+    )  # fmt: skip
+
+
+class Shaped:
+    """What the operators share: how the shape is laid onto the bed, and how that is told."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    fit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Size", description="How it is laid onto the bed", items=FITS, default=DEFAULT.fit
+    )
+    scale: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Times", description="How much larger than that in plan", default=1.0, min=1e-3, max=1e3
+    )
+    x: millimetres("Right", DEFAULT.x, "Shift of its middle from the bed's along x")  # type: ignore[valid-type]
+    y: millimetres("Back", DEFAULT.y, "Shift of its middle from the bed's along y")  # type: ignore[valid-type]
+    relief: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Height", description="How high it is", items=RELIEFS, default=DEFAULT.relief
+    )
+    rise: millimetres("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")  # type: ignore[valid-type]
+    foot: millimetres("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")  # type: ignore[valid-type]
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed that stands still and is nobody else's."""
+        bed = bed_of(context)
+        if bed is None:
+            why = "Select a bed or its fingertip first"
+        elif running.of(bed) is not None:
+            why = "Stop the session first: the bed is going to be shaped anew"
+        elif context.mode != "OBJECT":
+            why = "Go back to Object Mode first"
+        elif is_baked(bed):
+            why = "The bed plays a baked session: free the bake in the Takes panel first"
+        elif bed.library is not None or bed.data.library is not None:
+            why = "The bed is linked from another file: make it local first (Object > Relations)"
+        else:
+            why = cls.missing(context, bed)
+        if why:
+            cls.poll_message_set(why)
+        return not why
+
+    @classmethod
+    def missing(cls, context: Any, bed: Any) -> str:
+        """Return what else is needed, or an empty text."""
+        return ""
+
+    def execute(self, context: Any) -> set[str]:
+        """Display the shape, and say what of it the bed cannot show."""
+        bed = bed_of(context)
+        context.view_layer.update()
+        try:
+            laid, off = self.displayed(context, bed)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        lost = laid.too_low + laid.too_high + laid.overhanging
+        words = f"{laid.told()}; displayed to within {off * 1e6:.2g} µm"
+        running.say(words)
+        self.report({"WARNING" if lost else "INFO"}, words)
+        return {"FINISHED"}
+
+    def displayed(self, context: Any, bed: Any) -> Any:
+        """Display the shape; return what `shape_show` does."""
+        raise NotImplementedError
+
+    def shape(self, file: str, bed: Any, **known: Any) -> Shape:
+        """Return how the shape is laid onto the bed."""
+        lengths = {name: si(getattr(self, name), SHOWN["m"][1]) for name in ("x", "y", "rise", "foot")}
+        before = bed.digiclay.shape
+        return Shape(
+            file=file, fit=self.fit, scale=float(f"{self.scale:.7g}"), relief=self.relief, **lengths, **known,
+            refresh=before.refresh, surfaces=before.surfaces,
+        )  # fmt: skip
+
+
+class ShapeFromObject(Shaped, bpy.types.Operator):  # type: ignore[misc]
+    """Display the upper side of another selected object on the active bed, driving the pins there"""
+
+    bl_idname = "digiclay.shape_from_object"
+    bl_label = "Shape from Object"
+
+    @classmethod
+    def missing(cls, context: Any, bed: Any) -> str:
+        """One other object is needed that has a surface."""
+        count = len(others(context, bed))
+        if count == 1:
+            return ""
+        if count:
+            return f"Select one object besides the bed, not {count}"
+        return "Select the object first, then the bed with Shift: its upper side is displayed"
+
+    def displayed(self, context: Any, bed: Any) -> Any:
+        """Display the object."""
+        (thing,) = others(context, bed)
+        relief = shape_show.relief_of(thing, bed, context.evaluated_depsgraph_get())
+        return shape_show.show_relief(bed, relief, self.shape(thing.name, bed))
+
+
+class ShapeFromFile(Shaped, bpy.types.Operator):  # type: ignore[misc]
+    """Display a mesh, a picture (light is high) or a .npy file of heights on the active bed"""
+
+    bl_idname = "digiclay.shape_from_file"
+    bl_label = "Shape from File"
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH")  # type: ignore[valid-type]
+    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+        default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"}
+    )
+    up: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Up",
+        description="Which direction of a mesh is up; automatic: y in a glTF file, else z",
+        items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
+    )
+    unit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Unit",
+        description="Length a mesh is in; automatic: metres in a glTF file, else millimetres",
+        items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
+    )
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def displayed(self, context: Any, bed: Any) -> Any:
+        """Display the file."""
+        path = str(Path(bpy.path.abspath(self.filepath)))
+        return shape_show.show_file(bed, self.shape(path, bed, up=self.up, unit=self.unit))
+
+
+class ShapeSample(Shaped, bpy.types.Operator):  # type: ignore[misc]
+    """Display one of the shapes that come with Digital Clay on the active bed"""
+
+    bl_idname = "digiclay.shape_sample"
+    bl_label = "Sample Shape"
+
+    sample: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Shape", items=[(name, title(name), "") for name in sample_shapes()]
+    )
+
+    def displayed(self, context: Any, bed: Any) -> Any:
+        """Display the sample."""
+        return shape_show.show_file(bed, self.shape(self.sample, bed))
+
+
+def others(context: Any, bed: Any) -> list[Any]:
+    """Return the selected objects with a surface that are no part of a bed."""
+    return [thing for thing in context.selected_objects if thing != bed and shape_show.surfaced(thing)]

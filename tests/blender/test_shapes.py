@@ -1,0 +1,273 @@
+"""Shapes onto beds in Blender: from objects, files and samples, and what is said when it cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bed_state, bridge, image_reader, properties, view
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import ParameterError
+from digiclay.core.keeping import unpacked
+from digiclay.core.layout import Layout, grid
+from digiclay.core.shape_file import sample_shapes
+from digiclay.core.shape_text import unpacked as heights_of
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: Dead band of the height control, and the 32 bits a bed's vertices have.
+SHOWN = 10e-6 + 1e-8
+
+
+def bed(side: int = 13, **known: Any) -> Any:
+    """Add a bed."""
+    assert bpy.ops.mesh.digital_clay_add(rows=side, columns=side, **known) == {"FINISHED"}
+    return bpy.context.object
+
+
+def heights(thing: Any) -> np.ndarray:
+    """Return what a bed shows, m."""
+    return bridge.read_cells(thing.data)["height"]
+
+
+def object_beside(name: str, vertices: list[Any], faces: list[Any]) -> Any:
+    """Add a mesh object, selected besides the bed."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    made = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(made)
+    made.select_set(True)
+    return made
+
+
+def cube(size: float, height: float, at: tuple[float, float, float] = (0, 0, 0)) -> Any:
+    """Add a box standing at a place, Blender units."""
+    x, z = size / 2, height
+    low = [(-x, -x, 0), (x, -x, 0), (x, x, 0), (-x, x, 0)]
+    high = [(a, b, z) for a, b, _ in low]
+    faces = [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    made = object_beside("Box", [*low, *high], faces)
+    made.location = at
+    return made
+
+
+def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
+    made = bed()
+    cube(1.0, 1.0)
+    # A square box is as wide as the bed: all 169 pins go up by the rise.
+    assert bpy.ops.digiclay.shape_from_object(rise=12.0, scale=0.5) == {"FINISHED"}
+    scene = properties.scene_of(made)
+    wanted = heights_of(scene.shape.heights, grid(scene.layout))
+    raised = wanted > scene.actuator.rest_height + 6e-3
+    assert raised.sum() in (36, 49)
+    assert wanted.max() == pytest.approx(52e-3, abs=4e-9)
+    assert np.abs(heights(made) - wanted).max() <= SHOWN
+    # A session goes on from there: its state is in the bed, and the method has taken over.
+    system = assemble(scene)
+    state = unpacked(system, bed_state.kept(made))
+    assert system.controller.displayed(state.memory)
+    assert np.abs(state.row(0) - wanted).max() <= SHOWN
+
+
+def test_an_object_where_it_is_is_displayed_where_it_is() -> None:
+    made = bed()
+    made.location, made.scale = (3.0, -2.0, 1.0), (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    # 60 mm above the bed's floor at twice the size: 1 + 2 * 0.6 in the world.
+    cube(0.26, 0.2, at=(3.0 + 0.12, -2.0, 1.0 + 2 * 0.6 - 0.2))
+    assert bpy.ops.digiclay.shape_from_object(fit="placed") == {"FINISHED"}
+    up = heights(made).reshape(13, 13) > 50e-3
+    row, column = np.nonzero(up)
+    assert heights(made).max() == pytest.approx(60e-3, abs=SHOWN + 1e-7)
+    # 13 mm wide about x = 6 mm: pins at 0, 3, 6, 9, 12 mm and at -6 ... 6 mm.
+    assert (row.min(), row.max(), column.min(), column.max()) == (4, 8, 6, 10)
+
+
+def test_modifiers_of_the_object_count() -> None:
+    made = bed()
+    thing = object_beside("Face", [(-1, -1, 0), (1, -1, 0), (1, 1, 1), (-1, 1, 1)], [(0, 1, 2, 3)])
+    thing.modifiers.new("Back", "MIRROR").use_axis = (False, True, False)
+    assert bpy.ops.digiclay.shape_from_object() == {"FINISHED"}
+    table = heights(made).reshape(13, 13)
+    assert np.abs(table - table[::-1]).max() <= 2 * SHOWN
+
+
+def test_a_text_object_has_a_surface_too() -> None:
+    made = bed()
+    bpy.ops.object.text_add()
+    text = bpy.context.object
+    text.data.extrude = 0.1
+    made.select_set(True)
+    bpy.context.view_layer.objects.active = made
+    assert bpy.ops.digiclay.shape_from_object() == {"FINISHED"}
+    assert np.ptp(heights(made)) > 10e-3
+
+
+def test_the_finger_is_lifted_out_of_the_shape() -> None:
+    made = bed()
+    tip = view.fingertip_of(made)
+    assert bpy.ops.digiclay.shape_sample(sample="dome", rise=40.0) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert bridge.pose(tip)[2] > heights(made).max()
+
+
+@pytest.mark.parametrize("name", sample_shapes())
+def test_every_sample_shape_is_displayed(name: str) -> None:
+    made = bed()
+    assert bpy.ops.digiclay.shape_sample(sample=name) == {"FINISHED"}
+    assert np.ptp(heights(made)) == pytest.approx(15e-3, abs=2 * SHOWN)
+
+
+def test_a_shape_is_taken_back_by_undo() -> None:
+    bed()
+    bpy.ops.ed.undo_push(message="Before")
+    assert bpy.ops.digiclay.shape_sample(sample="dome") == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="After")
+    bpy.ops.ed.undo()
+    made = next(thing for thing in bpy.data.objects if view.is_bed(thing))
+    assert np.ptp(heights(made)) == 0.0
+    assert not made.digiclay.use_shape
+    assert bed_state.kept(made) is None
+
+
+def test_a_file_is_displayed_without_any_other_library(tmp_path: Path) -> None:
+    made = bed()
+    np.save(tmp_path / "größe 1.npy", np.eye(13))
+    done = bpy.ops.digiclay.shape_from_file(filepath=str(tmp_path / "größe 1.npy"), fit="stretch")
+    assert done == {"FINISHED"}
+    assert np.array_equal(heights(made).reshape(13, 13) > 50e-3, np.eye(13) > 0)
+
+
+def test_what_is_formed_becomes_the_shape_and_goes_again() -> None:
+    made = bed()
+    assert bpy.ops.digiclay.shape_sample(sample="saddle") == {"FINISHED"}
+    shown = heights(made)
+    assert bpy.ops.digiclay.shape_keep() == {"FINISHED"}
+    scene = properties.scene_of(made)
+    assert np.abs(heights_of(scene.shape.heights, grid(scene.layout)) - shown).max() < 4e-9
+    assert bpy.ops.digiclay.shape_remove() == {"FINISHED"}
+    assert properties.scene_of(made).shape is None
+
+
+# Refusals
+
+
+def test_without_an_object_the_button_says_what_to_select() -> None:
+    bed()
+    assert not bpy.ops.digiclay.shape_from_object.poll()
+    with pytest.raises(RuntimeError, match="Select the object first, then the bed"):
+        bpy.ops.digiclay.shape_from_object()
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "said"),
+    [
+        ([], [], "must hold a surface made of faces"),
+        ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], "must hold a surface made of faces"),
+        ([(0, 0, 0), (1, float("nan"), 0), (0, 1, 0)], [(0, 1, 2)], "vertices that are finite numbers"),
+        ([(0, 0, 0), (1, 0, 0), (1, 0, 1)], [(0, 1, 2)], "must be wider than a line"),
+    ],
+)
+def test_an_object_that_is_no_shape_is_refused_and_the_bed_stays(
+    vertices: list[Any], faces: list[Any], said: str
+) -> None:
+    made = bed()
+    object_beside("Odd", vertices, faces)
+    with pytest.raises(RuntimeError, match=said):
+        bpy.ops.digiclay.shape_from_object()
+    assert np.ptp(heights(made)) == 0.0
+    assert not made.digiclay.use_shape
+
+
+def test_an_object_beside_the_bed_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    bed()
+    cube(0.2, 0.2, at=(9, 9, 0))
+    with pytest.raises(RuntimeError, match="must leave the shape over the bed"):
+        bpy.ops.digiclay.shape_from_object(fit="placed")
+
+
+@pytest.mark.parametrize("name", ["nowhere.stl", "empty.png", "empty.npy", "empty.stl"])
+def test_a_file_that_is_none_is_told(tmp_path: Path, name: str) -> None:
+    bed()
+    if name != "nowhere.stl":
+        (tmp_path / name).touch()
+    with pytest.raises(RuntimeError, match=name):
+        bpy.ops.digiclay.shape_from_file(filepath=str(tmp_path / name))
+
+
+# Pictures by Blender itself
+
+
+def image(path: Path, values: np.ndarray, kind: str, depth: str) -> None:
+    """Write a picture with Blender."""
+    rows, columns = values.shape
+    made = bpy.data.images.new("x", columns, rows, float_buffer=depth != "8")
+    made.colorspace_settings.is_data = True
+    made.pixels.foreach_set(np.dstack([values] * 3 + [np.ones_like(values)]).astype(np.float32).ravel())
+    settings = bpy.context.scene.render.image_settings
+    settings.file_format, settings.color_depth = kind, depth
+    if kind == "PNG" and depth == "16":
+        settings.color_mode = "RGB"
+    bpy.context.scene.view_settings.view_transform = "Raw"
+    made.save_render(str(path))
+    bpy.data.images.remove(made)
+
+
+@pytest.mark.parametrize(
+    ("kind", "depth", "step"), [("PNG", "8", 1 / 255), ("PNG", "16", 1 / 65535), ("OPEN_EXR", "32", 1e-6)]
+)
+def test_blender_reads_a_picture_as_it_is(tmp_path: Path, kind: str, depth: str, step: float) -> None:
+    values = np.random.default_rng(5).uniform(0.0, 1.0, (7, 5))
+    path = tmp_path / f"Übung 1.{'exr' if kind == 'OPEN_EXR' else 'png'}"
+    image(path, values, kind, depth)
+    before = len(bpy.data.images)
+    read = image_reader.pixels(path)
+    assert read.shape == (7, 5)
+    assert np.abs(read - values).max() <= step
+    assert len(bpy.data.images) == before
+
+
+def test_an_exr_is_displayed(tmp_path: Path) -> None:
+    made = bed()
+    image(tmp_path / "ramp.exr", np.tile(np.linspace(0, 3, 13), (13, 1)), "OPEN_EXR", "32")
+    assert bpy.ops.digiclay.shape_from_file(filepath=str(tmp_path / "ramp.exr")) == {"FINISHED"}
+    table = heights(made).reshape(13, 13)
+    assert np.all(np.diff(table, axis=1) > 0.5e-3)
+
+
+def test_a_large_picture_is_scaled_down_by_blender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    image(tmp_path / "large.png", np.tile(np.linspace(0, 1, 300), (200, 1)), "PNG", "8")
+    monkeypatch.setattr(image_reader, "MOST", 6000)
+    read = image_reader.pixels(tmp_path / "large.png")
+    assert read.size <= 6000
+    assert read.shape[1] / read.shape[0] == pytest.approx(1.5, rel=0.03)
+    assert np.ptp(read) > 0.95
+
+
+def test_a_file_that_is_no_picture_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x.png").write_bytes(b"rubbish")
+    before = len(bpy.data.images)
+    with pytest.raises(ParameterError, match="must be a picture Blender can read"):
+        image_reader.pixels(tmp_path / "x.png")
+    assert len(bpy.data.images) == before
+
+
+def test_the_sample_pictures_are_the_same_to_blender_and_to_pillow() -> None:
+    pillow = pytest.importorskip("PIL.Image")
+    from digiclay.core.shape_file import find_shape
+
+    for name in ("crater", "face"):
+        path = find_shape(name)
+        with pillow.open(path) as opened:
+            levels = np.flipud(np.asarray(opened)).astype(float)
+        levels /= 65535.0 if levels.max() > 255 else 255.0
+        assert np.abs(image_reader.pixels(path) - levels).max() < 1e-5, name
+
+
+def test_a_bed_of_many_cells_keeps_its_shape_in_the_file() -> None:
+    made = bed(60, pitch=3.0)
+    assert bpy.ops.digiclay.shape_sample(sample="face") == {"FINISHED"}
+    assert len(made.digiclay.shape.heights) < 6 * Layout(60, 60).rows ** 2
