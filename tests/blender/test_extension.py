@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import bpy
 import digiclay
@@ -20,29 +24,44 @@ FLOAT32 = 0.1 * 2.0**-23
 MANIFEST = Path(digiclay.__file__).with_name("blender_manifest.toml")
 
 
-def entries(menu: str) -> int:
-    """Count what add-ons have hung into a menu."""
-    draw = getattr(getattr(bpy.types, menu).draw, "_draw_funcs", [])
-    return sum(function.__module__.startswith("digiclay") for function in draw)
+def ours(functions: Iterable[Any]) -> int:
+    """Count the functions that are of this package."""
+    return sum(getattr(function, "__module__", "").startswith("digiclay") for function in functions)
 
 
-def footprint() -> tuple[bool, bool, int, int]:
-    """Return what of the extension is to be found in Blender."""
-    return (
-        "MESH_OT_digital_clay_add" in dir(bpy.types),
-        "IMPORT_SCENE_OT_digital_clay_run" in dir(bpy.types),
-        entries("VIEW3D_MT_mesh_add"),
-        entries("TOPBAR_MT_file_import"),
-    )
+def footprint() -> set[str]:
+    """Return what of the extension is to be found in Blender: types, properties, entries, handlers."""
+    types = {name: getattr(bpy.types, name) for name in dir(bpy.types)}
+    found = {name for name in types if "digi" in name.lower()}
+    drawn = {name: getattr(getattr(kind, "draw", None), "_draw_funcs", ()) for name, kind in types.items()}
+    found |= {f"{ours(functions)} in {name}" for name, functions in drawn.items() if ours(functions)}
+    owners = {"Object": bpy.types.Object, "Scene": bpy.types.Scene, "WindowManager": bpy.types.WindowManager}
+    found |= {f"{name}.{key}" for name, kind in owners.items() for key in dir(kind) if "digi" in key}
+    lists = {name: getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers)}
+    handlers = {name: each for name, each in lists.items() if isinstance(each, list)}
+    return found | {f"{ours(each)} in {name}" for name, each in handlers.items() if ours(each)}
 
 
 def test_the_extension_registers_unregisters_and_registers_again_without_a_trace() -> None:
-    assert footprint() == (False, False, 0, 0)
-    for _ in range(2):
-        digiclay.register()
-        assert footprint() == (True, True, 1, 1)
-        digiclay.unregister()
-        assert footprint() == (False, False, 0, 0)
+    assert footprint() == set()
+    digiclay.register()
+    first = footprint()
+    assert {"MESH_OT_digital_clay_add", "IMPORT_SCENE_OT_digital_clay_run", "Object.digiclay"} <= first
+    digiclay.unregister()
+    assert footprint() == set()
+    digiclay.register()
+    assert footprint() == first
+    digiclay.unregister()
+    assert footprint() == set()
+
+
+def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> None:
+    heavy = "{'bpy', 'numpy', 'trimesh'}"
+    script = f"import digiclay, sys; print(sorted({heavy} & {{name.split('.')[0] for name in sys.modules}}))"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=MANIFEST.parents[1], capture_output=True, text=True
+    )
+    assert done.stdout == "[]\n", done.stderr
 
 
 def test_the_manifest_and_the_package_agree() -> None:
