@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,15 +145,10 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) 
 
 
 def _feature(formed: Formed, feature: Feature) -> Body:
-    """Return the body of a feature; its vertices have force and mode of the nearest of its pins."""
+    """Return the body of a feature; its vertices have force and mode of the nearest pin."""
     body = feature_solid(feature)
-    place = formed.position[feature.pins]
-    nearest = np.empty(len(body.vertices), np.int64)
-    for start in range(0, len(nearest), 1024):
-        some = slice(start, start + 1024)
-        away = ((body.vertices[some, None, :2] - place) ** 2).sum(axis=2)
-        nearest[some] = feature.pins[np.argmin(away, axis=1)]
-    return Body(body.name, body.vertices, body.faces, _of_pins(formed, body.vertices, nearest))
+    nearest = formed.nearest(body.vertices[:, :2])
+    return replace(body, values=_of_pins(formed, body.vertices, nearest))
 
 
 def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict[str, Floats]:

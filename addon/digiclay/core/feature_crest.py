@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,9 @@ BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
 FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 #: How far along a closed crest its two ends may be apart and be joined all the same, steps.
 NEARLY_CLOSED = 3
+#: A crest falls less than this share of what its sides fall; on a round top, where all directions are alike,
+#: there is none.
+SHARE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,20 +50,6 @@ class Lattice:
         on_bed = (rows >= 0) & (rows < formed.rows) & (columns >= 0) & (columns < formed.columns)
         return cls(np.where(on_bed, rows * formed.columns + columns, -1))
 
-    def sides(self, direction: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the directions straight to the left and to the right; two each where none is straight."""
-        count = self.neighbour.shape[1]
-        turns = (2,) if count == 8 else (1, 2)
-        left = tuple((direction + turn) % count for turn in turns)
-        return left, tuple((direction - turn) % count for turn in turns)
-
-    def ring(self, pins: Pins, steps: int) -> Pins:
-        """Return all pins within some steps of others."""
-        for _ in range(steps):
-            pins = np.unique(np.concatenate([pins, self.neighbour[pins].ravel()]))
-            pins = pins[pins >= 0]
-        return pins
-
 
 def crests(formed: Formed, lattice: Lattice, pins: Pins, off: Floats) -> tuple[Floats, ...]:
     """Trace the crests of a feature.
@@ -74,110 +64,122 @@ def crests(formed: Formed, lattice: Lattice, pins: Pins, off: Floats) -> tuple[F
     formed : Formed
     lattice : Lattice
     pins : ndarray of int (k,)
-        The feature's.
-    off : ndarray (n,)
-        How far each pin is off where it was, m; positive in the feature.
+        The feature's, ascending.
+    off : ndarray (k,)
+        How far each of them is off where it was, m, positive.
 
     Returns
     -------
     tuple of ndarray (p, 3)
         Points of each line, m, p at least 2; none for a feature without one, such as a dome.
     """
-    member = np.zeros(off.size, bool)
-    member[pins] = True
-    half = _half_width(lattice, pins, member)
-    top = _rounded(lattice, pins, np.where(member, off, 0.0), half)
-    traced: list[Pins] = []
-    untried = np.sort(pins)
-    lines = []
-    while untried.size:
-        start = int(untried[np.argmax(top[untried])])
-        found = _both_ways(lattice, start, top, member, traced)
-        traced.append(found)
-        untried = np.setdiff1d(untried, lattice.ring(found, 2 * half))
-        if len(found) > half:
-            lines.append(_line(formed, found))
-    return tuple(lines)
+    beside = lattice.neighbour[pins]
+    place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
+    slope = _Slope(np.where(pins[place] == beside, place, -1), beside >= 0, off)
+    found = [line for line in slope.lines() if len(line) > slope.half]
+    return tuple(_smoothed(formed, pins[line]) for line in found)
 
 
-def _half_width(lattice: Lattice, pins: Pins, member: NDArray[np.bool_]) -> int:
-    """Return how many rings of pins can be taken off a feature, one at least."""
-    inner, left, count = member.copy(), pins, 0
-    while left.size:
-        around = lattice.neighbour[left]
-        kept = np.all(inner[around] | (around < 0), axis=1)
-        if kept.all():  # it covers the whole bed
-            break
-        inner[left[~kept]] = False
-        left, count = left[kept], count + 1
-    return max(1, count)
+class _Slope:
+    """One feature: its pins are numbered from 0, and all around it is level ground.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours within the feature, -1 where there is none.
+    on_bed : ndarray of bool (k, 8 or 6)
+        Where the bed goes on, within the feature or outside it.
+    off : ndarray (k,)
+    """
+
+    def __init__(self, beside: Pins, on_bed: NDArray[np.bool_], off: Floats) -> None:
+        self.beside, self.on_bed = beside, on_bed
+        self.half = self._half_width()
+        self.top = off
+        for _ in range(self.half):
+            self.top = 0.5 * (self.top + self._heights(beside).sum(axis=1) / on_bed.sum(axis=1))
+
+    def lines(self) -> Iterator[Pins]:
+        """Give the lines, the one through the highest pin first; single pins too."""
+        untried = np.ones(len(self.top), bool)
+        traced: set[int] = set()
+        while untried.any():
+            start = int(np.argmax(np.where(untried, self.top, -np.inf)))
+            line = self._both_ways(start, traced)
+            traced.update(line.tolist())
+            untried[self._ring(line, 2 * self.half)] = False
+            yield line
+
+    def _heights(self, pins: Pins) -> Floats:
+        """Return the heights of pins, and of the ground for -1."""
+        heights: Floats = np.where(pins >= 0, self.top[pins], 0.0)
+        return heights
+
+    def _half_width(self) -> int:
+        """Return how many rings of pins can be taken off, one at least."""
+        inner, count = np.ones(len(self.beside), bool), 0
+        while inner.any():
+            # Where the bed ends the feature might go on.
+            kept = inner & np.all(np.where(self.beside >= 0, inner[self.beside], ~self.on_bed), axis=1)
+            if np.array_equal(kept, inner):  # it covers the whole bed
+                break
+            inner, count = kept, count + 1
+        return max(1, count)
+
+    def _ring(self, pins: Pins, steps: int) -> Pins:
+        """Return all pins within some steps of others."""
+        for _ in range(steps):
+            pins = np.unique(np.concatenate([pins, self.beside[pins].ravel()]))
+            pins = pins[pins >= 0]
+        return pins
+
+    def _both_ways(self, start: int, others: set[int]) -> Pins:
+        """Return the pins of a line through `start`; a line that meets another one ends on it."""
+        known = {start}
+        one = self._way(start, None, known, others)
+        if not one:
+            return np.array([start])
+        if len(one) > 2 * NEARLY_CLOSED and one[-1] in self._ring(np.array([start]), NEARLY_CLOSED):
+            return np.array([start, *one, start])
+        count = self.beside.shape[1]
+        first = int(np.flatnonzero(self.beside[start] == one[0])[0])
+        other = self._way(start, (first + count // 2) % count, known, others)
+        return np.array([*other[::-1], start, *one])
+
+    def _way(self, pin: int, direction: int | None, known: set[int], others: set[int]) -> list[int]:
+        """Follow the crest from a pin, ahead of a direction or, without one, wherever it goes on best."""
+        count = self.beside.shape[1]
+        way: list[int] = []
+        while pin not in others:
+            # It bends by one direction a step at most, so that it does not turn back at the end of a ridge.
+            ahead = range(count) if direction is None else range(direction - 1, direction + 2)
+            steps = [(turn % count, int(self.beside[pin, turn % count])) for turn in ahead]
+            steps = [(turn, to) for turn, to in steps if to >= 0 and to not in known]
+            steps.sort(key=lambda step: -float(self.top[step[1]]))
+            if direction is None:
+                steps = [step for step in steps if self._goes_on(pin, *step)]
+            if not steps or not self._goes_on(pin, *steps[0]):
+                break
+            direction, pin = steps[0]
+            way.append(pin)
+            known.add(pin)
+        return way
+
+    def _goes_on(self, here: int, direction: int, there: int) -> bool:
+        """Tell whether the crest goes on from a pin to its neighbour: it falls less ahead than aside."""
+        count = self.beside.shape[1]
+        falls = []
+        # Straight to the side, or between the two directions that are nearest to it.
+        for turns in ((2,), (-2,)) if count == 8 else ((1, 2), (-1, -2)):
+            side = [(direction + turn) % count for turn in turns]
+            side = [turn for turn in side if self.on_bed[there, turn]]
+            if side:
+                falls.append(self.top[there] - self._heights(self.beside[there, side]).mean())
+        ahead = float(self.top[here] - self.top[there])
+        return bool(falls) and ahead < SHARE * float(np.mean(falls))
 
 
-def _rounded(lattice: Lattice, pins: Pins, off: Floats, times: int) -> Floats:
-    """Average each pin with its neighbours, again and again; outside the feature is level ground."""
-    around = lattice.neighbour[pins]
-    on_bed = around >= 0
-    for _ in range(times):
-        mean = np.where(on_bed, off[around], 0.0).sum(axis=1) / on_bed.sum(axis=1)
-        smoother = off.copy()
-        smoother[pins] = 0.5 * (off[pins] + mean)
-        off = smoother
-    return off
-
-
-def _both_ways(
-    lattice: Lattice, start: int, top: Floats, member: NDArray[np.bool_], traced: list[Pins]
-) -> Pins:
-    """Return the pins of a line through `start`; a line that meets another one ends on it."""
-    others = {int(pin) for line in traced for pin in line}
-    known = {start}
-    one = _way(lattice, start, None, top, member, known, others)
-    if not one:
-        return np.array([start])
-    if len(one) > 2 * NEARLY_CLOSED and one[-1] in lattice.ring(np.array([start]), NEARLY_CLOSED):
-        return np.array([start, *one, start])
-    first = int(np.flatnonzero(lattice.neighbour[start] == one[0])[0])
-    count = lattice.neighbour.shape[1]
-    other = _way(lattice, start, (first + count // 2) % count, top, member, known, others)
-    return np.array([*other[::-1], start, *one])
-
-
-def _way(
-    lattice: Lattice, pin: int, direction: int | None, top: Floats, member: NDArray[np.bool_],
-    known: set[int], others: set[int],
-) -> list[int]:  # fmt: skip
-    """Follow the crest from a pin, ahead of a direction or, without one, wherever it goes on best."""
-    count = lattice.neighbour.shape[1]
-    way: list[int] = []
-    while pin not in others:
-        # It bends by one direction a step at most: at the end of a ridge it does not turn back along its flank.
-        turns = range(count) if direction is None else (-1, 0, 1)
-        ahead = [(direction or 0) + turn for turn in turns]
-        steps = [(turn % count, int(lattice.neighbour[pin, turn % count])) for turn in ahead]
-        steps = [(turn, to) for turn, to in steps if to >= 0 and member[to] and to not in known]
-        steps.sort(key=lambda step: -top[step[1]])
-        if direction is None:
-            steps = [step for step in steps if _goes_on(lattice, pin, *step, top)]
-        if not steps or not _goes_on(lattice, pin, *steps[0], top):
-            break
-        direction, pin = steps[0]
-        way.append(pin)
-        known.add(pin)
-    return way
-
-
-def _goes_on(lattice: Lattice, here: int, direction: int, there: int, top: Floats) -> bool:
-    """Tell whether the crest goes on from a pin to its neighbour: it falls less ahead than aside."""
-    around = lattice.neighbour[there]
-    falls = []
-    for side in lattice.sides(direction):
-        pins = [int(around[turn]) for turn in side if around[turn] >= 0]
-        if pins:
-            falls.append(float(top[there] - np.mean(top[pins])))
-    return bool(falls) and float(top[here] - top[there]) < 0.9 * float(np.mean(falls))
-
-
-def _line(formed: Formed, pins: Pins) -> Floats:
+def _smoothed(formed: Formed, pins: Pins) -> Floats:
     """Return the points of a line, smoothed so that an oblique one is no staircase and not too long."""
     line = np.column_stack([formed.position[pins], formed.height[pins]])
     for _ in range(2):

@@ -108,21 +108,23 @@ def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: 
     label = components(len(off), edges[inside[edges].all(axis=1)])
     # All corners of a triangle that are inside are joined by it, and so have one label.
     of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
-    order = np.argsort(of_face, kind="stable")
-    starts = np.flatnonzero(np.diff(of_face[order], prepend=-1))
-    pins = sheet.pins
-    of_pin = np.where(inside[pins], label[pins], -1)
     at_pins = sign * sheet.formed.raised
-    names, counts = np.unique(of_pin, return_counts=True)
-    large = set(names[(counts >= finding.smallest) & (names >= 0)].tolist())
-    for block in np.split(order, starts[1:]) if starts.size else []:
-        name = int(of_face[block[0]])
-        if name not in large:
+    pins = _by_label(np.where(inside[sheet.pins], label[sheet.pins], -1))
+    for name, block in _by_label(of_face).items():
+        mine = pins.get(name, np.empty(0, np.int64))
+        if len(mine) < finding.smallest:
             continue
-        mine = np.flatnonzero(of_pin == name)
         region = cut(sheet.place, sheet.former, off, faces[block], finding.threshold)
-        lines = crests(sheet.formed, lattice, mine, at_pins)
+        lines = crests(sheet.formed, lattice, mine, at_pins[mine])
         yield Feature(kind, 0, mine, region, float(region.off.max()), lines)
+
+
+def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
+    """Return for each label from 0 on where it stands, ascending."""
+    order = np.argsort(label, kind="stable")
+    names, starts, counts = np.unique(label[order], return_index=True, return_counts=True)
+    every = zip(names.tolist(), starts.tolist(), counts.tolist(), strict=True)
+    return {name: order[start : start + count] for name, start, count in every if name >= 0}
 
 
 def table(features: list[Feature]) -> list[tuple[str, ...]]:

@@ -80,6 +80,18 @@ class Formed:
         """Distance between rows, m."""
         return float(abs(self.position[self.columns, 1] - self.position[0, 1]))
 
+    def nearest(self, place: Floats) -> NDArray[np.int64]:
+        """Return the pin in the nearest row that is nearest to each of some places, m, shape (k, 2)."""
+        across = self.position[self.columns, 1] - self.position[0, 1]
+        along = self.position[1, 0] - self.position[0, 0]
+        row = np.clip(np.rint((place[:, 1] - self.position[0, 1]) / across), 0, self.rows - 1).astype(
+            np.int64
+        )
+        first = self.position[row * self.columns, 0]
+        column = np.clip(np.rint((place[:, 0] - first) / along), 0, self.columns - 1).astype(np.int64)
+        pins: NDArray[np.int64] = row * self.columns + column
+        return pins
+
     @property
     def raised(self) -> Floats:
         """How far each pin is above where it was before, m."""

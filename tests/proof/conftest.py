@@ -1,0 +1,60 @@
+"""What the proofs share: meshes of the paper's final surface, and programs that are not ours."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+
+PROGRAMS = ("admesh", "assimp", "prusa-slicer")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip where a program is missing; `make test-proof` sees to it that none is."""
+    lacking = [name for name in PROGRAMS if shutil.which(name) is None]
+    if not lacking:
+        return
+    skip = pytest.mark.skip(reason=f"{', '.join(lacking)} not installed: run 'make test-proof'")
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker(skip)
+
+
+@pytest.fixture(scope="session")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the paper's session, run once."""
+    folder = tmp_path_factory.mktemp("proof") / "paper"
+    assert main(["run", "ridge_mound_valley", "--out", str(folder), "--quiet", "--no-errors"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def meshes(paper: Path) -> Path:
+    """All kinds of mesh in all formats, the solid with every skin, and each feature by itself."""
+    out = paper.parent
+    every = ["--format", "stl,stl_ascii,obj,ply,glb,3mf", "--quiet"]
+    for kind in ("solid", "surface", "pins", "features"):
+        assert main(["export", str(paper), "--kind", kind, "--out", str(out / "bilinear"), *every]) == 0
+    for skin in ("smooth", "membrane"):
+        for kind in (["solid"], ["features", "--separate"]):
+            assert (
+                main(
+                    ["export", str(paper), "--kind", *kind, "--skin", skin, "--out", str(out / skin), *every]
+                )
+                == 0
+            )
+    return out
+
+
+def told(*command: str | Path) -> str:
+    """Run a program and return all it says; it must end well."""
+    done = subprocess.run(
+        [str(part) for part in command],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+        text=True, errors="replace", timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    return done.stdout
