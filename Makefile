@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test lint test-matrix test-window clean
+.PHONY: help demo extension test lint test-matrix test-window test-proof clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -25,10 +25,10 @@ extension: ## build the Blender extension and leave its zip in dist/
 	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
 	@.venv/bin/python tools/extension.py
 
-test: ## run all tests but those of the matrix and of the window
+test: ## run all tests but those of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 400 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests" 400 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 240 -- tests/blender || status=1; \
 	echo; cat .reports/test.txt; exit $$status
 
@@ -47,6 +47,11 @@ test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 600 -- tests/window
+
+test-proof: ## judge exported meshes by admesh, assimp and PrusaSlicer, which root installs on Debian
+	@tools/proof .reports
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports judged by other programs" 300 -- tests/proof
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
