@@ -102,7 +102,7 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
     took = time.monotonic() - started
     if todo:
         processes = "1 process" if count == 1 else f"{count} processes"
-        said += f"; {len(todo)} taken up here in {duration(took)} on {processes}"
+        said += f"; {done - before} of them now, in {duration(took)} on {processes}"
     ready = folder.start_up()
     if ready is not None:
         said += f"; a job's process takes {ready:.1f} s to start"
@@ -112,9 +112,9 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
         tell("Stopped: what is done is kept, and the same command goes on from there.")
         return STOPPED
     if failed:
-        raise_all = f"{len(failed)} of {len(made.jobs)} jobs failed; the first one: "
         name, error = next(iter(failed.items()))
-        print(f"{raise_all}{name}: {error}", file=sys.stderr)
+        first = f"{len(failed)} of {len(made.jobs)} jobs failed; the first one: {name}: {error}"
+        print(first, file=sys.stderr)
         return FAILED
     return 0
 

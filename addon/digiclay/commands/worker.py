@@ -74,7 +74,10 @@ class Worker:
 
     def ended(self) -> bool:
         """Tell whether the process has ended."""
-        return self._process.poll() is not None
+        if self._process.poll() is None:
+            return False
+        self.stop()  # nobody reads it any more
+        return True
 
     def fraction(self) -> float:
         """Return how much of the job is done, from 0 to 1."""

@@ -1,0 +1,242 @@
+"""Batches while they run: what is kept, what is done again, what fails, and what the page says."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands.batch_folder import opened
+from digiclay.commands.worker import Worker
+from digiclay.core.errors import OutputError
+from digiclay.core.jobs import batch
+
+ADDON = Path(__file__).parents[2] / "addon"
+
+TWO = """
+scenes = ["tap"]
+export = ["stl"]
+errors = false
+[settings]
+quick = { simulation.duration = 0.1 }
+slow = { simulation.duration = 0.2 }
+"""
+#: Sessions of hours: for being stopped.
+HOURS = """
+scenes = ["tap"]
+[settings]
+a = { simulation.duration = 1e4, recorder.every = 1000 }
+b = { simulation.duration = 1e4, recorder.every = 1000 }
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder, with a blank and an umlaut in its path."""
+    folder = tmp_path / "schöne Tasten"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def jobs(said: str) -> None:
+    """Write the JOBS file."""
+    Path("two.toml").write_text(said, encoding="utf-8")
+
+
+def runs(out: str = "two") -> list[str]:
+    """Return what lies in the folder of runs, hidden things too."""
+    return sorted(path.name for path in Path(out, "runs").iterdir())
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    """Start the program in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "digiclay", "batch", *arguments], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ADDON)},
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def until(holds: object) -> None:
+    """Wait until something holds."""
+    deadline = time.monotonic() + 30.0
+    while not holds():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys: pytest.CaptureFixture[str]) -> None:
+    jobs(TWO)
+    assert main(["batch", "two.toml", "--jobs", "2"]) == 0
+    assert runs() == ["tap-quick", "tap-slow"]
+    files = {path.name for path in Path("two/runs/tap-slow").iterdir()}
+    wanted = "history.npz job.toml metrics.json scene.toml surface.stl thumbnail.png timing.json"
+    assert files == set(wanted.split())
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "2 of 2 jobs done; 2 of them now, in" in out
+    page = Path("two/index.html").read_text(encoding="utf-8")
+    assert 'href="runs/tap-slow/surface.stl"' in page
+    assert page.count("data:image/png;base64,") == 2
+
+
+def test_what_it_takes_to_start_a_process_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    jobs(TWO)
+    main(["batch", "two.toml"])
+    timing = json.loads(Path("two/runs/tap-slow/timing.json").read_text(encoding="utf-8"))
+    # A process that imports numpy needs a tenth of a second at the very least, on any machine.
+    assert 0.1 < timing["start_up"] < 30.0
+    assert "s to start" in capsys.readouterr().out
+
+
+def test_finished_jobs_are_kept_and_only_changed_ones_are_done_again() -> None:
+    jobs(TWO)
+    main(["batch", "two.toml", "--quiet"])
+    before = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
+    jobs(TWO.replace("0.2", "0.3") + "other.simulation.duration = 0.1\n")
+    assert main(["batch", "two.toml", "--quiet"]) == 0
+    after = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
+    assert after["tap-quick"] == before["tap-quick"]
+    assert after["tap-slow"] > before["tap-slow"]
+    assert list(after) == ["tap-other", "tap-quick", "tap-slow"]
+    metrics = json.loads(Path("two/runs/tap-slow/metrics.json").read_text(encoding="utf-8"))
+    assert metrics["simulated"] == pytest.approx(0.3, abs=1e-9)
+
+
+def test_a_failing_job_is_told_of_and_the_rest_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+    # One fails when its scene is read, one when it is run: its history fits into no memory.
+    jobs(TWO + 'narrow.layout.pitch = "1 mm"\nendless.simulation.duration = 1e6\n')
+    assert main(["batch", "two.toml"]) == 1
+    assert runs() == ["tap-quick", "tap-slow"]
+    out, err = capsys.readouterr()
+    assert "failed: tap-narrow: settings.narrow: layout.pitch must be at least" in out
+    assert "failed: tap-endless: recorder.every must be at least" in out
+    assert err.startswith("2 of 4 jobs failed; the first one: tap-narrow: ")
+    assert err.count("\n") == 1
+    page = Path("two/index.html").read_text(encoding="utf-8")
+    assert page.count('class="failed"') == 2
+    assert "recorder.every must be at least" in page
+
+
+def test_a_folder_that_was_half_written_does_not_count() -> None:
+    jobs(TWO)
+    main(["batch", "two.toml", "--quiet"])
+    Path("two/runs/tap-slow/job.toml").unlink()  # as if it had not come so far
+    leftover = Path("two/runs/.tap-quick.4711.part")
+    shutil.move("two/runs/tap-quick", leftover)
+    assert main(["batch", "two.toml", "--quiet"]) == 0
+    assert runs() == ["tap-quick", "tap-slow"]
+    assert Path("two/runs/tap-slow/job.toml").is_file()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_ctrl_c_ends_all_processes_and_leaves_nothing_half_done() -> None:
+    jobs(HOURS)
+    process = started("two.toml", "--jobs", "2")
+    until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, "")
+    assert "Stopped: what is done is kept, and the same command goes on from there." in out
+    assert runs() == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_when_a_batch_is_killed_its_processes_end_and_the_next_one_goes_on() -> None:
+    jobs(HOURS)
+    process = started("two.toml", "--jobs", "2")
+    until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    process.kill()
+    process.communicate(timeout=60)
+    # The processes notice that nobody is there, and take back what they have begun.
+    until(lambda: runs() == [])
+    jobs(TWO)
+    assert main(["batch", "two.toml", "--quiet"]) == 0
+
+
+def test_a_process_that_dies_is_told_by_its_signal() -> None:
+    jobs(HOURS)
+    main(["batch", "two.toml", "--prepare", "--quiet"])
+    worker = Worker(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
+    until(lambda: list(Path("two/runs").glob(".*.part")))
+    worker.kill()
+    assert worker.error().startswith("The process ended with signal 9")
+
+
+def test_a_job_can_be_done_elsewhere_from_its_files_alone(here: Path) -> None:
+    jobs(TWO)
+    assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
+    assert runs() == []
+    far = here.parent / "a farm"
+    shutil.copytree("two/jobs/tap-slow", far / "jobs" / "tap-slow")
+    assert main(["job", str(far / "jobs" / "tap-slow"), "--quiet"]) == 0
+    shutil.copytree(far / "runs" / "tap-slow", "two/runs/tap-slow")
+    shutil.rmtree("two/jobs")
+    assert main(["batch", "two.toml", "--quiet"]) == 0
+    # Its time says that it was not done again.
+    assert json.loads(Path("two/runs/tap-slow/timing.json").read_text(encoding="utf-8"))["start_up"] is None
+
+
+def test_two_batches_cannot_work_in_one_folder() -> None:
+    jobs(TWO)
+    made = batch(Path("two.toml"))
+    with (
+        opened(Path("two"), made),
+        pytest.raises(OutputError, match="being worked in by another batch"),
+        opened(Path("two"), made),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("before", "told"),
+    [
+        (lambda: Path("two").touch(), "two is a file"),
+        (
+            lambda: (Path("two").mkdir(), Path("two/letter.txt").touch()),
+            "two holds other things than a batch",
+        ),
+    ],
+)
+def test_a_folder_that_is_something_else_is_left_alone(
+    before: object, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    jobs(TWO)
+    before()  # type: ignore[operator]
+    assert main(["batch", "two.toml"]) == 2
+    assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ('scenes = ["tap"]\nexport = ["doc"]', "export: "),
+        ('scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
+    ],
+)
+def test_outputs_nobody_can_have_are_refused_before_any_work(
+    said: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    jobs(said)
+    assert main(["batch", "two.toml"]) == 2
+    _, err = capsys.readouterr()
+    assert told in err
+    assert err.count("\n") == 1
+    assert not Path("two").exists()
+
+
+@pytest.mark.parametrize("arguments", [["nothing.toml"], ["secnod"], ["two.toml", "--jobs", "0"]])
+def test_arguments_that_make_no_sense_are_told_in_one_line(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    jobs(TWO)
+    assert main(["batch", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

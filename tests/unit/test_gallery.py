@@ -1,0 +1,122 @@
+"""The index page needs nothing but itself, and pictures are what they say they are."""
+
+from __future__ import annotations
+
+import base64
+from html.parser import HTMLParser
+from io import BytesIO
+
+import matplotlib.image
+import numpy as np
+import pytest
+from digiclay.commands.counted import Counted, duration
+from digiclay.commands.thumbnail import height_map
+from digiclay.core.png import png
+from digiclay.gallery import Card, page
+
+
+class Reader(HTMLParser):
+    """Collects tags, references and text, and checks that tags are closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.references: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag and what it refers to."""
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+        self.references += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_endtag(self, tag: str) -> None:
+        """Close the tag that was opened last."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Note a text."""
+        self.text.append(data)
+
+
+def read(made: str) -> Reader:
+    """Read a page."""
+    reader = Reader()
+    reader.feed(made)
+    reader.close()
+    assert reader.open == []
+    return reader
+
+
+def test_the_page_refers_to_nothing_but_files_beside_it() -> None:
+    card = Card(
+        "a", png(np.zeros((2, 2, 3), np.uint8)), [("lag", "1 mm")], [("film", "runs/a b/film #1.mp4")]
+    )
+    reader = read(
+        page("Batch", "1 of 1 jobs done.", [card, Card("b", error="it broke", links=[("log", "l")])])
+    )
+    assert reader.references[0].startswith("data:image/png;base64,")
+    assert reader.references[1:] == ["runs/a%20b/film%20%231.mp4", "l"]
+
+
+def test_names_and_errors_are_shown_as_they_are_and_never_as_html() -> None:
+    nasty = '<script>alert("x")</script> & Söhne'
+    reader = read(page(nasty, nasty, [Card(nasty, facts=[(nasty, nasty)]), Card(nasty, error=nasty)]))
+    assert "script" not in reader.open
+    assert sum(nasty in text for text in reader.text) == 8  # the title stands in the head as well
+
+
+def test_a_thumbnail_within_the_page_is_the_file_it_was() -> None:
+    data = png(np.full((3, 5, 3), 77, np.uint8))
+    source = read(page("", "", [Card("a", data)])).references[0]
+    assert base64.b64decode(source.partition(",")[2]) == data
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (40, 61)])
+def test_a_png_is_read_back_by_another_program_as_it_was(shape: tuple[int, int]) -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, (*shape, 3), np.uint8)
+    back = matplotlib.image.imread(BytesIO(png(pixels)), format="png")
+    np.testing.assert_array_equal(np.round(back[..., :3] * 255.0).astype(np.uint8), pixels)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (25, 25), (3, 40), (1000, 700)])
+def test_a_map_of_heights_has_about_the_width_asked_for(shape: tuple[int, int]) -> None:
+    rows, columns, channels = height_map(np.zeros(shape), 320).shape
+    assert (channels, 160 < max(rows, columns) <= 320) == (3, True)
+
+
+def test_a_map_of_heights_shows_the_far_side_above_and_high_pins_bright() -> None:
+    height = np.zeros((4, 4))
+    height[3, 0] = 1.0  # far, left
+    shown = height_map(height, 4).astype(int).sum(axis=2)
+    assert np.unravel_index(shown.argmax(), shown.shape) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
+)
+def test_times_are_written_as_people_say_them(seconds: float, said: str) -> None:
+    assert duration(seconds) == said
+
+
+class Terminal(BytesIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        """Be one."""
+        return True
+
+    def write(self, text: str) -> int:  # type: ignore[override]
+        """Keep what is written."""
+        return super().write(text.encode())
+
+
+def test_jobs_done_beforehand_do_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("digiclay.commands.counted.time.monotonic", lambda: now[0])
+    stream = Terminal()
+    with Counted(stream, "first", "jobs", before=8) as bar:  # type: ignore[arg-type]
+        now[0] += 10.0
+        bar(9, 10)
+    # One job took ten seconds, so the last one will.
+    assert "9 of 10 jobs, 10 s left" in stream.getvalue().decode()
