@@ -2,11 +2,13 @@
 
 The finger comes from above and leaves upwards, so that it never drags across the bed on its way
 to where the mouse is. How deep it is pressed counts from the surface as it was when the gesture
-began: pins that give way do not draw the finger after them.
+began: pins that give way do not draw the finger after them. It goes the way the mouse has gone, no
+faster than a finger does: where the machine is slow the finger comes later, and draws the same.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,14 +18,15 @@ from .core.fingertip import Fingertip
 from .core.layout import Grid
 from .core.pointing import ground
 
-__all__ = ["DEEPEST", "DONE", "Gesture", "advanced", "begun", "deeper"]
+__all__ = ["DEEPEST", "DONE", "Gesture", "advanced", "begun", "deeper", "dragged", "lifted"]
 
 Floats = NDArray[np.float64]
 
 #: What the finger is about: to get above the place, to press there, to leave it; and the end.
 ABOVE, PRESS, LEAVE, DONE = "above", "press", "leave", "done"
-#: How fast the finger comes down or is pressed deeper, m/s: a quick tap, and nothing faster.
-SPEED = 0.1
+#: How fast the finger comes down to the surface, presses, and drags, m/s. Pressed faster, it runs into
+#: pins whose valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.
+APPROACH, SPEED, DRAG = 0.1, 0.02, 0.1
 #: How far above the highest pin the finger passes over the bed, m.
 CLEARANCE = 4e-3
 #: Deepest press, m, and least one.
@@ -45,8 +48,8 @@ class Gesture:
     finger : Fingertip
     at : ndarray (7,)
         Pose of the finger.
-    over : tuple of float
-        Where on the bed the finger is to press, m.
+    way : tuple of (float, float)
+        Where on the bed the finger is to press, one place after another, m; at least one.
     depth : float
         How deep, m.
     pressure : float
@@ -62,7 +65,7 @@ class Gesture:
     height: Floats
     finger: Fingertip
     at: Floats
-    over: tuple[float, float]
+    way: tuple[tuple[float, float], ...]
     depth: float
     pressure: float = 1.0
     phase: str = ABOVE
@@ -75,17 +78,28 @@ class Gesture:
         return float(self.height.max()) + CLEARANCE
 
     @property
+    def surface(self) -> float:
+        """Height of the surface under the finger as it was, m."""
+        return ground(self.grid, self.height, float(self.at[0]), float(self.at[1]), self.finger.width / 2)
+
+    @property
     def lowest(self) -> float:
         """Height to press down to, m; never below the bed's floor."""
-        level = ground(self.grid, self.height, *self.over, self.finger.width / 2)
-        return max(0.0, level - self.depth * self.pressure)
+        return max(0.0, self.surface - self.depth * self.pressure)
 
 
 def begun(
     grid: Grid, height: Floats, finger: Fingertip, at: Floats, over: tuple[float, float], depth: float
 ) -> Gesture:
     """Begin a gesture; see `Gesture`."""
-    return deeper(Gesture(grid, height.copy(), finger, at, over, depth), 0.0)
+    return deeper(Gesture(grid, height.copy(), finger, at, (over,), depth), 0.0)
+
+
+def dragged(gesture: Gesture, over: tuple[float, float]) -> Gesture:
+    """Drag on to a place; before the finger has come down it comes down there."""
+    if gesture.phase == ABOVE:
+        return replace(gesture, way=(over,))
+    return replace(gesture, way=(*gesture.way, over))
 
 
 def deeper(gesture: Gesture, by: float) -> Gesture:
@@ -100,7 +114,7 @@ def advanced(gesture: Gesture, seconds: float, followed: Floats | None) -> Gestu
     ----------
     gesture : Gesture
     seconds : float
-        Time gone by.
+        Time gone by, of the session's: a slow one makes a slow finger.
     followed : ndarray (7,) or None
         Pose up to which the session has followed the finger; None when it follows nothing now.
     """
@@ -115,27 +129,53 @@ def advanced(gesture: Gesture, seconds: float, followed: Floats | None) -> Gestu
     if gesture.phase == ABOVE:
         return _above(gesture)
     if gesture.at[2] < gesture.safe:
-        return replace(gesture, at=_moved(gesture.at, gesture.at[0], gesture.at[1], gesture.safe))
+        return replace(gesture, at=lifted(gesture))
     return replace(gesture, phase=DONE)
+
+
+def lifted(gesture: Gesture) -> Floats:
+    """Return the finger's pose (7,) straight above where it is, where it touches nothing."""
+    return _moved(gesture.at, float(gesture.at[0]), float(gesture.at[1]), gesture.safe)
 
 
 def _above(gesture: Gesture) -> Gesture:
     """Go up, then over, then begin to press."""
     if gesture.at[2] < gesture.safe:
-        return replace(gesture, at=_moved(gesture.at, gesture.at[0], gesture.at[1], gesture.safe))
-    if (gesture.at[0], gesture.at[1]) != gesture.over or gesture.at[2] > gesture.safe:
-        return replace(gesture, at=_moved(gesture.at, *gesture.over, gesture.safe))
+        return replace(gesture, at=lifted(gesture))
+    if (gesture.at[0], gesture.at[1]) != gesture.way[0] or gesture.at[2] > gesture.safe:
+        return replace(gesture, at=_moved(gesture.at, *gesture.way[0], gesture.safe))
     return replace(gesture, phase=PRESS)
 
 
 def _pressed(gesture: Gesture, seconds: float) -> Gesture:
-    """Go to the place wanted, up and down no faster than a finger does; leave once there when let go."""
-    lowest, step = gesture.lowest, SPEED * seconds
-    height = min(max(lowest, gesture.at[2] - step), gesture.at[2] + step)
-    gesture = replace(gesture, at=_moved(gesture.at, *gesture.over, height))
-    if gesture.held or abs(height - lowest) > NEAR:
-        return gesture
-    return replace(gesture, phase=LEAVE)
+    """Go on along the way, and down; leave at its end and at the depth when let go."""
+    x, y, way = _along(gesture, DRAG * seconds)
+    gesture = replace(gesture, way=way, at=_moved(gesture.at, x, y, float(gesture.at[2])))
+    surface, lowest, height = gesture.surface, gesture.lowest, float(gesture.at[2])
+    if height > surface:
+        height = max(surface, height - APPROACH * seconds)
+    elif height > lowest:
+        height = max(lowest, height - SPEED * seconds)
+    else:
+        height = min(lowest, height + APPROACH * seconds)
+    gesture = replace(gesture, at=_moved(gesture.at, x, y, height))
+    ended = len(way) == 1 and (x, y) == way[0] and abs(height - lowest) < NEAR
+    return replace(gesture, phase=LEAVE) if ended and not gesture.held else gesture
+
+
+def _along(gesture: Gesture, length: float) -> tuple[float, float, tuple[tuple[float, float], ...]]:
+    """Return where the finger is after a length of its way, m, and what is left of the way."""
+    x, y = float(gesture.at[0]), float(gesture.at[1])
+    way = gesture.way
+    while True:
+        far = math.hypot(way[0][0] - x, way[0][1] - y)
+        if far > length:
+            share = length / far
+            return x + share * (way[0][0] - x), y + share * (way[0][1] - y), way
+        (x, y), length = way[0], length - far
+        if len(way) == 1:
+            return x, y, way
+        way = way[1:]
 
 
 def _moved(at: Floats, x: float, y: float, z: float) -> Floats:

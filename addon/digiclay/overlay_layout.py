@@ -11,7 +11,7 @@ __all__ = ["free", "laid_out"]
 #: Sizes at a UI scale of 1, pixels.
 WIDTH, MARGIN, PADDING = 290.0, 12.0, 10.0
 #: Opacity of the box behind it all: the bed shines through a little.
-BACK_ALPHA = 0.9
+BACK_ALPHA = 0.95
 
 #: Left, bottom, right and top of a part of the view, pixels.
 Room = tuple[float, float, float, float]

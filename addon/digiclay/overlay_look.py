@@ -23,8 +23,8 @@ CURVES: tuple[Colour, ...] = (
     (0.84, 0.37, 0.00),
     (0.95, 0.90, 0.25),
 )
-#: Contrast that the Web Content Accessibility Guidelines ask of letters, and of lines.
-LETTERS, LINES = 4.5, 3.0
+#: Contrast that the Web Content Accessibility Guidelines ask of letters, if possible, at least, and of lines.
+INK, LETTERS, LINES = 7.0, 4.5, 3.0
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
@@ -51,7 +51,7 @@ def look(back: Colour, ink: Colour) -> Look:
     ink : Colour
         The theme's letters; replaced by black or white where they could not be read.
     """
-    ink = legible(ink, back, LETTERS)
+    ink = legible(ink, back, INK)
     return Look(
         back=back,
         ink=ink,

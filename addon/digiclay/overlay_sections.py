@@ -21,6 +21,8 @@ __all__ = ["SECTIONS", "Pen", "Told"]
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
 #: Space below a section.
 GAP = 6.0
+#: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no further.
+MOST = 5.0
 #: Shortest axes, N and mm: a quiet force is not drawn as a wild one.
 LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
 
@@ -126,8 +128,8 @@ def head(told: Told, pen: Pen, top: float) -> None:
     if told.errors is None:
         pen.row(top, "Solver error: not estimated yet", small=True)
     else:
-        height, force = told.errors[0] * 1e6, told.errors[1] * 1e3
-        pen.row(top, f"Solver error: about {height:.2g} µm, {force:.2g} mN", small=True)
+        height, force = _size(told.errors[0] * 1e6), _size(told.errors[1] * 1e3)
+        pen.row(top, f"Solver error (estimate): {height} µm, {force} mN", small=True)
 
 
 def force_height(told: Told) -> float:
@@ -141,7 +143,11 @@ def force(told: Told, pen: Pen, top: float) -> None:
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
     top = pen.row(top, f"Total force  {now}", asked)
     recent = told.force[told.time >= told.window[0]]
-    largest = max(LEAST_FORCE, 1.2 * (told.set_point or 0.0), float(recent.max(initial=0.0)))
+    asked_for = told.set_point or 0.0
+    largest = float(recent.max(initial=0.0))
+    if asked_for:
+        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
+    largest = max(largest, LEAST_FORCE)
     ends = (0.0, axis(0.0, largest)[1])
     box = pen.frame(top, "0 N", f"{ends[1]:g} N")
     if told.set_point is not None:
@@ -191,6 +197,11 @@ def modes(told: Told, pen: Pen, top: float) -> None:
         x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
         mode = Mode(int(code))
         _entry(pen, x, y, told.colours[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
+
+
+def _size(error: float) -> str:
+    """Say how large an error is."""
+    return f"{error:.2g}" if error >= 0.01 else "< 0.01"
 
 
 def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], text: str) -> None:

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from digiclay.core.fingertip import LEVEL, Fingertip
 from digiclay.core.layout import Layout, grid
-from digiclay.gesture import ABOVE, DEEPEST, DONE, PRESS, SPEED, Gesture, advanced, begun, deeper
+from digiclay.gesture import (
+    ABOVE,
+    APPROACH,
+    DEEPEST,
+    DONE,
+    DRAG,
+    PRESS,
+    SPEED,
+    Gesture,
+    advanced,
+    begun,
+    deeper,
+    dragged,
+)
 
 CELLS = grid(Layout(rows=20, columns=20))
 TICK = 1.0 / 30.0
@@ -41,16 +55,37 @@ def test_the_finger_crosses_the_bed_above_all_pins_and_then_presses_to_its_depth
 
 
 def test_a_finger_deep_in_the_bed_goes_straight_up_before_it_crosses() -> None:
-    for before, after in zip(
-        *(through(start(at=(0.0, 0.0, 0.030)), 60)[s] for s in (slice(None, -1), slice(1, None))), strict=True
-    ):
+    for before, after in pairwise(through(start(at=(0.0, 0.0, 0.030)), 60)):
         if before.at[2] < 0.055 and before.phase == ABOVE:
             assert tuple(after.at[:2]) == (0.0, 0.0)
 
 
 def test_the_finger_goes_down_no_faster_than_a_finger() -> None:
     heights = np.array([g.at[2] for g in through(start(), 60) if g.phase == PRESS])
-    assert np.diff(heights).min() >= -SPEED * TICK - 1e-12
+    falls = -np.diff(heights)
+    assert falls.max() <= APPROACH * TICK + 1e-12
+    assert falls[heights[1:] < 0.040].max() <= SPEED * TICK + 1e-12
+
+
+def test_the_finger_goes_the_way_of_the_mouse_however_slow_the_session_is() -> None:
+    pressed = through(start(over=(0.0, 0.0)), 60)[-1]
+    corner = dragged(dragged(pressed, (0.01, 0.0)), (0.01, 0.01))
+    for ticks in (2, 7, 30):
+        tick, passed = 0.25 / ticks, [corner]
+        for _ in range(ticks):
+            passed.append(advanced(passed[-1], tick, passed[-1].at))
+        lengths = [np.hypot(*(b.at - a.at)[:2]) for a, b in pairwise(passed)]
+        assert max(lengths) <= DRAG * tick + 1e-12
+        assert tuple(passed[-1].at[:2]) == (0.01, 0.01)
+        off = [min(abs(g.at[1]), abs(g.at[0] - 0.01)) for g in passed]
+        assert max(off) < 1e-12
+
+
+def test_a_gesture_let_go_at_once_is_drawn_to_its_end() -> None:
+    pressed = through(start(over=(0.0, 0.0)), 60)[-1]
+    passed = through(replace(dragged(pressed, (0.02, 0.0)), held=False), 90)
+    assert passed[-1].phase == DONE
+    assert max(g.at[0] for g in passed if g.at[2] < 0.0361) == pytest.approx(0.02, rel=1e-12)
 
 
 def test_a_click_is_a_whole_press_and_ends_above_the_bed() -> None:
@@ -63,7 +98,7 @@ def test_a_click_is_a_whole_press_and_ends_above_the_bed() -> None:
 def test_pins_that_give_way_do_not_draw_the_finger_after_them() -> None:
     gesture = start()
     height = gesture.height.copy()
-    given = begun(CELLS, height, Fingertip(), gesture.at, gesture.over, 4e-3)
+    given = begun(CELLS, height, Fingertip(), gesture.at, gesture.way[0], 4e-3)
     height -= 0.01
     assert given.lowest == gesture.lowest
 
@@ -72,9 +107,9 @@ def test_dragging_follows_the_surface_as_it_was() -> None:
     slope = 0.040 + 0.1 * CELLS.x
     gesture = begun(CELLS, slope, Fingertip(), np.array([0.0, 0.0, 0.07, *LEVEL]), (0.0, 0.0), 4e-3)
     pressed = through(gesture, 60)[-1]
-    dragged = through(replace(pressed, over=(0.02, 0.0)), 60)[-1]
+    there = through(dragged(pressed, (0.02, 0.0)), 60)[-1]
     # The mean of a few pins about the place, which do not stand evenly about it: half a pitch of the slope.
-    assert dragged.at[2] - pressed.at[2] == pytest.approx(0.1 * 0.02, abs=0.1 * 1.5e-3)
+    assert there.at[2] - pressed.at[2] == pytest.approx(0.1 * 0.02, abs=0.1 * 1.5e-3)
 
 
 def test_a_session_that_does_not_follow_is_waited_for_and_not_for_ever() -> None:

@@ -74,6 +74,17 @@ def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None
         assert part in words
 
 
+def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
+    force = np.full(1001, 0.4)
+    force[900] = 180.0
+    assert "2 N" in said(laid_out(session(force=force), look(DARK, LIGHT), ROOM, 1.0)).split(" | ")
+
+
+def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
+    words = said(laid_out(session(errors=(9e-12, 0.0)), look(DARK, LIGHT), ROOM, 1.0))
+    assert "Solver error (estimate): < 0.01 µm, < 0.01 mN" in words
+
+
 def test_it_says_what_is_not_known_yet() -> None:
     empty = np.empty(0)
     told = session(

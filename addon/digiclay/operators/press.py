@@ -8,7 +8,7 @@ from typing import Any
 from .. import aim, bridge, preferences, running, view
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..gesture import DEEPEST, DONE, advanced, begun, deeper
+from ..gesture import DEEPEST, DONE, advanced, begun, deeper, dragged, lifted
 
 __all__ = ["Press"]
 
@@ -67,7 +67,7 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         if session.paused:
             self.report({"WARNING"}, "The session is paused: the pins follow when it goes on")
         place = float(found.point[0]), float(found.point[1])
-        self.uid, self.period = session.uid, session.state.period
+        self.uid, self.seen, self.known = session.uid, session.state.period, session.gestures
         self.gesture = begun(found.grid, found.height, finger, at, place, 1e-3 * self.depth)
         self._feel(event)
         self.region, self.last, self.before = context.region, time.perf_counter(), event.mouse_y
@@ -116,7 +116,7 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         with context.temp_override(region=self.region):
             point = aim.meets(bpy.context, bed, self.gesture.grid, self.gesture.height, xy)
         if point is not None:
-            self.gesture = replace(self.gesture, over=(float(point[0]), float(point[1])))
+            self.gesture = dragged(self.gesture, (float(point[0]), float(point[1])))
 
     def _feel(self, event: Any) -> None:
         """Take a pen's pressure."""
@@ -125,11 +125,12 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
 
     def _timed(self, context: Any, bed: Any, tip: Any) -> set[str]:
         """Let the finger go on, and hand the timer on to the session."""
-        now = time.perf_counter()
-        session = running.of(bed)
+        now, session = time.perf_counter(), running.of(bed)
         still = session.paused or bool(session.waits)
-        self.gesture = advanced(self.gesture, now - self.last, None if still else session.pose)
-        self.last = now
+        simulated = (session.state.period - self.seen) * session.system.period
+        seconds = now - self.last if still else max(0.0, simulated)
+        self.gesture = advanced(self.gesture, seconds, None if still else session.pose)
+        self.last, self.seen = now, session.state.period
         bridge.place_fingertip(tip, self.gesture.at, self.gesture.finger)
         if self.gesture.phase != DONE:
             return {"PASS_THROUGH"}
@@ -141,8 +142,10 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         """Bring bed and fingertip back to where the gesture began; one that touched nothing just ends."""
         self._end(context)
         context.view_layer.objects.active = bed
+        tip = view.fingertip_of(bed)
+        bridge.place_fingertip(tip, lifted(self.gesture), self.gesture.finger)
         # The session counts a new gesture wherever the finger rests: there may be several to take back.
-        while any(gesture.period >= self.period for gesture in running.of(bed).gestures[-1:]):
+        while any(gesture not in self.known for gesture in running.of(bed).gestures[-1:]):
             bpy.ops.digiclay.session_rewind()
         return {"CANCELLED"}
 
