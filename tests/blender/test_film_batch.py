@@ -1,0 +1,92 @@
+"""A batch with pictures, drawn by processes that start this Blender once more."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import bpy
+import pytest
+from digiclay.cli import main
+from digiclay.commands.thumbnail import WIDTH
+
+JOBS = """
+scenes = ["tap"]
+methods = ["virtual_master", "cell_states"]
+errors = false
+settings.short.simulation.duration = 0.3
+[still]
+width = 160
+height = 100
+engine = "cycles"
+samples = 1
+[turntable]
+width = 64
+height = 40
+frames = 3
+[film]
+width = 160
+height = 100
+rate = 10
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_batch_draws_what_is_asked_for_and_shows_it_on_its_page(capfd: pytest.CaptureFixture[str]) -> None:
+    Path("drawn.toml").write_text(JOBS, encoding="utf-8")
+    assert main(["batch", "drawn.toml", "--jobs", "2"]) == 0, capfd.readouterr().out
+    page = Path("drawn/index.html").read_text(encoding="utf-8")
+    for name in ("tap-virtual_master-short", "tap-cell_states-short"):
+        run = Path("drawn/runs", name)
+        drawn = {"still.png", "thumbnail.jpg", "turntable.mp4", "film.mp4"}
+        assert drawn <= {path.name for path in run.iterdir()}
+        # An MP4 file says so at its start.
+        assert all((run / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4"))
+        assert f'href="runs/{name}/film.mp4"' in page
+        timing = json.loads((run / "timing.json").read_text(encoding="utf-8"))
+        # Blender's module needs some tenths of a second to come up, on any machine.
+        assert 0.2 < timing["start_up"] < 60.0
+        image = bpy.data.images.load(str((run / "thumbnail.jpg").resolve()))
+        assert tuple(image.size) == (WIDTH, WIDTH * 100 // 160)
+    assert page.count("data:image/jpeg;base64,") == 2
+
+
+def test_a_run_is_filmed_and_turned_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    settings = ["--set", "simulation.duration=0.2", "--no-errors", "--quiet"]
+    assert main(["run", "tap", "--out", "run", *settings]) == 0
+    small = ["--size", "64x40", "--rate", "10", "--quiet"]
+    assert main(["render", "run", "--film", "--speed", "0.5", "--colour", "force", *small]) == 0
+    assert main(["render", "run", "--turntable", "--frames", "2", *small]) == 0
+    assert {path.name for path in Path("run").iterdir() if path.suffix == ".mp4"} == {
+        "film.mp4",
+        "turntable.mp4",
+    }
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--film", "--size", "65x40"], "Film.width must be an even number"),
+        (["--film", "--rate", "0"], "Film.rate must be at least 1"),
+        (["--film", "--start", "7"], "Film.start must be between 0 s and"),
+        (["--film", "--time", "0"], "--time must not be given with --film"),
+        (["--speed", "2"], "--speed must be given with --film only"),
+        (["--film", "--frames", "9"], "--frames must be given with --turntable only"),
+        (["--film", "--turntable"], "not allowed with argument"),
+    ],
+)
+def test_options_that_do_not_go_together_are_told_in_one_line(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["run", "tap", "--out", "run", "--set", "simulation.duration=0.05", "--no-errors", "--quiet"])
+    assert main(["render", "run", *arguments]) == 2
+    _, err = capsys.readouterr()
+    assert told in err
+    assert err.count("\n") == 1
