@@ -14,6 +14,9 @@ from .base import Panel, bed_of
 
 __all__ = ["section_panel"]
 
+#: Kinds of properties whose label stands beside the field.
+BESIDE = {"ENUM", "STRING"}
+
 
 def section_panel(section: str, parent: str, order: int, words: str = "") -> type:
     """Make the sub-panel of a part.
@@ -51,13 +54,15 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
 
         def draw(self, context: Any) -> None:
             settings = bed_of(context).digiclay
-            column = self.layout.column()
-            column.use_property_split = True
-            column.use_property_decorate = False
+            column = self.layout.column(align=True)
             column.active = in_use(settings, section)
             group = part_group(settings, section)
             for name in quantities(parameters(section, settings.method)):
-                column.prop(group, name)
+                place = column.row(align=True)
+                # A number's label stands in its field: beside it the sidebar would cut off the unit.
+                place.use_property_split = group.bl_rna.properties[name].type in BESIDE
+                place.use_property_decorate = False
+                place.prop(group, name)
 
     Section.__name__ = Section.__qualname__ = Section.bl_idname
     return Section

@@ -1,0 +1,83 @@
+"""``blender --command digiclay`` in a real Blender that has the extension's zip installed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.window.blender_window import BLENDER
+
+TOOL = Path(__file__).parents[2] / "tools" / "extension.py"
+#: A command takes 1 s, a still 5 s with software GL; beyond this Blender hangs.
+LIMIT = 120
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
+    """Blender with settings of its own and the zip installed; a function that gives it a command."""
+    folder = tmp_path_factory.mktemp("installed")
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "settings")}
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        given = [BLENDER, "--command", *words]
+        return subprocess.run(
+            given, env=environment, cwd=folder, capture_output=True, text=True, timeout=LIMIT
+        )
+
+    built = [sys.executable, str(TOOL), "--out", str(folder)]
+    done = subprocess.run(built, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 0, done.stderr
+    (archive,) = folder.glob("*.zip")
+    done = run("extension", "validate", str(archive))
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = run("extension", "install-file", "-r", "user_default", "--enable", str(archive))
+    assert done.returncode == 0, done.stdout + done.stderr
+    return run
+
+
+@pytest.fixture(scope="module")
+def run(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run made through Blender, its name with a blank and an umlaut."""
+    out = tmp_path_factory.mktemp("runs") / "a täp"
+    done = command("digiclay", "run", "tap", "--out", str(out))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return out
+
+
+def test_a_scene_is_described(command: Command) -> None:
+    done = command("digiclay", "describe", "tap")
+    assert (done.returncode, "11 x 11 = 121 cells" in done.stdout) == (0, True)
+
+
+def test_a_scene_is_run(run: Path) -> None:
+    assert {"history.npz", "metrics.json", "scene.toml"} <= {file.name for file in run.iterdir()}
+
+
+def test_a_run_is_exported(command: Command, run: Path, tmp_path: Path) -> None:
+    done = command("digiclay", "export", str(run), "--format", "stl,obj", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {".stl", ".obj"} <= {file.suffix for file in tmp_path.iterdir()}
+
+
+def test_a_run_is_rendered(command: Command, run: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "still.png"
+    size = ("--size", "160x100", "--engine", "workbench")
+    done = command("digiclay", "render", str(run), *size, "--out", str(picture))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("words", [("run", "nothing"), ("render", "nowhere"), ("stroke",), ()])
+def test_what_cannot_be_done_is_told_in_one_line(words: tuple[str, ...], command: Command) -> None:
+    done = command("digiclay", *words)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
