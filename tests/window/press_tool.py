@@ -1,0 +1,184 @@
+"""Draws a valley with the Press tool, undoes, taps, changes the depth; turns what is shown on and off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+
+def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> tuple[int, int]:
+    """Return where a place in the bed's space, mm, is seen."""
+    from mathutils import Vector
+
+    scale = blender.part("bridge").SCALE * 1e-3
+    return blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
+
+
+def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> Iterator[float | None]:
+    """Hold the mouse along a way over the bed, mm, at its start until the finger is there; it stays down."""
+    for step, (x, y) in enumerate(way):
+        at = on_the_bed(blender, x, y)
+        blender.event("MOUSEMOVE", "NOTHING", at)
+        yield 0.15
+        if step == 0:
+            blender.event("LEFTMOUSE", "PRESS", at)
+            yield from come(blender)
+        yield pause
+    yield from come(blender)
+
+
+def come(blender: Any) -> Iterator[float | None]:
+    """Wait until the finger has come to rest, however slow the machine is: at most 15 s."""
+    last, still = None, 0
+    for _ in range(60):
+        yield 0.25
+        now = tuple(blender.fingertip().location)
+        still = still + 1 if now == last else 0
+        last = now
+        if still == 3:
+            return
+
+
+def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
+    """Let the mouse button go, and wait until the finger is off the bed."""
+    blender.event("LEFTMOUSE", "RELEASE", on_the_bed(blender, x, y))
+    yield from come(blender)
+
+
+def heights(blender: Any) -> np.ndarray:
+    """Return the heights drawn, mm, rows by columns."""
+    bed = blender.beds()[0]
+    return 1e3 * blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
+
+
+def note(blender: Any, name: str) -> None:
+    """Write down heights, where the finger is, what pins are picked, and whether the overlay is drawn."""
+    blender.look(name)
+    tip = blender.fingertip()
+    blender.SEEN[name] |= {
+        "bed": heights(blender).round(4).tolist(),
+        "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
+        "overlay": blender.part("overlay").shown(),
+        "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
+        "picked": list(blender.part("display").picked(blender.beds()[0])),
+    }
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a user does; every yield lets Blender work off the events."""
+    yield from blender.empty_scene()
+    yield from blender.add_bed()
+    yield from blender.open_sidebar()
+    blender.key("HOME", blender.middle())
+    yield 1.0
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    yield None
+    note(blender, "added")
+    # An outline about 625 pins is what takes software GL longest.
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
+    blender.event("MOUSEMOVE", "NOTHING", on_the_bed(blender, -15, 5))
+    yield 1.0
+    blender.shot("press_cursor")
+
+    yield from drag(blender, [(-18.0 + 6.0 * step, 6.0) for step in range(0, 7, 2)])
+    note(blender, "pressed")
+    blender.shot("press_held")
+    yield from let_go(blender, 18.0, 6.0)
+    note(blender, "let go")
+    yield from drag(blender, [(0.0, -18.0)])
+    yield from let_go(blender, 0.0, -18.0)
+    note(blender, "tapped")
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield 1.0
+    note(blender, "tap undone")
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield 1.0
+    note(blender, "valley undone")
+    blender.key("Z", blender.middle(), ctrl=True, shift=True)
+    yield 1.0
+    note(blender, "valley redone")
+
+    yield from depths(blender)
+    yield from shown(blender)
+    yield from ended(blender)
+
+
+def depths(blender: Any) -> Iterator[float | None]:
+    """Change the depth by the wheel and by Ctrl, and take a gesture back with Esc."""
+    yield from drag(blender, [(-20.0, -20.0)])
+    note(blender, "before the wheel")
+    at = on_the_bed(blender, -20, -20)
+    for _ in range(8):
+        blender.event("WHEELDOWNMOUSE", "PRESS", at)
+        yield 0.1
+    yield from come(blender)
+    note(blender, "after the wheel")
+    for step in range(1, 5):
+        blender.event("MOUSEMOVE", "NOTHING", (at[0], at[1] + 20 * step), ctrl=True)
+        yield 0.1
+    yield from come(blender)
+    note(blender, "after Ctrl")
+    blender.key("ESC", at)
+    yield 1.0
+    blender.event("LEFTMOUSE", "RELEASE", at)
+    yield 0.5
+    note(blender, "taken back")
+
+
+def shown(blender: Any) -> Iterator[float | None]:
+    """Pick pins, colour by force, show arrows, in the light theme and at another scale."""
+    bed = blender.beds()[0]
+    window = bpy.context.window_manager.windows[0]
+    window.view_layer.objects.active = bed
+    blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
+    yield None
+    for x in (-12.0, 0.0, 12.0):
+        blender.event("MOUSEMOVE", "NOTHING", on_the_bed(blender, x, -27))
+        yield 0.2
+        blender.key("LEFTMOUSE", on_the_bed(blender, x, -27))
+        yield 0.3
+    blender.key("RET", blender.middle())
+    yield 0.5
+    note(blender, "picked")
+    yield from drag(blender, [(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
+    display = blender.beds()[0].digiclay_display
+    display.colour, display.arrows = "force", True
+    yield 1.0
+    note(blender, "forces shown")
+    blender.shot("press_forces")
+    yield from let_go(blender, 4.0, -24.0)
+    preferences = bpy.context.preferences
+    theme = bpy.utils.preset_paths("interface_theme")[0]
+    bpy.ops.script.execute_preset(
+        filepath=f"{theme}/Blender_Light.xml", menu_idname="USERPREF_MT_interface_theme_presets"
+    )
+    display.colour, display.arrows = "mode", False
+    yield 1.5
+    blender.shot("press_light")
+    preferences.view.ui_scale = 1.5
+    yield 1.5
+    blender.shot("press_scaled")
+    preferences.view.ui_scale = 1.0
+    display.overlay = False
+    yield 1.0
+    note(blender, "overlay off")
+    display.overlay = True
+    yield 0.5
+    note(blender, "overlay on")
+
+
+def ended(blender: Any) -> Iterator[float | None]:
+    """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
+    blender.key("ESC", blender.middle())
+    yield 1.0
+    note(blender, "ended")
+    yield from drag(blender, [(20.0, 20.0)])
+    note(blender, "started anew")
+    bpy.data.objects.remove(blender.beds()[0])
+    yield 1.0
+    blender.look("bed deleted")
+    blender.event("LEFTMOUSE", "RELEASE", blender.middle())
+    yield 0.5
