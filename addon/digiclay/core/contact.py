@@ -38,8 +38,8 @@ class Contact(Parameters):
         """
         exponent = np.multiply(depth, self.exponent)
         exponent -= self.offset * self.exponent
-        np.maximum(exponent, 0.0, exponent)
-        np.minimum(exponent, LARGEST_EXPONENT, exponent)
+        np.maximum(exponent, 0.0, out=exponent)
+        np.minimum(exponent, LARGEST_EXPONENT, out=exponent)
         np.expm1(exponent, exponent)
         exponent *= self.stiffness / self.exponent
         return exponent

@@ -107,6 +107,6 @@ def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Float
     """
     tension = touch.contact.tension(height - under)
     tension -= touch.pulp.relaxed(filters)
-    np.maximum(tension, 0.0, tension)
+    np.maximum(tension, 0.0, out=tension)
     tension *= touch.contact.share
     return tension

@@ -29,8 +29,8 @@ class Servo(Parameters):
         """Return valve commands, shape (n,), for commanded and measured heights, m."""
         error = target - height
         command = self.gain * error
-        np.minimum(command, 1.0, command)
-        np.maximum(command, -1.0, command)
+        np.minimum(command, 1.0, out=command)
+        np.maximum(command, -1.0, out=command)
         command *= np.abs(error) > self.dead_band
         return command
 

@@ -62,5 +62,5 @@ def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floa
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
     square: Floats = np.dot(form, place)
-    np.maximum(square, 0.0, square)
+    np.maximum(square, 0.0, out=square)
     return square

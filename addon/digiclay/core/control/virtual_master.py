@@ -172,8 +172,8 @@ class VirtualMasterControl:
         backward &= inside
         frozen = backward & (seen.force < self.parameters.release_force)
         profile = blister.height(distance, master.edge, master.height)
-        np.maximum(profile, 0.0, profile)
-        np.minimum(profile, self.actuator.stroke, profile)
+        np.maximum(profile, 0.0, out=profile)
+        np.minimum(profile, self.actuator.stroke, out=profile)
         # What is frozen is never called back; a blister that outgrows it takes it along.
         outgrown = np.maximum if master.height >= master.edge else np.minimum
         np.putmask(profile, frozen, outgrown(profile, seen.target))

@@ -124,8 +124,8 @@ class BernoulliExponential:
         untouched = height[k:]
         for rise in free[:, k:]:
             untouched += rise
-            np.maximum(untouched, 0.0, untouched)
-            np.minimum(untouched, stroke, untouched)
+            np.maximum(untouched, 0.0, out=untouched)
+            np.minimum(untouched, stroke, out=untouched)
 
 
 def _under_finger(
@@ -146,7 +146,7 @@ def _under_finger(
     work = np.empty((pulp + 3, k))
     filters, first, mean, last = work[:pulp], work[pulp], work[pulp + 1], work[pulp + 2]
     np.divide(y[plan.cell.pulp_rows], unit, filters)
-    np.maximum(filters, zero, filters)
+    np.maximum(filters, zero, out=filters)
     exponent = m * height
     exponent -= floor[0]
     grown = _grown(exponent, zero, most)
@@ -178,8 +178,8 @@ def _under_finger(
         way /= m
         way += free[s]
         way += height
-        np.maximum(way, zero, height)
-        np.minimum(height, stroke, height)
+        np.maximum(way, zero, out=height)
+        np.minimum(height, stroke, out=height)
         # The mean found above is that of a pin that no end stop holds.
         idle |= way != height
         np.multiply(m, height, exponent)
@@ -191,7 +191,7 @@ def _under_finger(
         rate -= one
         np.putmask(mean, ~idle, rate)
         # Of a tension that falls steeply a straight line would make a filter that pulls.
-        np.maximum(np.dot(plan.transition[s], work), zero, filters)
+        np.maximum(np.dot(plan.transition[s], work), zero, out=filters)
     np.multiply(filters, unit, y[plan.cell.pulp_rows])
 
 
@@ -208,7 +208,7 @@ def _easy(plan: BernoulliPlan, exponent: Floats, slip: Floats, decay: Floats, fi
 def _grown(exponent: Floats, zero: Floats | float = 0.0, most: Floats | float = LARGEST_EXPONENT) -> Floats:
     """Return exp(e), 1 where there is a gap."""
     grown: Floats = np.maximum(exponent, zero)
-    np.minimum(grown, most, grown)
+    np.minimum(grown, most, out=grown)
     np.exp(grown, grown)
     return grown
 
