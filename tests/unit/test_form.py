@@ -162,3 +162,8 @@ def test_an_older_run_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.Cap
     out = form(tmp_path, "dome", "--finger", "away")
     assert main(["form", "dome", "--out", str(out)]) == WRONG
     assert "--overwrite" in capsys.readouterr().err
+
+
+def test_a_scene_s_shape_is_described(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["describe", "crater_breached"]) == 0
+    assert "shape       crater.png: heights from 32.0 to 46.0 mm, covers all cells" in capsys.readouterr().out

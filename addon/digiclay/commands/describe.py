@@ -11,6 +11,7 @@ from ..core.assembly import assemble
 from ..core.quantity import Parameters, quantities
 from ..core.recorder import available_memory, bytes_needed
 from ..core.scene import Scene
+from ..core.shape_file import fitted_to
 from ..core.simulation import System
 from .arguments import add_scene, scene_of
 
@@ -57,6 +58,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         part = getattr(scene, section)
         method = f"{scene.method}: " if section == "control" else ""
         yield _filled(place, "left out" if part is None else method + _parameters(part))
+    if scene.shape:
+        yield _filled("shape", fitted_to(scene.shape, system.grid, scene.actuator).told())
     simulation = scene.simulation
     yield _filled("stepper", f"{system.stepper.name}, order {system.stepper.order}")
     yield "\nThe bed"
