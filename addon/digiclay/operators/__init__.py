@@ -5,8 +5,11 @@ from __future__ import annotations
 from ..compat import bpy
 from . import (
     add_bed,
+    export_mesh,
+    find_features,
     bake,
     import_run,
+    make_mesh,
     open_scene,
     pick_pins,
     presets,
@@ -37,6 +40,12 @@ CLASSES: tuple[type, ...] = (
     pick_pins.PickPins,
     pick_pins.ClearPins,
     press.Press,
+    export_mesh.ExportMesh,
+    export_mesh.ExportMenu,
+    make_mesh.MakeMesh,
+    find_features.FindFeatures,
+    find_features.KeepSurface,
+    find_features.ForgetSurface,
     session.Session,
     session_stop.StopSession,
     session_pause.PauseSession,
@@ -66,6 +75,7 @@ CLASSES: tuple[type, ...] = (
 MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
     ("TOPBAR_MT_file_import", import_run.entry),
+    ("TOPBAR_MT_file_export", export_mesh.entry),
     *open_scene.MENUS,
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import control, device, display, finger, session, shapes, takes
+from . import control, device, display, export, finger, session, shapes, takes
 
 __all__ = ["register", "unregister"]
 
@@ -17,6 +17,7 @@ CLASSES: tuple[type, ...] = (
     *display.CLASSES,
     *shapes.CLASSES,
     *takes.CLASSES,
+    *export.CLASSES,
 )
 
 

@@ -1,0 +1,259 @@
+"""Export, Make Mesh and the list of features, as a user of Blender has them."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge, formed_bed, properties, view
+from digiclay.core.assembly import assemble
+from digiclay.core.export import FORMATS, suffix
+from digiclay.core.keeping import packed
+from digiclay.core.layout import Layout, grid
+from digiclay.core.simulation import begin, step
+from digiclay.instant import Instant
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: float32 at 0.5 Blender units, in m.
+FLOAT32 = 0.5 / bridge.SCALE * 2.0**-23
+LAYOUT = Layout(rows=12, columns=14)
+
+
+def shaped() -> Instant:
+    """A boss of 5 mm, a crease of 4 mm, level ground between them; forces and all modes."""
+    place = grid(LAYOUT).positions
+    x, y = place.T * 1e3
+    raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
+    return Instant(
+        position=place,
+        height=0.04 + raised * 1e-3,
+        mode=np.arange(168) % 8,
+        force=np.arange(168) / 100.0,
+        fingertip=np.array([0.0, 0.0, 0.06, 1.0, 0.0, 0.0, 0.0]),
+    )
+
+
+@pytest.fixture
+def bed(extension: None) -> bpy.types.Object:
+    """A formed bed, selected as Blender's Add leaves it."""
+    bpy.ops.mesh.digital_clay_add(rows=LAYOUT.rows, columns=LAYOUT.columns)
+    view.show_arrows(bpy.context.object, True)  # only then are forces drawn
+    view.show(bpy.context.object, shaped())
+    return bpy.context.object
+
+
+def corners(thing: bpy.types.Object) -> np.ndarray:
+    """Vertices of a mesh object in the space of its data."""
+    found = np.empty(3 * len(thing.data.vertices), np.float32)
+    thing.data.vertices.foreach_get("co", found)
+    return found.reshape(-1, 3).astype(float)
+
+
+def open_edges(thing: bpy.types.Object) -> int:
+    """Count the edges that have not exactly two faces."""
+    keys = [key for polygon in thing.data.polygons for key in polygon.edge_keys]
+    _, counts = np.unique(np.array(keys), axis=0, return_counts=True)
+    return int(np.sum(counts != 2))
+
+
+def enclosed(mesh: bpy.types.Mesh) -> float:
+    """Volume a mesh encloses, in cubic Blender units, by Blender; every edge must have two faces."""
+    known = bmesh.new()
+    known.from_mesh(mesh)
+    assert all(edge.is_manifold for edge in known.edges)
+    volume = known.calc_volume(signed=True)
+    known.free()
+    return float(volume)
+
+
+IMPORTERS = {
+    "stl": ("wm", "stl_import"), "stl_ascii": ("wm", "stl_import"), "obj": ("wm", "obj_import"),
+    "ply": ("wm", "ply_import"), "glb": ("import_scene", "gltf"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["solid", "surface", "pins", "features"])
+@pytest.mark.parametrize("file_format", IMPORTERS)
+def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file_format):
+    path = tmp_path / f"bed{suffix(file_format)}"
+    done = bpy.ops.export_mesh.digital_clay(filepath=str(path), kind=kind, file_format=file_format)
+    assert done == {"FINISHED"}
+    bpy.ops.mesh.digital_clay_make(kind=kind, beside=False)
+    known = [len(one.data.polygons) for one in bpy.context.selected_objects]
+    before = set(bpy.data.objects)
+    group, name = IMPORTERS[file_format]
+    getattr(getattr(bpy.ops, group), name)(filepath=str(path))
+    read = [one for one in set(bpy.data.objects) - before if one.type == "MESH"]
+    assert sum(len(one.data.polygons) for one in read) == sum(known)
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_every_format_is_written_with_its_ending(bed, tmp_path, file_format):
+    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), file_format=file_format)
+    assert [path.name for path in tmp_path.iterdir()] == [f"bed{suffix(file_format)}"]
+
+
+def test_a_name_gets_the_ending_of_its_format_in_place_of_another(bed, tmp_path):
+    for name in ("one.STL", "two.ascii.stl", "three.part", "four.3mf"):
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), file_format="stl")
+    found = sorted(path.name for path in tmp_path.iterdir())
+    assert found == ["four.stl", "one.STL", "three.part.stl", "two.stl"]
+
+
+def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
+    path = tmp_path / "für später" / "grüne Form.stl"
+    path.parent.mkdir()
+    bpy.ops.export_mesh.digital_clay(filepath=str(path), kind="features", separate=True)
+    names = sorted(one.name for one in path.parent.iterdir())
+    assert names == ["grüne Form_boss_1.stl", "grüne Form_crease_1.stl"]
+
+
+def test_a_folder_that_is_not_there_is_told_in_one_line(bed, tmp_path):
+    with pytest.raises(RuntimeError, match=r"Cannot write .*bed\.stl: No such file or directory\.") as caught:
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "missing" / "bed.stl"))
+    assert "Traceback" not in str(caught.value)
+
+
+def test_without_features_the_export_says_what_was_looked_for(bed, tmp_path):
+    with pytest.raises(RuntimeError, match=r"There is no feature of at least 3 pins more than 50 mm off"):
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "a.stl"), kind="features", threshold=50.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_lengths_are_millimetres_of_the_device_whatever_the_size_of_the_bed(bed, tmp_path):
+    bed.scale = (3.0, 3.0, 3.0)
+    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), kind="surface")
+    bpy.ops.wm.stl_import(filepath=str(tmp_path / "bed.stl"))
+    assert np.ptp(corners(bpy.context.object)[:, 0]) == pytest.approx(13 * 3.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["solid", "surface", "pins"])
+def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
+    known = bridge.read_cells(bed.data)
+    assert bpy.ops.mesh.digital_clay_make(kind=kind) == {"FINISHED"}
+    made = bpy.context.object
+    assert made != bed
+    exact = 0.6e-7 if kind == "pins" else FLOAT32  # pins have steps of 0.1 µm
+    np.testing.assert_allclose(corners(made)[:168, 2] / bridge.SCALE, known["height"], rtol=0, atol=exact)
+    assert [group.name for group in made.vertex_groups] == ["boss_1", "crease_1"]
+    for index, x in ((0, -9e-3), (1, 9e-3)):
+        mine = [v.co.x / bridge.SCALE for v in made.data.vertices if any(g.group == index for g in v.groups)]
+        assert len(mine) > 8
+        assert np.mean(mine) == pytest.approx(x, abs=1.5e-3)
+    assert (open_edges(made) == 0) == (kind != "surface")
+
+
+def test_the_mesh_keeps_force_and_mode_of_the_pins(bed):
+    bpy.ops.mesh.digital_clay_make(kind="surface")
+    attributes = bpy.context.object.data.attributes
+    assert [round(attributes["force"].data[i].value, 6) for i in (0, 7, 167)] == [0.0, 0.07, 1.67]
+    assert [attributes["mode"].data[i].value for i in (0, 7, 167)] == [0, 7, 7]
+
+
+def test_a_session_tells_its_forces_whether_they_are_drawn_or_not(bed):
+    view.show_arrows(bed, False)
+    scene = properties.scene_of(bed)
+    system = assemble(scene)
+    finger = np.array([1.5e-3, 1.5e-3, 0.038, 1.0, 0.0, 0.0, 0.0])
+    state = step(system, begin(system), np.tile(finger, (len(system.instants), 1)))
+    view.show_state(bed, system, state)
+    force = state.row(system.rows.force).copy()
+    assert force.max() > 1e-3
+    bed["digiclay_state"] = packed(system, state)
+    np.testing.assert_array_equal(formed_bed.formed(bed).force, force)
+    bed["digiclay_state"] = b"damaged"
+    assert not np.array_equal(formed_bed.formed(bed).force, force)
+
+
+def test_each_feature_becomes_a_body_of_its_own_selected(bed):
+    bpy.ops.mesh.digital_clay_make(kind="features")
+    made = bpy.context.selected_objects
+    assert sorted(one.name.split()[-1] for one in made) == ["boss_1", "crease_1"]
+    assert [open_edges(one) for one in made] == [0, 0]
+
+
+def test_the_mesh_stands_beside_the_bed_or_where_its_surface_is(bed):
+    bed.location = (1.0, 2.0, 3.0)
+    bed.rotation_euler = (0.0, 0.0, 0.5)
+    bpy.context.view_layer.update()
+    bpy.ops.mesh.digital_clay_make(kind="surface", beside=False)
+    np.testing.assert_allclose(bpy.context.object.matrix_world, bed.matrix_world, rtol=0, atol=1e-6)
+    bpy.context.view_layer.objects.active = bed
+    bpy.ops.mesh.digital_clay_make(kind="surface", beside=True)
+    bpy.context.view_layer.update()
+    away = bpy.context.object.matrix_world.translation - bed.matrix_world.translation
+    assert away.length > 13 * 3e-3 * bridge.SCALE
+
+
+def test_the_mesh_goes_on_into_a_boolean(bed):
+    bpy.ops.mesh.digital_clay_make(kind="solid", beside=False)
+    solid = bpy.context.object
+    bpy.context.view_layer.update()
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=solid.matrix_world @ solid.data.vertices[50].co)
+    cube = bpy.context.object
+    cut = solid.modifiers.new("Cut", "BOOLEAN")
+    cut.object, cut.operation, cut.solver = cube, "DIFFERENCE", "EXACT"
+    evaluated = solid.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    # Half of the cube is in the ground, and the ground there nearly level: within a fifth.
+    assert enclosed(solid.data) - enclosed(evaluated.data) == pytest.approx(0.5e-3, rel=0.2)
+
+
+def test_the_features_are_listed_in_the_panel(bed):
+    assert bpy.ops.digiclay.find_features() == {"FINISHED"}
+    lines = bed["digiclay_features"].splitlines()
+    assert lines[0] == "1 boss and 1 crease"
+    assert lines[1].startswith("boss_1: 4.")
+    assert "mm high" in lines[1]
+    assert "mm deep" in lines[3]
+
+
+def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
+    assert not bpy.ops.digiclay.forget_surface.poll()
+    bpy.ops.digiclay.keep_surface()
+    bpy.ops.digiclay.find_features()
+    assert bed["digiclay_features"] == "0 bosses and 0 creases"
+    bpy.ops.digiclay.forget_surface()
+    bpy.ops.digiclay.find_features()
+    assert bed["digiclay_features"].startswith("1 boss and 1 crease")
+
+
+def test_the_kept_surface_comes_through_saving(bed, tmp_path):
+    bpy.ops.digiclay.keep_surface()
+    name, kept = bed.name, formed_bed.formed(bed).former.copy()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_factory_settings()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    np.testing.assert_array_equal(formed_bed.formed(bpy.data.objects[name]).former, kept)
+
+
+def test_the_heights_are_measured_from_the_rest_height_of_the_settings(bed):
+    bed.digiclay.actuator.rest_height = 35.0
+    np.testing.assert_allclose(formed_bed.formed(bed).former, 0.035, rtol=0, atol=1e-12)
+
+
+def test_without_a_bed_nothing_can_be_exported_or_made(extension):
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    for name in ("keep_surface", "forget_surface", "find_features"):
+        assert not getattr(bpy.ops.digiclay, name).poll()
+    assert not bpy.ops.export_mesh.digital_clay.poll()
+    assert not bpy.ops.mesh.digital_clay_make.poll()
+
+
+def test_a_bed_of_one_row_has_no_surface_to_export(extension):
+    bpy.ops.mesh.digital_clay_add(rows=1, columns=9)
+    with pytest.raises(RuntimeError, match=r"must have 2 x 2 pins at least to carry a skin \(got 1 x 9\)"):
+        bpy.ops.mesh.digital_clay_make()
+
+
+def test_a_bed_that_lost_its_attributes_is_told(bed):
+    bed.data.attributes.remove(bed.data.attributes["force"])
+    with pytest.raises(RuntimeError, match=r"has lost the attributes of its pins: press Rebuild"):
+        bpy.ops.mesh.digital_clay_make()
+
+
+def test_the_operators_also_work_from_the_fingertip(bed, tmp_path):
+    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
+    bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"))
+    assert (tmp_path / "bed.stl").stat().st_size > 84
