@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from . import bridge, properties, view
+from . import bed_state, bridge, properties, view
 from .compat import bpy
 from .core.fingertip import Fingertip
 from .core.scene import Scene
 from .instant import Instant
 
-__all__ = ["STATE", "rebuild"]
-
-#: What a bed keeps of a session; it is of no use to other pins.
-STATE = "digiclay_state"
+__all__ = ["rebuild"]
 
 
 def rebuild(bed: Any) -> Scene:
     """Make a bed anew, at rest; its place, its fingertip and what else hangs on the object stay.
+
+    The state of a session is forgotten: it is of no use to other pins.
 
     Returns
     -------
@@ -53,8 +52,7 @@ def rebuild(bed: Any) -> Scene:
         _discard(tree)
     if not old_mesh.users:
         bpy.data.meshes.remove(old_mesh)
-    if STATE in bed:
-        del bed[STATE]
+    bed_state.clear(bed)
     return scene
 
 

@@ -77,7 +77,7 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
         name="Preset", description="Fluid, valves and whatever else a preset of your own sets", items=offered
     )
     scale: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="1 mm Shown as (cm)",
+        name="Scale (cm/mm)",
         description="How large the device is drawn: centimetres in Blender for a millimetre of the device",
         default=1.0,
         min=0.001,

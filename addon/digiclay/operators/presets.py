@@ -4,7 +4,7 @@
 from dataclasses import replace
 from typing import Any
 
-from .. import own_presets, properties, running
+from .. import own_presets, properties
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.scene_file import load
@@ -32,11 +32,7 @@ class ApplyPreset(bpy.types.Operator):  # type: ignore[misc]
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """A bed is needed, and no session that runs with other parameters."""
-        bed = bed_of(context)
-        if bed is not None and running.of(bed) is not None:
-            cls.poll_message_set("Stop the session first: it runs with the parameters it began with")
-            return False
+        """A bed is needed; a session that runs on it goes on with the new parameters."""
         return _on_a_bed(cls, context)
 
     def execute(self, context: Any) -> set[str]:

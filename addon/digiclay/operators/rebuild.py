@@ -4,6 +4,7 @@
 from typing import Any
 
 from .. import rebuild, running
+from ..bake import is_baked
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..panels.base import bed_of
@@ -26,6 +27,8 @@ class Rebuild(bpy.types.Operator):  # type: ignore[misc]
             cls.poll_message_set("Select a bed or its fingertip first")
         elif running.of(bed) is not None:
             cls.poll_message_set("Stop the session first: its pins cannot be exchanged")
+        elif is_baked(bed):
+            cls.poll_message_set("Free the bake in the Takes panel first: it moves the pins there are now")
         elif context.mode != "OBJECT":
             cls.poll_message_set("Leave Edit Mode first")
         else:
