@@ -12,7 +12,7 @@ from . import bridge, properties, running, view
 from .bridge import SCALE
 from .core.errors import DigiclayError
 from .core.layout import Grid, grid
-from .core.pointing import meeting
+from .core.pointing import meeting, ray
 
 __all__ = ["Target", "meets", "on_screen", "surface", "target"]
 
@@ -106,10 +106,10 @@ def on_screen(context: Any, bed: Any, points: Floats) -> Floats:
 
 def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Floats]:
     """Return the ray through a pixel in the bed's space: origin, m, and direction of length 1."""
-    from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
-
     bridge.uniform(bed)
-    inverse = np.array(bed.matrix_world.inverted())
-    eye = np.array(region_2d_to_origin_3d(context.region, context.region_data, xy))
-    way = inverse[:3, :3] @ np.array(region_2d_to_vector_3d(context.region, context.region_data, xy))
-    return (inverse[:3, :3] @ eye + inverse[:3, 3]) / SCALE, way / np.linalg.norm(way)
+    looking, region = context.region_data, context.region
+    lens = np.array(looking.window_matrix, np.float64)
+    seen = np.array(looking.view_matrix, np.float64) @ np.array(bed.matrix_world, np.float64)
+    screen = 2.0 * np.array(xy) / [region.width, region.height] - 1.0
+    origin, way = ray(lens, seen, screen)
+    return origin / SCALE, way

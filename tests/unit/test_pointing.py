@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from digiclay.core.fingertip import LEVEL, Fingertip, forms, matrices, underside
 from digiclay.core.layout import Grid, Layout, grid
-from digiclay.core.pointing import ground, meeting, patch
+from digiclay.core.pointing import ground, meeting, patch, ray
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -80,6 +80,27 @@ def test_one_pin_alone_is_a_bed_too() -> None:
     cells = grid(Layout(rows=1, columns=1))
     found = meeting(cells, np.array([0.04]), np.array([1e-3, -1e-3, 1.0]), DOWN)
     np.testing.assert_allclose(found, [1e-3, -1e-3, 0.04], rtol=0, atol=1e-12)
+
+
+LENSES = {
+    "perspective": [[1.4, 0, 0.1, 0], [0, 2.4, -0.2, 0], [0, 0, -1, -0.02], [0, 0, -1, 0]],
+    "none": [[0.4, 0, 0, 0.1], [0, 0.7, 0, -0.2], [0, 0, -0.01, -1], [0, 0, 0, 1]],
+}
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None:
+    projection = np.array(LENSES[lens])
+    seen = np.eye(4)
+    seen[:3, :3] = 3.0 * matrices(np.array([[0.8, 0.4, -0.3, 0.33]]))[0]
+    seen[:3, 3] = 1.0, -2.0, -15.0
+    for place in ([0.0, 0.0, 0.0], [0.3, -0.2, 0.5], [-1.0, 1.0, 0.1]):
+        clip = projection @ seen @ [*place, 1.0]
+        origin, way = ray(projection, seen, clip[:2] / clip[3])
+        along = (place - origin) @ way
+        assert along > 0.0
+        # Twelve digits of the distance from where the ray begins.
+        np.testing.assert_allclose(origin + along * way, place, rtol=0, atol=1e-12 * along + 1e-12)
 
 
 def test_the_ground_is_the_mean_of_the_pins_within_reach_and_the_nearest_beside_the_bed() -> None:

@@ -10,12 +10,44 @@ from numpy.typing import NDArray
 from .fingertip import Fingertip, matrices
 from .layout import Grid
 
-__all__ = ["ground", "meeting", "patch"]
+__all__ = ["ground", "meeting", "patch", "ray"]
 
 Floats = NDArray[np.float64]
 
 #: Steps a pitch at which a ray is looked at on its way over the bed.
 STEPS = 4
+#: How far behind the middle of a view without perspective its rays begin, in its own unit.
+BEHIND = 1e5
+
+
+def ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
+    """Return the ray through a place of a picture, in double precision throughout.
+
+    Blender's own function takes the difference of two places near the eye in single precision,
+    and is off by up to a pixel.
+
+    Parameters
+    ----------
+    lens : ndarray (4, 4)
+        From the camera's space to the picture's, with perspective or without.
+    seen : ndarray (4, 4)
+        From the wanted space to the camera's, which looks along -z.
+    screen : ndarray (2,)
+        The place: -1 to 1 from left to right and from below to above.
+
+    Returns
+    -------
+    origin, direction : ndarray (3,)
+        In the wanted space and its unit; the direction has length 1.
+    """
+    across = np.array([lens[0, 0], lens[1, 1]])
+    if lens[3, 2]:
+        eye, way = np.zeros(3), np.array([*((screen + lens[:2, 2]) / across), -1.0])
+    else:
+        eye, way = np.array([*((screen - lens[:2, 3]) / across), BEHIND]), np.array([0.0, 0.0, -1.0])
+    inverse = np.linalg.inv(seen)
+    way = inverse[:3, :3] @ way
+    return inverse[:3, :3] @ eye + inverse[:3, 3], way / np.linalg.norm(way)
 
 
 def meeting(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:

@@ -1,0 +1,149 @@
+"""The mouse points at the pin drawn under it, and the Press tool comes and goes with the extension."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import digiclay
+import numpy as np
+import pytest
+from digiclay import aim, bridge, press_tool, properties, view
+from digiclay.core.errors import DigiclayError
+from digiclay.core.layout import grid
+
+#: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
+LARGER = 8.0
+
+
+def tools() -> list[str]:
+    """Return our tools in the toolbar of the 3D view in Object Mode, down through its groups."""
+    from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active
+
+    found, left = [], list(VIEW3D_PT_tools_active._tools["OBJECT"])
+    while left:
+        tool = left.pop()
+        if isinstance(tool, list | tuple) and not hasattr(tool, "idname"):
+            left += tool
+        elif tool is not None and tool.idname.startswith("digiclay"):
+            found.append(tool.idname)
+    return found
+
+
+@pytest.fixture
+def bed(extension: None) -> Any:
+    """A staggered bed whose pins all have heights of their own, turned, moved and scaled uniformly."""
+    bpy.ops.mesh.digital_clay_add(rows=12, columns=15, arrangement="staggered")
+    made = bpy.context.object
+    made.scale = (LARGER,) * 3
+    made.rotation_euler = (0.1, -0.2, 0.5)
+    cells, height = aim.surface(made)
+    bridge.write_cells(made.data, cells.positions, height + 0.0003 * np.sin(np.arange(cells.count)))
+    bpy.context.view_layer.update()
+    return made
+
+
+@pytest.fixture
+def in_the_view(bed: Any) -> Iterator[Any]:
+    """The context as in the main region of the 3D view."""
+    (window,) = bpy.context.window_manager.windows
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        yield bpy.context
+
+
+def test_the_tool_comes_and_goes_with_the_extension() -> None:
+    assert tools() == []
+    for _ in range(2):
+        digiclay.register()
+        assert tools() == [press_tool.PressTool.bl_idname]
+        digiclay.unregister()
+        assert tools() == []
+
+
+def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, in_the_view: Any) -> None:
+    cells, height = aim.surface(bed)
+    tops = np.column_stack([cells.positions, height])
+    pixels = aim.on_screen(in_the_view, bed, tops)
+    met = [aim.target(in_the_view, tuple(xy)) for xy in pixels]
+    assert all(found is not None and found.bed == bed for found in met)
+    hit = np.array([found.pin for found in met])
+    near = np.array([found.point for found in met])
+    # A pin may hide another; whatever is met lies in front of the top that was asked for, on the same ray.
+    eye = np.array(in_the_view.region_data.view_matrix.inverted().translation)
+    eye = np.array(bed.matrix_world.inverted()) @ [*eye, 1.0]
+    eye = eye[:3] / bridge.SCALE
+    visible = hit == np.arange(cells.count)
+    assert visible.sum() > 0.9 * cells.count
+    # Blender's matrices are float32, at a distance of 2 m of the device.
+    np.testing.assert_allclose(near[visible], tops[visible], rtol=0, atol=2e-6)
+    closer = np.linalg.norm(near - eye, axis=1) <= np.linalg.norm(tops - eye, axis=1) + 2e-6
+    assert closer.all()
+
+
+def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, in_the_view: Any) -> None:
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    from mathutils import Vector
+
+    place = np.array([[0.01, -0.02, 0.045]])
+    world = bed.matrix_world @ Vector(place[0] * bridge.SCALE)
+    theirs = location_3d_to_region_2d(in_the_view.region, in_the_view.region_data, world)
+    # A thousandth of a pixel: theirs is reckoned in float32.
+    np.testing.assert_allclose(aim.on_screen(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
+
+
+def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, in_the_view: Any) -> None:
+    eye = np.array(bed.matrix_world.inverted() @ in_the_view.region_data.view_matrix.inverted().translation)
+    behind = 1.5 * eye[None] / bridge.SCALE
+    assert np.isnan(aim.on_screen(in_the_view, bed, behind)).all()
+
+
+def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, in_the_view: Any) -> None:
+    assert aim.target(in_the_view, (0.0, 0.0)) is None
+
+
+def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(
+    bed: Any, in_the_view: Any
+) -> None:
+    cells, height = aim.surface(bed)
+    middle = np.array([[0.0, 0.0, float(height.max())]])
+    xy = tuple(aim.on_screen(in_the_view, bed, middle)[0])
+    assert aim.target(in_the_view, xy) is not None
+    bed.scale.z *= 1.2
+    bpy.context.view_layer.update()
+    assert aim.target(in_the_view, xy) is None
+    with pytest.raises(DigiclayError, match="the same along x, y and z"):
+        aim.meets(in_the_view, bed, cells, height, xy)
+
+
+def test_a_hidden_bed_is_looked_through(bed: Any, in_the_view: Any) -> None:
+    _, height = aim.surface(bed)
+    xy = tuple(aim.on_screen(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
+    bed.hide_set(True)
+    assert aim.target(in_the_view, xy) is None
+
+
+def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
+    cells, height = aim.surface(bed)
+    wanted = grid(properties.scene_of(bed).layout)
+    np.testing.assert_array_equal(cells.positions, wanted.positions)
+    np.testing.assert_array_equal(height, bridge.read_cells(bed.data)["height"])
+
+
+def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed: Any) -> None:
+    cells, height = aim.surface(bed)
+    rim = press_tool.outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
+    finger = bridge.finger_of(view.fingertip_of(bed))
+    # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
+    across = np.ptp(rim[:, :2], axis=0) / 2
+    np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)
+    np.testing.assert_array_equal(rim[:, 2], height[cells.at(rim[:, 0], rim[:, 1])])
+
+
+@pytest.mark.usefixtures("extension")
+def test_pressing_wants_a_bed_in_a_view_in_object_mode(in_the_view: Any, bed: Any) -> None:
+    assert bpy.ops.digiclay.press.poll()
+    bed.hide_set(True)
+    assert not bpy.ops.digiclay.press.poll()
