@@ -22,6 +22,8 @@ from .overlay_sections import Told
 
 __all__ = ["follow", "redraw", "shown", "stop", "told"]
 
+#: How often the views are drawn anew while nothing moves in them, s: the curves go on all the same.
+QUIET = 0.25
 #: The draw handler, while there is one.
 _HANDLES: list[Any] = []
 
@@ -31,6 +33,7 @@ def follow() -> None:
     if any(_wanted(bed) for bed in _beds()):
         if not _HANDLES:
             _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+            bpy.app.timers.register(_again, first_interval=QUIET)
     else:
         stop()
     redraw()
@@ -38,6 +41,8 @@ def follow() -> None:
 
 def stop() -> None:
     """Draw the overlay no more."""
+    if bpy.app.timers.is_registered(_again):
+        bpy.app.timers.unregister(_again)
     while _HANDLES:
         bpy.types.SpaceView3D.draw_handler_remove(_HANDLES.pop(), "WINDOW")
 
@@ -53,6 +58,12 @@ def redraw() -> None:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
+
+
+def _again() -> float:
+    """Have the views drawn anew now and then: a timer, so that an overlay that is off costs nothing."""
+    redraw()
+    return QUIET
 
 
 def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:

@@ -100,6 +100,12 @@ def test_the_overlay_is_drawn_only_while_a_session_runs_whose_bed_wants_it(
     assert not overlay.shown()
 
 
+def test_the_overlays_timer_comes_and_goes_with_it(bed: Any, session: running.Running) -> None:
+    for wanted in (True, False, True):
+        bed.digiclay_display.overlay = wanted
+        assert bpy.app.timers.is_registered(overlay._again) is wanted
+
+
 def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: running.Running) -> None:
     overlay.follow()
     display.unregister()
