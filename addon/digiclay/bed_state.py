@@ -30,11 +30,12 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     bed[MOMENT] = running.moment
     if before is not None and running.kept is before.kept:
         return
-    # Blender corrupts its memory when bytes are assigned over others of another length.
-    if STATE in bed:
-        del bed[STATE]
-    bed[STATE] = running.kept
-    bed[POSE] = running.pose.tobytes()
+    for name, data in ((STATE, running.kept), (POSE, running.pose.tobytes())):
+        # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
+        # and corrupts its memory where the lengths differ.
+        if name in bed:
+            del bed[name]
+        bed[name] = data
 
 
 def clear(bed: Any) -> None:

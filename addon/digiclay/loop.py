@@ -86,13 +86,14 @@ def status_changed() -> None:
 def draw(header: Any, context: Any) -> None:
     """Draw the keys of a running session in the status bar."""
     sessions = running.all()
-    row = header.layout.row(align=True)
+    row = header.layout.row()
     paused = all(session.paused for session in sessions)
     row.label(text="Digital Clay paused" if paused else "Digital Clay", icon="PAUSE" if paused else "PLAY")
-    row.label(text="Stop", icon="EVENT_ESC")
+    row.label(text=" Stop", icon="EVENT_ESC")
     row.label(text="Resume" if paused else "Pause", icon="EVENT_P")
-    row.label(text="", icon="EVENT_SHIFT")
-    row.label(text="Single Step", icon="EVENT_P")
+    step = row.row(align=True)
+    step.label(text="", icon="EVENT_SHIFT")
+    step.label(text="Single Step", icon="EVENT_P")
     row.label(text="Backspace: Take Back a Gesture")
     row.label(text="Shift Backspace: Reset")
     row.separator(factor=2.0)

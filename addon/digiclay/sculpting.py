@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
+#: What is told when the state of other parts is taken up.
+CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
 #: A finger that moves on after resting so long makes another gesture, s.
 REST = 0.5
 
@@ -66,10 +68,10 @@ def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
         return begin(system), ""
     try:
         return unpacked(system, kept), ""
-    except StateError as error:
-        first = error
+    except StateError:
+        pass  # of other parts, perhaps: then the heights at least can be had
     try:
-        return carried(system, kept), f"The heights were taken up, the rest begins anew. {first}"
+        return carried(system, kept), CHANGED
     except StateError as error:
         return begin(system), f"The bed begins at rest. {error}"
 

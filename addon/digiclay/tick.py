@@ -51,7 +51,7 @@ def start(context: Any, bed: Any) -> list[Note]:
         bridge.place_fingertip(tip, rest.fingertip, rest.finger)
         notes.append(Note("INFO", f"{bed.name} got a new fingertip"))
     context.view_layer.update()
-    why = obstacle(context, bed)
+    why = obstacle(context, bed, scene.cells)
     if why:
         raise DigiclayError(f"The session of {bed.name} cannot start: {why}.")
     begun, said = sculpting.begun(
@@ -91,6 +91,10 @@ def tick(context: Any, now: float) -> list[Note]:
     """Let every session go on up to now, by a clock that never goes back, s; return what there is to tell."""
     notes: list[Note] = []
     most = preferences.of(context).most_periods
+    if any(session.stale for session in running.all()):
+        # What undo has put back has no place in the world until it is evaluated.
+        for window in context.window_manager.windows:
+            window.view_layer.update()
     for session in running.all():
         bed = found(session.uid, session.name)
         if bed is None:
@@ -140,7 +144,7 @@ def _seen(session: Running) -> Floats:
 
 def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
     """Look at what the user may have changed; return why to wait, the session, and what to tell."""
-    why, said = obstacle(context, bed), ""
+    why, said = obstacle(context, bed, session.system.grid.count), ""
     if why:
         return why, session, said
     try:

@@ -28,13 +28,15 @@ def found(uid: int, name: str) -> Any | None:
     return bed if bed is not None and view.is_bed(bed) and bed.users_scene else None
 
 
-def obstacle(context: Any, bed: Any) -> str:
+def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
     """Return why the session of a bed cannot go on now, or an empty text.
 
     Parameters
     ----------
     context : bpy.types.Context
     bed : bpy.types.Object
+    pins : int, optional
+        How many the session simulates; as many as there are when left out.
     """
     if bpy.app.is_job_running("RENDER"):
         return "a render is under way"
@@ -43,9 +45,15 @@ def obstacle(context: Any, bed: Any) -> str:
         return "no window shows its scene, or its collection is left out: show it to go on"
     if bed.mode != "OBJECT":
         return "the bed is being edited: go back to Object Mode to go on"
+    if bed.type != "MESH" or not bridge.ATTRIBUTES.keys() <= set(bed.data.attributes.keys()):
+        return "the bed's mesh is no longer that of its pins: undo that to go on"
+    if pins is not None and len(bed.data.vertices) != pins:
+        return f"the bed has {len(bed.data.vertices)} pins now instead of {pins}: undo that to go on"
     tip = view.fingertip_of(bed)
     if tip is None:
-        return "its fingertip is deleted: undo that, or start the session anew to get another one"
+        return (
+            "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
+        )
     if not any(layer.objects.get(tip.name) == tip for layer in layers):
         return "its fingertip stands in no scene shown: link it to a collection to go on"
     try:

@@ -11,6 +11,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import bed_state, bridge, handlers, properties, running, sculpting, tick, view
+from digiclay.core import live
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import DigiclayError
 from digiclay.core.keeping import packed, unpacked
@@ -19,6 +20,12 @@ from digiclay.core.simulation import begin
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
 TICK = 1 / 30
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
+    monkeypatch.setattr(live, "SHARE", 1e9)
 
 
 @pytest.fixture(autouse=True)
@@ -107,6 +114,7 @@ def test_the_bed_keeps_and_shows_what_the_session_is(bed: Any, clock: Clock) -> 
     session = running.of(bed)
     assert session is not None
     assert bed_state.kept(bed) == packed(session.system, session.state)
+    assert np.array_equal(bed_state.pose(bed), session.pose)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3
 
@@ -155,7 +163,7 @@ def test_a_turned_moved_and_scaled_bed_forms_like_one_that_is_not(bed: Any, cloc
     other.location, other.rotation_euler, other.scale = (3.0, -2.0, 1.0), (0.4, 0.0, 0.7), (2.0, 2.0, 2.0)
     started(other)
     press(other, clock)
-    # The matrices are float32: 1e-7 of some units, at 0.1 m a unit; the clocks start a tick apart.
+    # The matrices are float32: some 1e-7 of 3 units, at 0.1 m a unit; the clocks start a tick apart.
     np.testing.assert_allclose(exact(other), straight, rtol=0, atol=2e-5)
 
 
@@ -196,6 +204,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     session = running.of(only_bed())
     assert session is not None
     assert packed(session.system, session.state) == first
+    assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
     np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
     undone(clock)
     assert (exact(only_bed()) == 40e-3).all()
@@ -388,6 +397,28 @@ def test_a_session_waits_while_the_bed_is_edited(bed: Any, clock: Clock) -> None
     waits(bed, clock, words="back to Object Mode")
     bpy.ops.object.mode_set(mode="OBJECT")
     goes_on(clock)
+
+
+@pytest.mark.parametrize("name", ["session_rewind", "session_reset"])
+def test_a_bed_that_is_edited_is_not_written(bed: Any, clock: Clock, name: str) -> None:
+    started(bed)
+    press(bed, clock)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not getattr(bpy.ops.digiclay, name).poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert getattr(bpy.ops.digiclay, name).poll()
+
+
+def test_a_session_waits_while_pins_are_missing(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bed.data.vertices.add(1)
+    waits(bed, clock, words="170 pins now instead of 169")
+
+
+def test_a_session_waits_for_a_mesh_that_has_lost_its_attributes(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bed.data.attributes.remove(bed.data.attributes["mode"])
+    waits(bed, clock, words="no longer that of its pins")
 
 
 def test_a_session_waits_while_the_bed_is_scaled_unevenly(bed: Any, clock: Clock) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay import running, sculpting
+from digiclay.core import live
 from digiclay.core.errors import DigiclayError
 from digiclay.core.fingertip import LEVEL
 from digiclay.core.keeping import packed, unpacked
@@ -20,6 +21,12 @@ Floats = NDArray[np.float64]
 SIZES = {"rows": 15, "columns": 15}
 SCENE = resolve({"layout": SIZES})
 TICK = 1 / 30
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
+    monkeypatch.setattr(live, "SHARE", 1e9)
 
 
 def pose(x: float = 0.0, z: float = 46.0) -> Floats:

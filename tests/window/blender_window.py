@@ -16,7 +16,7 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 LIMIT = 240
 
 
-def played(script: str, out: Path) -> dict[str, Any]:
+def played(script: str, out: Path, size: tuple[int, int] = (1280, 800)) -> dict[str, Any]:
     """Play a script of this folder in a Blender with a copy of the extension installed.
 
     Parameters
@@ -25,6 +25,8 @@ def played(script: str, out: Path) -> dict[str, Any]:
         Its file's name.
     out : Path
         An empty folder for what is installed, seen and shot.
+    size : (int, int)
+        The window's, pixels: software GL draws a small one much quicker.
 
     Returns
     -------
@@ -36,8 +38,11 @@ def played(script: str, out: Path) -> dict[str, Any]:
     # `timeout` ends Blender with SIGTERM, so that a launcher can take its children along.
     command = ["timeout", "--kill-after=10", str(LIMIT), BLENDER]
     command += ["--factory-startup", "--enable-event-simulate", "--python-exit-code", "3"]
+    command += ["--window-geometry", "0", "0", str(size[0]), str(size[1])]
     command += ["--python", str(HERE / "driver.py"), "--", str(out), str(HERE / script)]
-    environment = os.environ | {"BLENDER_USER_EXTENSIONS": str(out / "extensions")}
+    # A launcher that makes a screen for Blender makes it as large as the window.
+    screen = {"BLENDER_WINDOW_SCREEN": f"{size[0]}x{size[1]}x24"}
+    environment = os.environ | screen | {"BLENDER_USER_EXTENSIONS": str(out / "extensions")}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     kept = os.environ.get("DIGICLAY_SCREENSHOTS")
     if kept:

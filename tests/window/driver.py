@@ -159,19 +159,31 @@ def grab(
     yield None
 
 
+def settle(ticks: int = 3) -> Iterator[float | None]:
+    """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
+    running = part("running")
+    start = max((session.moment for session in running.all()), default=0)
+    for _ in range(100):
+        yield 0.1
+        now = max((session.moment for session in running.all()), default=start + ticks)
+        if now >= start + ticks:
+            return
+    raise AssertionError("The session does not tick any more")
+
+
 def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
     bridge, running = part("bridge"), part("running")
     found: dict[str, Any] = {"beds": len(beds()), "sessions": len(running.all()), "said": running.said()}
     for bed in beds()[:1]:
-        session, cells = running.of(bed), bridge.read_cells(bed.data)
-        found |= {
-            "heights": [float(cells["height"].min()), float(cells["height"].max())],
-            "modes": np.bincount(cells["mode"], minlength=8).tolist(),
-            "kept": len(bed.get("digiclay_state", b"")),
-        }
+        session = running.of(bed)
+        found["kept"] = len(bed.get("digiclay_state", b""))
+        if bed.mode == "OBJECT":  # a mesh that is being edited cannot be read
+            cells = bridge.read_cells(bed.data)
+            found["heights"] = [float(cells["height"].min()), float(cells["height"].max())]
+            found["modes"] = np.bincount(cells["mode"], minlength=8).tolist()
         tip = part("view").fingertip_of(bed)
-        if tip is not None:
+        if tip is not None and not (session and session.waits):
             found["pose"] = bridge.pose(tip).tolist()
         if session is not None:
             found |= {
@@ -187,6 +199,7 @@ def look(name: str) -> None:
 
 def shot(name: str) -> None:
     """Leave a picture of the screen, and note how many colours it has."""
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
     command = ["import", "-window", "root", str(file)]
@@ -208,6 +221,8 @@ def finish() -> None:
 def main() -> None:
     """Enable the extension under the name Blender gives it, and play the script."""
     bpy.context.preferences.view.show_splash = False
+    # Smooth edges cost software GL most of its time.
+    bpy.context.preferences.system.viewport_aa = "OFF"
     # Whoever is asked whether to save waits for ever.
     bpy.context.preferences.view.use_save_prompt = False
     if addon_utils.enable(EXTENSION) is None:

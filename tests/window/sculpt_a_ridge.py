@@ -18,52 +18,57 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.look("added")
     blender.select(blender.fingertip())
     yield None
+    yield from blender.grab((9, 0, 0), "X", steps=2)
+    blender.look("dragged")
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield 0.8
+    blender.look("drag undone")
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield 1.0
+    yield from blender.settle()
     blender.look("started")
     yield from blender.grab((0, 0, -9), "Z", look_as="pressing")
-    yield 0.8
+    yield from blender.settle()
     blender.look("pressed")
     yield from blender.grab((22, 0, 0), "X", steps=8, look_as="drawing")
-    yield 0.8
+    yield from blender.settle()
     blender.look("drawn")
     blender.shot("session_ridge")
     yield from blender.grab((0, 0, 14), "Z")
-    yield 1.0
+    yield from blender.settle()
     blender.look("lifted")
     blender.shot("session_lifted")
 
     blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    yield from blender.settle()
     blender.look("lift undone")
     blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    yield from blender.settle()
     blender.look("draw undone")
     blender.shot("session_undone")
     blender.key("Z", blender.middle(), ctrl=True, shift=True)
-    yield 1.0
+    yield from blender.settle()
     blender.look("draw redone")
     blender.key("Z", blender.middle(), ctrl=True, shift=True)
-    yield 1.0
+    yield from blender.settle()
     blender.look("lift redone")
 
     blender.key("P", blender.middle())
-    yield 0.8
+    yield from blender.settle()
     blender.look("paused")
-    yield 0.8
+    yield from blender.settle()
     blender.look("paused later")
     blender.key("P", blender.middle(), shift=True)
-    yield 0.8
+    yield from blender.settle()
     blender.look("single step")
     blender.shot("session_paused")
     blender.key("P", blender.middle())
-    yield 0.8
+    yield from blender.settle()
     blender.look("resumed")
     blender.key("BACK_SPACE", blender.middle())
-    yield 1.0
+    yield from blender.settle()
     blender.look("rewound")
     blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    yield from blender.settle()
     blender.look("rewinding undone")
 
     path = str(blender.OUT / "mid_session.blend")
@@ -71,17 +76,18 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.look("saved")
     yield None
     bpy.ops.wm.open_mainfile(filepath=path)
-    yield 1.0
+    yield from blender.settle()
     blender.look("loaded")
     blender.shot("session_loaded")
     blender.select(blender.beds()[0])
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
-    yield 1.0
+    yield from blender.settle()
     blender.look("going on")
     blender.key("ESC", blender.middle())
-    yield 1.0
+    yield from blender.settle()
     blender.look("stopped")
     blender.shot("session_stopped")
-    blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    for _ in range(3):
+        blender.key("Z", blender.middle(), ctrl=True)
+        yield 0.6
     blender.look("stop undone")

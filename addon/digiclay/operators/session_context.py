@@ -8,7 +8,7 @@ from .. import running, waiting
 from ..panels.base import bed_of
 from ..running import Running
 
-__all__ = ["decline_without", "session_of"]
+__all__ = ["decline_while_waiting", "decline_without", "session_of"]
 
 
 def session_of(context: Any) -> tuple[Any, Running] | None:
@@ -19,6 +19,17 @@ def session_of(context: Any) -> tuple[Any, Running] | None:
         (session,) = running.all()
         bed = waiting.found(session.uid, session.name)
     return (bed, session) if bed is not None and session is not None else None
+
+
+def decline_while_waiting(operator: Any, context: Any) -> bool:
+    """Tell, for a poll, whether there is a session whose bed can be written; the operator says why if not."""
+    if not decline_without(operator, context):
+        return False
+    bed, session = session_of(context)
+    why = waiting.obstacle(context, bed, session.system.grid.count)
+    if why:
+        operator.poll_message_set(f"The session waits: {why}")
+    return not why
 
 
 def decline_without(operator: Any, context: Any) -> bool:

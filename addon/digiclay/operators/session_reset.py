@@ -11,7 +11,7 @@ from ..core.fingertip import Fingertip
 from ..core.simulation import begin
 from ..instant import CLEARANCE
 from ..panels.base import bed_of
-from .session_context import session_of
+from .session_context import decline_while_waiting, session_of
 
 __all__ = ["ResetSession"]
 
@@ -34,7 +34,7 @@ class ResetSession(bpy.types.Operator):  # type: ignore[misc]
         """A bed that has left its rest is needed."""
         bed = bed_of(context)
         if session_of(context) is not None:
-            return True
+            return decline_while_waiting(cls, context)
         if bed is None:
             cls.poll_message_set("Select a bed or its fingertip first")
         elif bed_state.kept(bed) is None:

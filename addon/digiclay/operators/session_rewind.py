@@ -6,7 +6,7 @@ from typing import Any
 
 from .. import sculpting, tick
 from ..compat import bpy
-from .session_context import decline_without, session_of
+from .session_context import decline_while_waiting, session_of
 
 __all__ = ["RewindSession"]
 
@@ -21,7 +21,7 @@ class RewindSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A session with a gesture is needed."""
-        if not decline_without(cls, context):
+        if not decline_while_waiting(cls, context):
             return False
         if session_of(context)[1].gestures:
             return True

@@ -1,0 +1,204 @@
+"""Three hundred random events at a running session: moves, undos, mode switches, deletes, and all keys."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+EVENTS = 300
+#: What is done, and how often out of the sum.
+CHOICES = {
+    "move": 60, "turn": 8, "grab": 30, "undo": 34, "redo": 14, "edit": 12, "select": 16, "delete": 8,
+    "add": 6, "start": 40, "stop": 4, "pause": 12, "step": 8, "rewind": 12, "reset": 6, "method": 8,
+    "scale": 5, "workspace": 5, "scene": 5, "play": 6, "parameter": 5, "duplicate": 4, "save": 3, "load": 2,
+}  # fmt: skip
+
+
+class Events:
+    """The events, each a method that does one thing a user can do."""
+
+    def __init__(self, blender: Any, source: random.Random) -> None:
+        self.blender, self.source = blender, source
+
+    @property
+    def tip(self) -> Any:
+        """Some fingertip, or None."""
+        found = [self.blender.fingertip(number) for number in range(len(self.blender.beds()))]
+        tips = [tip for tip in found if tip is not None]
+        return self.source.choice(tips) if tips else None
+
+    def somewhere(self) -> tuple[int, int]:
+        """Return a place in the 3D view."""
+        _, region = self.blender.view()
+        pick = self.source.random
+        return region.x + int(region.width * (0.2 + 0.5 * pick())), region.y + int(
+            region.height * (0.2 + 0.6 * pick())
+        )
+
+    def move(self) -> None:
+        if self.tip is not None:
+            pick = self.source.uniform
+            self.tip.location = pick(-0.35, 0.35), pick(-0.35, 0.35), pick(0.42, 0.56)
+
+    def turn(self) -> None:
+        if self.tip is not None:
+            self.tip.rotation_quaternion = [self.source.uniform(-1, 1) for _ in range(4)]
+
+    def grab(self) -> None:
+        at = self.somewhere()
+        self.blender.key("G", at)
+        for _ in range(3):
+            at = self.somewhere()
+            self.blender.event("MOUSEMOVE", "NOTHING", at)
+        self.blender.key(self.source.choice(["LEFTMOUSE", "RIGHTMOUSE", "ESC", "RET"]), at)
+
+    def undo(self) -> None:
+        self.blender.key("Z", self.somewhere(), ctrl=True)
+
+    def redo(self) -> None:
+        self.blender.key("Z", self.somewhere(), ctrl=True, shift=True)
+
+    def edit(self) -> None:
+        self.blender.key("TAB", self.somewhere())
+
+    def select(self) -> None:
+        things = list(self.blender.window().view_layer.objects)
+        if things and bpy.context.mode == "OBJECT":
+            self.blender.select(self.source.choice(things))
+
+    def delete(self) -> None:
+        self.blender.key("DEL", self.somewhere())
+
+    def add(self) -> None:
+        if len(self.blender.beds()) < 3:
+            self.operator(bpy.ops.mesh.digital_clay_add, rows=11, columns=11)
+
+    def operator(self, operator: Any, *how: str, **properties: Any) -> None:
+        """Call an operator if it is willing."""
+        area, region = self.blender.view()
+        with bpy.context.temp_override(window=self.blender.window(), area=area, region=region):
+            willing = operator.poll()
+        if willing:
+            try:
+                self.blender.call(operator, *how, **properties)
+            except RuntimeError as error:
+                if not str(error).startswith("Error: "):  # what an operator reports is no fault
+                    raise
+
+    def start(self) -> None:
+        """Start a session, on a bed that is selected for it where that can be done."""
+        beds = self.blender.beds()
+        if beds and bpy.context.mode == "OBJECT":
+            self.blender.select(self.source.choice(beds))
+        self.operator(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+
+    def stop(self) -> None:
+        self.blender.key("ESC", self.somewhere())
+
+    def pause(self) -> None:
+        self.blender.key("P", self.somewhere())
+
+    def step(self) -> None:
+        self.blender.key("P", self.somewhere(), shift=True)
+
+    def rewind(self) -> None:
+        self.blender.key("BACK_SPACE", self.somewhere())
+
+    def reset(self) -> None:
+        self.blender.key("BACK_SPACE", self.somewhere(), shift=True)
+
+    def method(self) -> None:
+        methods = ["virtual_master", "cell_states", "plastic", "push_pull"]
+        for bed in self.blender.beds():
+            bed.digiclay.method = self.source.choice(methods)
+
+    def parameter(self) -> None:
+        for bed in self.blender.beds():
+            bed.digiclay.simulation.control_period = self.source.choice([5.0, 10.0])
+
+    def scale(self) -> None:
+        for bed in self.blender.beds():
+            bed.scale = self.source.choice([(1, 1, 1), (1, 1, 1), (2, 2, 2), (1, 2, 1), (0, 0, 0)])
+
+    def workspace(self) -> None:
+        name = self.source.choice(["Layout", "Layout", "Animation", "Modeling"])
+        self.blender.window().workspace = bpy.data.workspaces[name]
+
+    def scene(self) -> None:
+        if len(bpy.data.scenes) < 2:
+            bpy.data.scenes.new("Other")
+        self.blender.window().scene = self.source.choice([*bpy.data.scenes, bpy.data.scenes[0]])
+
+    def play(self) -> None:
+        self.operator(bpy.ops.screen.animation_play)
+
+    def duplicate(self) -> None:
+        if bpy.context.mode == "OBJECT" and len(self.blender.beds()) < 3:
+            self.operator(bpy.ops.object.duplicate, linked=self.source.random() < 0.5)
+
+    def save(self) -> None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.blender.OUT / "random.blend"))
+
+    def load(self) -> None:
+        if (self.blender.OUT / "random.blend").is_file():
+            bpy.ops.wm.open_mainfile(filepath=str(self.blender.OUT / "random.blend"))
+
+
+def check(blender: Any) -> None:
+    """Check that every session is a state that can be kept, and every bed shows finite pins."""
+    running, keeping = blender.part("running"), blender.part("core.keeping")
+    for session in running.all():
+        state = keeping.unpacked(session.system, session.kept)
+        height = state.row(0)
+        assert np.isfinite(height).all()
+        assert height.min() >= 0.0
+        assert height.max() <= session.system.cell.actuator.stroke
+        bed = blender.part("waiting").found(session.uid, session.name)
+        if bed is not None and not session.stale:
+            assert blender.part("bed_state").kept(bed) == session.kept
+    for bed in blender.beds():
+        if bed.mode == "OBJECT":
+            assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do random things, checking after each; then form a bed in peace."""
+    yield from blender.empty_scene()
+    blender.call(bpy.ops.mesh.digital_clay_add, rows=15, columns=15)
+    bpy.ops.ed.undo_push(message="Add")
+    blender.key("HOME", blender.middle())
+    yield None
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    source = random.Random(20)
+    events = Events(blender, source)
+    names = source.choices(list(CHOICES), weights=list(CHOICES.values()), k=EVENTS)
+    done: list[str] = []
+    blender.SEEN["done"] = done
+    live = 0
+    for name in names:
+        done.append(name)
+        getattr(events, name)()
+        yield 0.1
+        check(blender)
+        live += bool(blender.part("running").all())
+    blender.SEEN["live"] = live
+    blender.shot("session_random")
+
+    # Whatever state that was, somebody who goes on from it can sculpt.
+    blender.key("ESC", blender.middle())
+    yield 0.5
+    if bpy.context.screen.is_animation_playing:
+        blender.call(bpy.ops.screen.animation_cancel)
+    bpy.ops.wm.read_homefile()
+    yield 1.0
+    blender.call(bpy.ops.mesh.digital_clay_add, rows=15, columns=15)
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield from blender.settle()
+    blender.fingertip().location.z = 0.45
+    yield from blender.settle(5)
+    blender.look("formed")
+    blender.shot("session_after_random")
