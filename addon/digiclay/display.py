@@ -8,7 +8,7 @@ them there, so that there is one place they stand in.
 from collections.abc import Iterable
 from typing import Any
 
-from . import heat, overlay, properties, running, view
+from . import bed_state, heat, overlay, properties, running, view
 from .compat import bpy
 from .core.assembly import assemble
 from .core.errors import DigiclayError
@@ -18,8 +18,6 @@ from .node_arrows import LENGTH
 
 __all__ = ["Display", "pick", "picked", "register", "unregister"]
 
-#: Where a session keeps its state, see `handlers`.
-STATE = "digiclay_state"
 COLOURINGS = (
     ("mode", "Mode", "Colour the pins by what they do"),
     ("force", "Force", "Colour the pins by the force on them"),
@@ -57,10 +55,12 @@ def _rewrite(bed: Any) -> None:
     session = running.of(bed)
     if session is not None:
         view.show_state(bed, session.system, session.state)
-    elif bed.get(STATE) is not None:
+        return
+    kept = bed_state.kept(bed)
+    if kept is not None:
         try:
             system = assemble(properties.scene_of(bed))
-            view.show_state(bed, system, unpacked(system, bytes(bed[STATE])))
+            view.show_state(bed, system, unpacked(system, kept))
         except DigiclayError:
             # The settings have changed since the state was kept: what was last drawn stays.
             return

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import palettes, preferences, running
+from . import palettes, preferences, running, view
 from .aim import on_screen
 from .compat import bpy
 from .core.modes import Mode
@@ -85,6 +85,7 @@ def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, fl
         modes=np.bincount(session.state.mode(), minlength=len(Mode)),
         colours=tuple(colours[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
+        top=view.top_colour(bed) if view.shows_force(bed) else None,
     )
 
 

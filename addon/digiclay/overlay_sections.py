@@ -1,4 +1,4 @@
-"""The sections of the overlay: head, force against set point, heights of picked pins, modes.
+"""The sections of the overlay: head, force against set point, colours, heights of picked pins, modes.
 
 Each says how tall it is and draws itself. No Blender in here.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from . import heat
 from .core.modes import Mode
 from .overlay_look import Colour, Look
 from .overlay_picture import Box, Dot, Floats, Line, Picture, Words, axis, scaled
@@ -54,6 +55,8 @@ class Told:
         Of the modes, as the pins wear them.
     seconds : float
         How much of the past is shown, s.
+    top : float or None
+        Force from which on a pin has the last colour, N; None while the colours tell the modes.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Told:
     modes: NDArray[np.int64]
     colours: tuple[Colour, ...]
     seconds: float
+    top: float | None = None
 
     @property
     def window(self) -> tuple[float, float]:
@@ -185,6 +189,22 @@ def heights(told: Told, pen: Pen, top: float) -> None:
         _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
 
 
+def scale_height(told: Told) -> float:
+    """Return the height of the scale of colours, pixels at a UI scale of 1; 0 while none is needed."""
+    return 0.0 if told.top is None else 2.6 * ROW
+
+
+def scale(told: Told, pen: Pen, top: float) -> None:
+    """Draw the colours of the force on a pin."""
+    if told.top is None:
+        return
+    top = pen.row(top, "Force on a pin")
+    width, height = pen.width / len(heat.COLOURS), 0.5 * ROW * pen.scale
+    for place, colour in enumerate(heat.COLOURS):
+        pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, colour))
+    pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
+
+
 def modes_height(told: Told) -> float:
     """Return the height of the section of the modes, pixels at a UI scale of 1."""
     return ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2))
@@ -214,4 +234,10 @@ def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], tex
 
 
 #: From the top down: how tall each section is, and how it is drawn.
-SECTIONS = ((head_height, head), (force_height, force), (heights_height, heights), (modes_height, modes))
+SECTIONS = (
+    (head_height, head),
+    (force_height, force),
+    (scale_height, scale),
+    (heights_height, heights),
+    (modes_height, modes),
+)

@@ -29,8 +29,8 @@ from .parts import BED, ELLIPSOID, FINGERTIP, HOUSING, ROLE, material
 __all__ = [
     "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
     "arrow_length", "arrows_shown", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed", "is_drawn",
-    "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state", "top_colour",
-    "underside", "wants_force",
+    "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state", "shows_force",
+    "top_colour", "underside", "wants_force",
 ]  # fmt: skip
 
 #: What the colour of a pin can tell.
@@ -119,6 +119,11 @@ def top_colour(bed: Any) -> float:
     return float(node_setting(_modifier(bed), TOP_FORCE))
 
 
+def shows_force(bed: Any) -> bool:
+    """Tell whether the colours of the pins tell the force on them."""
+    return is_drawn(bed) and coloured_by(bed) == "force"
+
+
 def scale_colours(bed: Any, top: float) -> None:
     """Set the force from which on a pin has the last colour, N."""
     set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
@@ -150,7 +155,7 @@ def scale_arrows(bed: Any, length: float) -> None:
 
 def wants_force(bed: Any) -> bool:
     """Tell whether anything drawn needs the force on each pin."""
-    return is_drawn(bed) and (arrows_shown(bed) or coloured_by(bed) == "force")
+    return shows_force(bed) or (is_drawn(bed) and arrows_shown(bed))
 
 
 def is_drawn(bed: Any) -> bool:

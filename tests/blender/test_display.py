@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, display, overlay, palettes, properties, running, sculpting, view
+from digiclay import bed_state, bridge, display, overlay, palettes, properties, running, sculpting, view
 from digiclay.core.errors import DigiclayError
 from digiclay.core.modes import Mode
 
@@ -79,7 +79,7 @@ def test_turning_the_heat_map_on_shows_the_forces_of_now(bed: Any, session: runn
 def test_turning_arrows_on_after_a_session_shows_the_forces_it_ended_with(
     bed: Any, session: running.Running
 ) -> None:
-    bed[display.STATE] = session.kept
+    bed_state.write(bed, session)
     running.drop(session.uid)
     bed.digiclay_display.arrows = True
     np.testing.assert_allclose(forces(bed), session.state.row(session.system.rows.force), rtol=2.0**-23)

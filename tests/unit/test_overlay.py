@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay import heat
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.overlay_layout import free, laid_out
 from digiclay.overlay_look import LETTERS, LINES, contrast, look
@@ -83,6 +84,14 @@ def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
 def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
     words = said(laid_out(session(errors=(9e-12, 0.0)), look(DARK, LIGHT), ROOM, 1.0))
     assert "Solver error (estimate): < 0.01 µm, < 0.01 mN" in words
+
+
+def test_the_colours_of_the_force_are_explained_while_pins_wear_them() -> None:
+    plain = laid_out(session(), look(DARK, LIGHT), ROOM, 1.0)
+    hot = laid_out(session(top=0.2), look(DARK, LIGHT), ROOM, 1.0)
+    assert len(plain.boxes) == 1
+    assert [box.colour for box in hot.boxes[1:]] == list(heat.COLOURS)
+    assert "Force on a pin | 0 N | 0.2 N" in said(hot)
 
 
 def test_it_says_what_is_not_known_yet() -> None:

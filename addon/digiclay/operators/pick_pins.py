@@ -53,8 +53,8 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
 
     def _clicked(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under the mouse; a click beside the bed goes on to whatever lies there."""
-        region = next((part for part in context.area.regions if part.type == "WINDOW"), None)
-        if region is None or context.area.type != "VIEW_3D":
+        region = _under(context.area, event)
+        if region is None:
             return {"PASS_THROUGH"}
         with context.temp_override(region=region):
             found = aim.target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
@@ -69,6 +69,17 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
         else:
             self.changed = True
         return {"RUNNING_MODAL"}
+
+
+def _under(area: Any, event: Any) -> Any | None:
+    """Return the main region of a 3D view that the mouse is in; the view may be split into four."""
+    for region in area.regions if area.type == "VIEW_3D" else ():
+        inside = (
+            0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
+        )
+        if region.type == "WINDOW" and inside:
+            return region
+    return None
 
 
 class ClearPins(bpy.types.Operator):  # type: ignore[misc]
