@@ -6,10 +6,7 @@ sequencer makes the film of them: so a stop between two frames loses nothing but
 
 from __future__ import annotations
 
-import os
-import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +15,10 @@ from numpy.typing import NDArray
 
 from . import stage, view
 from .bridge import SCALE
-from .compat import bpy, quiet, scratch, strips, to_video
-from .core.errors import OutputError
+from .compat import bpy, scratch
 from .core.modes import Mode
-from .core.shots import Film, Moving, Turntable
+from .core.shots import Film, Turntable
+from .film_file import encoded, frames_beside
 from .instant import Instant
 from .render import draw, dress, hasten, picture_scene
 from .strip import SHARE, strip
@@ -78,7 +75,7 @@ def film(
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
-    with scratch(), _frames(out) as folder:
+    with scratch(), frames_beside(out) as folder:
         scene = picture_scene("Digital Clay Film", looks)
         hasten(scene)
         first = Instant.of(history, int(rows[0]), **sizes)
@@ -100,8 +97,8 @@ def film(
             if chart is not None:
                 chart.show(float(time[row]), float(force[row]))
 
-        drawn = _drawn(scene, folder, len(rows), show, progress, stopped)
-        return _encoded(drawn, out, looks) if drawn else None
+        drawn = _drawn(scene, folder, out, len(rows), show, progress, stopped)
+        return encoded(drawn, out, looks) if drawn else None
 
 
 def turntable(
@@ -126,7 +123,7 @@ def turntable(
     Path or None
         `out`; None when it was stopped.
     """
-    with scratch(), _frames(out) as folder:
+    with scratch(), frames_beside(out) as folder:
         scene = picture_scene("Digital Clay Turntable", looks)
         hasten(scene)
         bed = view.build(instant, scene.collection)
@@ -143,8 +140,8 @@ def turntable(
         def show(frame: int) -> None:
             bed.rotation_euler = (0.0, 0.0, float(angles[frame]))
 
-        drawn = _drawn(scene, folder, looks.frames, show, progress, stopped)
-        return _encoded(drawn, out, looks) if drawn else None
+        drawn = _drawn(scene, folder, out, looks.frames, show, progress, stopped)
+        return encoded(drawn, out, looks) if drawn else None
 
 
 def _seen(
@@ -176,22 +173,10 @@ def _about_z(points: Floats, angle: float) -> Floats:
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-@contextmanager
-def _frames(out: Path) -> Iterator[Path]:
-    """Give a folder for the frames beside the film, and take it away again."""
-    folder = out.with_name(f".{out.name}.{os.getpid()}.frames")
-    try:
-        folder.mkdir(parents=True)
-        yield folder
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def _drawn(
     scene: Any,
     folder: Path,
+    out: Path,
     count: int,
     show: Callable[[int], None],
     progress: Progress | None,
@@ -204,32 +189,7 @@ def _drawn(
             return []
         show(frame)
         files.append(folder / f"{frame:06d}.png")
-        draw(scene, files[-1])
+        draw(scene, files[-1], out)
         if progress:
             progress(frame + 1, count)
     return files
-
-
-def _encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
-    """Make a film of pictures that lie in one folder."""
-    scene = bpy.data.scenes.new("Digital Clay Frames")
-    scene.view_settings.view_transform = "Standard"
-    scene.frame_start, scene.frame_end = 1, len(frames)
-    render = scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = looks.width, looks.height, 100
-    render.fps, render.fps_base = looks.rate, 1.0
-    to_video(render)
-    partial = frames[0].with_name("film.mp4")
-    render.filepath = str(partial)
-    pictures = strips(scene).new_image("frames", str(frames[0]), channel=1, frame_start=1)
-    for path in frames[1:]:
-        pictures.elements.append(path.name)
-    try:
-        with quiet():
-            bpy.ops.render.render(animation=True, scene=scene.name)
-        if not partial.is_file() or not partial.stat().st_size:
-            raise OutputError(f"{out} cannot be written: Blender gave no film.")
-        os.replace(partial, out)
-    except RuntimeError as error:
-        raise OutputError(f"{out} cannot be written: {' '.join(str(error).split())}") from None
-    return out

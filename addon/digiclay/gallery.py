@@ -27,7 +27,7 @@ article div { padding: .6rem .8rem .8rem; }
 h2 { font-size: 1rem; margin: 0 0 .3rem; overflow-wrap: anywhere; }
 dl { display: grid; grid-template-columns: auto 1fr; gap: .1rem .8rem; margin: 0 0 .5rem; font-size: .87rem; }
 dt { color: var(--faded); } dd { margin: 0; text-align: right; font-variant-numeric: tabular-nums; }
-a { color: inherit; margin-right: .7rem; font-size: .87rem; }
+a { color: inherit; margin-right: .7rem; font-size: .87rem; } a.picture { margin: 0; }
 .failed { border-color: var(--bad); } .failed strong { color: var(--bad); }
 .failed span { overflow-wrap: anywhere; }
 """
@@ -46,6 +46,8 @@ class Card:
         What is measured, and its value with unit.
     links : sequence of (str, str)
         What a file is, and its path from the page.
+    leads : str
+        Path of what the thumbnail leads to; empty where it leads nowhere.
     error : str
         Why the job was not done; empty where it was.
     """
@@ -54,6 +56,7 @@ class Card:
     thumbnail: bytes = b""
     facts: Sequence[tuple[str, str]] = field(default_factory=tuple)
     links: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    leads: str = ""
     error: str = ""
 
 
@@ -93,12 +96,13 @@ def _picture(card: Card) -> str:
         return ""
     kind = "png" if card.thumbnail.startswith(b"\x89PNG") else "jpeg"
     data = base64.b64encode(card.thumbnail).decode("ascii")
-    return f'<img alt="{_safe(card.name)}" src="data:image/{kind};base64,{data}">'
+    shown = f'<img alt="{_safe(card.name)}" src="data:image/{kind};base64,{data}">'
+    return f'<a class="picture" href="{_safe(quote(card.leads))}">{shown}</a>' if card.leads else shown
 
 
 def _links(links: Sequence[tuple[str, str]]) -> str:
     """Return links to files beside the page."""
-    return "".join(f'<a href="{_safe(quote(path))}">{_safe(said)}</a>' for said, path in links)
+    return "\n".join(f'<a href="{_safe(quote(path))}">{_safe(said)}</a>' for said, path in links)
 
 
 def _safe(said: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ from .core.errors import OutputError
 from .core.shots import Picture, Still
 from .instant import Instant
 
-__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "still"]
+__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "still", "whole_picture", "why_not"]
 
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
+#: With less than this on a disk, bytes, a picture does not fit.
+SPACE = 2**20
 
 
 def still(
@@ -73,7 +76,7 @@ def still(
             bed = view.build(instant, scene.collection)
             dress(bed, looks)
             stage.set_up(scene, bed, instant)
-            draw(scene, partial)
+            draw(scene, partial, out)
         os.replace(partial, out)
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
@@ -88,8 +91,16 @@ def dress(bed: Any, looks: Picture) -> None:
     view.show_arrows(bed, looks.arrows)
 
 
-def draw(scene: Any, path: Path) -> None:
+def draw(scene: Any, path: Path, out: Path) -> None:
     """Draw a scene into a PNG file.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    path : Path
+        The file.
+    out : Path
+        What the user knows of it; messages name this.
 
     Raises
     ------
@@ -101,12 +112,23 @@ def draw(scene: Any, path: Path) -> None:
         path.touch()
         with quiet():
             bpy.ops.render.render(write_still=True, scene=scene.name)
-        if not path.stat().st_size:
-            raise OutputError(f"{path} cannot be written: Blender gave no picture.")
+        if not whole_picture(path.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {why_not(path)}.")
     except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from None
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
     except RuntimeError as error:
-        raise OutputError(f"{path} cannot be drawn: {' '.join(str(error).split())}") from None
+        raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
+
+
+def whole_picture(data: bytes) -> bool:
+    """Tell whether a PNG file has its end; Blender does not always tell when a disk is full."""
+    return data[-8:-4] == b"IEND"
+
+
+def why_not(path: Path) -> str:
+    """Return why Blender may not have written a file."""
+    full = shutil.disk_usage(path.parent).free < SPACE
+    return "no space is left on the disk" if full else "Blender wrote no whole file"
 
 
 def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import film as films
+from digiclay import film_file, render
 from digiclay.compat import scratch, strips
 from digiclay.core.errors import OutputError, ParameterError
 from digiclay.core.fingertip import LEVEL
@@ -178,3 +181,33 @@ def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, his
     with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
         films.film(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
     assert "\n" not in str(caught.value)
+
+
+def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any) -> None:
+    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.2))
+    assert path is not None
+    data = path.read_bytes()
+    assert film_file.whole_film(data)
+    assert not any(film_file.whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
+    still = render.still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
+    picture = still.read_bytes()
+    assert render.whole_picture(picture)
+    assert not any(
+        render.whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make a small disk")
+def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], capture_output=True)
+    if made.returncode:
+        pytest.skip("this machine does not let root mount a disk")
+    try:
+        with pytest.raises(OutputError, match=r"film\.mp4 cannot be written: [Nn]o space") as caught:
+            films.film(history, disk / "film.mp4", Film(**SMALL))
+        assert "\n" not in str(caught.value)
+        assert list(disk.iterdir()) == []
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

@@ -49,14 +49,12 @@ def read(made: str) -> Reader:
 
 
 def test_the_page_refers_to_nothing_but_files_beside_it() -> None:
-    card = Card(
-        "a", png(np.zeros((2, 2, 3), np.uint8)), [("lag", "1 mm")], [("film", "runs/a b/film #1.mp4")]
-    )
-    reader = read(
-        page("Batch", "1 of 1 jobs done.", [card, Card("b", error="it broke", links=[("log", "l")])])
-    )
-    assert reader.references[0].startswith("data:image/png;base64,")
-    assert reader.references[1:] == ["runs/a%20b/film%20%231.mp4", "l"]
+    picture = png(np.zeros((2, 2, 3), np.uint8))
+    done = Card("a", picture, [("lag", "1 mm")], [("film", "runs/a b/film #1.mp4")], leads="f.mp4")
+    failed = Card("b", error="it broke", links=[("log", "l")])
+    reader = read(page("Batch", "1 of 2 jobs done.", [done, failed]))
+    assert reader.references[1].startswith("data:image/png;base64,")
+    assert [reader.references[0], *reader.references[2:]] == ["f.mp4", "runs/a%20b/film%20%231.mp4", "l"]
 
 
 def test_names_and_errors_are_shown_as_they_are_and_never_as_html() -> None:

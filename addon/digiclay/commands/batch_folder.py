@@ -27,6 +27,8 @@ __all__ = ["JOBS", "LOGS", "MARK", "Folder", "opened"]
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
+#: What a thumbnail leads to: the first of these there is.
+SHOWN = ("film.mp4", "turntable.mp4", "still.png")
 #: What is told of a run: its figure, what it is called, factor and unit.
 FACTS: tuple[tuple[str, str, float, str], ...] = (
     ("method", "method", 0.0, ""),
@@ -129,7 +131,8 @@ class Folder:
             for path in sorted(run.iterdir())
             if path.name not in hidden
         ]
-        return Card(job.name, thumbnail, [fact for fact in facts if fact[1]], links)
+        shown = next((path for name in SHOWN for said, path in links if said == name), "")
+        return Card(job.name, thumbnail, [fact for fact in facts if fact[1]], links, shown)
 
 
 @contextmanager
