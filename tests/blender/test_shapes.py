@@ -152,6 +152,23 @@ def test_what_is_formed_becomes_the_shape_and_goes_again() -> None:
     assert properties.scene_of(made).shape is None
 
 
+def test_a_mesh_made_of_the_clay_is_the_same_clay_when_it_goes_in_again() -> None:
+    made = bed()
+    cube(1.0, 1.0)
+    assert bpy.ops.digiclay.shape_from_object(scale=0.6) == {"FINISHED"}
+    shown = heights(made)
+    assert bpy.ops.mesh.digital_clay_make(kind="solid", beside=False) == {"FINISHED"}
+    mesh = bpy.context.object
+    assert not view.is_bed(mesh)
+    bpy.ops.object.select_all(action="DESELECT")
+    other = bed()
+    other.location = made.location
+    mesh.select_set(True)
+    assert bpy.ops.digiclay.shape_from_object(fit="placed") == {"FINISHED"}
+    # Twice the dead band, and 32 bits.
+    assert np.abs(heights(other) - shown).max() <= 2 * SHOWN
+
+
 # Refusals
 
 

@@ -43,6 +43,12 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.shape_keep, "EXEC_DEFAULT", True)
     yield None
     blender.SEEN["kept"] = len(blender.beds()[0].digiclay.shape.heights)
+    blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="solid", beside=False)
+    yield None
+    mesh = blender.window().view_layer.objects.active
+    blender.SEEN["mesh"] = max(vertex.co.z for vertex in mesh.data.vertices) / blender.part("bridge").SCALE
+    blender.key("Z", blender.middle(), ctrl=True)
+    yield None
 
     blender.key("Z", blender.middle(), ctrl=True)
     yield None

@@ -39,6 +39,10 @@ def test_what_was_formed_is_kept_and_keeping_is_one_undo_step(seen: dict[str, An
     assert seen["keeping undone"] == "ripple"
 
 
+def test_what_was_formed_is_made_a_mesh(seen: dict[str, Any]) -> None:
+    assert seen["mesh"] == pytest.approx(seen["formed"]["heights"][1], abs=1e-7)
+
+
 def test_a_sample_is_added_and_taken_back_as_one_step(seen: dict[str, Any]) -> None:
     assert (seen["beds"], seen["beds after undo"]) == (2, 1)
 

@@ -32,6 +32,7 @@ class Shapes(Panel, bpy.types.Panel):  # type: ignore[misc]
             self._displayed(settings)
         column = self.layout.column(align=True)
         column.operator("digiclay.shape_keep", icon="PINNED")
+        column.operator("mesh.digital_clay_make", icon="OUTLINER_OB_MESH")
 
     def _displayed(self, settings: Any) -> None:
         """Draw what is displayed, and how the surface gets there."""
