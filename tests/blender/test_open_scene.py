@@ -57,6 +57,12 @@ def test_a_scene_file_opens_from_the_file_dialog(tmp_path: Path) -> None:
     assert len(bpy.context.object.data.vertices) == 121
 
 
+def test_a_dropped_file_opens_without_a_dialog() -> None:
+    path = str(SAMPLES / "stamp.toml")
+    assert bpy.ops.digiclay.open_scene("INVOKE_DEFAULT", filepath=path) == {"FINISHED"}
+    assert bpy.context.object.name == "stamp"
+
+
 def test_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path: Path) -> None:
     path = tmp_path / "long.toml"
     path.write_text("[simulation]\nduration = 3600", encoding="utf-8")

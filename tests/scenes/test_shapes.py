@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.assembly import assemble
+from digiclay.core.keeping import packed, unpacked
 from digiclay.core.methods import METHODS
 from digiclay.core.modes import Mode
 from digiclay.core.scene_file import find, load
@@ -118,6 +120,20 @@ def test_a_session_without_a_shape_is_what_it_was_before() -> None:
     one, other = run(plain).history, run(level).history
     assert np.array_equal(one["height"], other["height"])
     assert one["total_force"].max() > 0.1
+
+
+@pytest.mark.parametrize("moment", [0.3, 3.0])
+@pytest.mark.parametrize("method", EDITING)
+def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) -> None:
+    # While the shape is coming up, and while the finger presses it.
+    made = scene(method)
+    system, way = assemble(made), made.trajectory.trajectory()
+    (state,) = deque(periods(system, way, begin(system), round(moment / PERIOD)), maxlen=1)
+    again = unpacked(system, packed(system, state))
+    (one,) = deque(periods(system, way, state, 40), maxlen=1)
+    (other,) = deque(periods(system, way, again, 40), maxlen=1)
+    assert np.array_equal(one.row(0), other.row(0))
+    assert packed(system, one) == packed(system, other)
 
 
 def test_a_hand_over_counts_the_finger_s_losses() -> None:
