@@ -1,0 +1,149 @@
+"""File > Export > Digital Clay: what was formed in a bed as a mesh file."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from pathlib import Path
+from typing import Any
+
+from .. import formed_bed
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..core.export import FORMATS, UNITS, suffix, write
+from ..core.export_model import bodies
+from ..panels.base import bed_of
+from .surface_options import SurfaceOptions, chosen, needs_surface, sentence
+
+__all__ = ["ExportMenu", "ExportMesh", "entry"]
+
+#: Entries of the menu: words, icon, and the properties they stand for.
+ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("Solid for printing (.3mf)", "MESH_CUBE", {"kind": "solid", "file_format": "3mf"}),
+    ("Solid, smooth (.stl)", "MESH_ICOSPHERE", {"kind": "solid", "skin": "smooth", "file_format": "stl"}),
+    ("Pins, stepped (.stl)", "SORTSIZE", {"kind": "pins", "file_format": "stl"}),
+    ("Surface with its features as groups (.obj)", "SURFACE_DATA", {"kind": "surface", "file_format": "obj"}),
+    ("Surface with force and mode (.ply)", "POINTCLOUD_DATA", {"kind": "surface", "file_format": "ply"}),
+    ("Bosses and creases, a file each (.stl)", "MOD_BOOLEAN",
+     {"kind": "features", "file_format": "stl", "separate": True}),
+    ("Solid for the web (.glb)", "WORLD", {"kind": "solid", "skin": "smooth", "file_format": "glb"}),
+)  # fmt: skip
+
+
+class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
+    """Write what was formed in the active bed as a mesh file"""
+
+    bl_idname = "export_mesh.digital_clay"
+    bl_label = "Export Digital Clay"
+    bl_options = {"PRESET"}  # noqa: RUF012
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})  # type: ignore[valid-type]
+    check_existing: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        default=True, options={"HIDDEN", "SKIP_PRESET"}
+    )
+    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+        default="*.stl;*.obj;*.ply;*.glb;*.3mf", options={"HIDDEN", "SKIP_PRESET"}
+    )
+    file_format: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Format",
+        description="Format of the file",
+        items=[(name, name.upper().replace("_", " "), sentence(said)) for name, said in FORMATS.items()],
+        default="stl",
+    )
+    unit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Unit",
+        description="Length unit of the file; a GLB is always in metres",
+        items=[(name, name, f"Lengths in {name}") for name in UNITS],
+        default="mm",
+    )
+    separate: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="A File Each", description="Write each feature into a file of its own", default=False
+    )
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed."""
+        return needs_surface(cls, context)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask for the file, named after the bed."""
+        folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
+        name = bpy.path.clean_name(bed_of(context).name)
+        self.filepath = str(folder / f"{name}{suffix(self.file_format)}")
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def check(self, context: Any) -> bool:
+        """Keep the ending of the name that of the format."""
+        wanted = str(self._file())
+        changed = wanted != self.filepath
+        self.filepath = wanted
+        return changed
+
+    def draw(self, context: Any) -> None:
+        """Draw the options beside the file browser."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "file_format")
+        row = layout.row()
+        row.active = self.file_format != "glb"
+        row.prop(self, "unit", expand=True)
+        self.draw_surface(layout)
+        row = layout.row()
+        row.active = self.kind == "features"
+        row.prop(self, "separate")
+
+    def execute(self, context: Any) -> set[str]:
+        """Write the file, or the files."""
+        target = self._file()
+        try:
+            bed = chosen(context)
+            made = bodies(formed_bed.formed(bed), self.model(bed), self.finding())
+            files = [(target, made)]
+            if self.separate and self.kind == "features":
+                ending = suffix(self.file_format)
+                stem = target.name.removesuffix(ending)
+                files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
+            for path, some in files:
+                write(some, path, self.unit, self.file_format)
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        told = f"{len(files)} files beside {target}" if len(files) > 1 else str(files[0][0])
+        self.report({"INFO"}, f"Written: {told}")
+        return {"FINISHED"}
+
+    def _file(self) -> Path:
+        """Return the file with the ending of its format, in place of that of another format."""
+        path = Path(bpy.path.abspath(self.filepath or "digital_clay"))
+        ending = suffix(self.file_format)
+        if path.name.lower().endswith(ending) and not (ending == ".stl" and _is_text(path)):
+            return path
+        known = sorted((suffix(name) for name in FORMATS), key=len, reverse=True)
+        other = next((end for end in known if path.name.lower().endswith(end)), "")
+        return path.with_name(path.name[: len(path.name) - len(other)] + ending)
+
+
+def _is_text(path: Path) -> bool:
+    """Tell whether a name is that of an STL as text, which ends like that of a binary one."""
+    return path.name.lower().endswith(suffix("stl_ascii"))
+
+
+class ExportMenu(bpy.types.Menu):  # type: ignore[misc]
+    """What is often wanted, and a dialog for all else"""
+
+    bl_idname = "DIGICLAY_MT_export"
+    bl_label = "Digital Clay"
+
+    def draw(self, context: Any) -> None:
+        """Draw an entry for each."""
+        self.layout.operator_context = "INVOKE_DEFAULT"
+        for words, icon, told in ENTRIES:
+            entry = self.layout.operator(ExportMesh.bl_idname, text=words, icon=icon)
+            for name, value in {"skin": "bilinear", "separate": False, **told}.items():
+                setattr(entry, name, value)
+        self.layout.separator()
+        self.layout.operator(ExportMesh.bl_idname, text="Other ...")
+
+
+def entry(menu: Any, context: Any) -> None:
+    """Draw the entry in File > Export."""
+    menu.layout.menu(ExportMenu.bl_idname, icon="MESH_GRID")

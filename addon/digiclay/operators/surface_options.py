@@ -1,0 +1,133 @@
+"""Properties of the operators that make meshes of a formed surface: what is made, and what is a feature."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from typing import Any
+
+from .. import formed_bed
+from ..compat import bpy
+from ..core.errors import OutputError
+from ..core.export_model import KINDS, Model
+from ..core.features import Finding
+from ..core.quantity import quantities
+from ..core.skins import SKINS
+from ..panels.base import bed_of
+
+__all__ = ["FindingOptions", "SurfaceOptions", "needs_surface"]
+
+MODEL, FINDING = quantities(Model), quantities(Finding)
+
+
+def needs_surface(operator: Any, context: Any) -> bool:
+    """Tell whether there is a bed with a surface; if not, the operator says why."""
+    bed = bed_of(context)
+    if bed is None:
+        operator.poll_message_set("Select a bed of Digital Clay, or its fingertip")
+        return False
+    if len(bed.data.vertices) < 4:
+        operator.poll_message_set("A bed needs at least 2 x 2 pins to have a surface")
+        return False
+    return True
+
+
+def sentence(text: str) -> str:
+    """Return a text as a tooltip: with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+class FindingOptions:
+    """What counts as a feature."""
+
+    threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Threshold (mm)",
+        description=sentence(FINDING["threshold"].doc) + ", in mm",
+        default=Finding().threshold * 1e3,
+        min=0.001,
+        max=100.0,
+        precision=3,
+        step=10,
+    )
+    smallest: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Smallest (pins)",
+        description=sentence(FINDING["smallest"].doc),
+        default=Finding().smallest,
+        min=1,
+        max=1_000_000,
+        soft_max=100,
+    )
+
+    def finding(self) -> Finding:
+        """Return what counts as a feature."""
+        return Finding(threshold=float(f"{self.threshold:.7g}") * 1e-3, smallest=self.smallest)
+
+
+class SurfaceOptions(FindingOptions):
+    """What is made of a surface."""
+
+    kind: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Mesh",
+        description="What is made of the formed surface",
+        items=[(name, sentence(name), sentence(said)) for name, said in KINDS.items()],
+        default=Model().kind,
+    )
+    skin: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Skin",
+        description="What the surface is between the pins",
+        items=[(name, sentence(name), sentence(said)) for name, said in SKINS.items()],
+        default=Model().skin,
+    )
+    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Points a Pitch",
+        description=sentence(MODEL["resolution"].doc),
+        default=0,
+        min=0,
+        max=64,
+        soft_max=16,
+    )
+    base_thickness: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Base (mm)",
+        description=sentence(MODEL["base_thickness"].doc) + ", in mm",
+        default=Model().base_thickness * 1e3,
+        min=0.01,
+        max=1000.0,
+        soft_max=50.0,
+        precision=2,
+        step=10,
+    )
+
+    def model(self, bed: Any) -> Model:
+        """Return what is to be made of a bed."""
+        return formed_bed.model(
+            bed,
+            kind=self.kind,
+            skin=self.skin,
+            resolution=self.resolution,
+            base_thickness=float(f"{self.base_thickness:.7g}") * 1e-3,
+        )
+
+    def draw_surface(self, layout: Any) -> None:
+        """Draw the properties; those without effect on what is made are greyed out."""
+        layout.prop(self, "kind")
+        column = layout.column()
+        column.active = self.kind != "pins"
+        column.prop(self, "skin")
+        column.prop(self, "resolution")
+        row = layout.row()
+        row.active = self.kind in ("solid", "pins")
+        row.prop(self, "base_thickness")
+        column = layout.column(heading="Features")
+        column.prop(self, "threshold")
+        column.prop(self, "smallest")
+
+
+def chosen(context: Any) -> Any:
+    """Return the bed to work on.
+
+    Raises
+    ------
+    OutputError
+        When it has gone since the operator was called.
+    """
+    bed = bed_of(context)
+    if bed is None:
+        raise OutputError("There is no bed any more: select one, or its fingertip.")
+    return bed
