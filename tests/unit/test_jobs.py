@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from digiclay.core.errors import SceneError
 from digiclay.core.job_outputs import Outputs
 from digiclay.core.jobs import batch, job_outputs
+from digiclay.core.layout import grid
 from digiclay.core.scene_file import SAMPLES, load
+from digiclay.core.scene_table import text
+from digiclay.core.shape_file import fitted_to
 from digiclay.core.shots import Film, Still, Turntable
 
 
@@ -116,6 +120,24 @@ def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
     assert job_outputs(path) == made
     path.write_text(Outputs().text(), encoding="utf-8")
     assert job_outputs(path) == Outputs()
+
+
+def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
+    np.save(tmp_path / "own.npy", np.arange(25.0).reshape(5, 5))
+    said = 'control = "absent"\nlayout = { rows = 5, columns = 5 }\nshape.file = "own.npy"\n'
+    (tmp_path / "shaped.toml").write_text(said, encoding="utf-8")
+    path = jobs_file(tmp_path, 'scenes = ["shaped.toml"]')
+    (job,) = batch(path).jobs
+    assert job.scene is not None
+    assert job.scene.shape is not None
+    (tmp_path / "far").mkdir()
+    (tmp_path / "far" / "scene.toml").write_text(text(job.scene), encoding="utf-8")
+    wanted = fitted_to(job.scene.shape, grid(job.scene.layout), job.scene.actuator).heights
+    (tmp_path / "own.npy").unlink()
+    alone = load(tmp_path / "far" / "scene.toml")
+    assert alone.shape is not None
+    np.testing.assert_array_equal(fitted_to(alone.shape, grid(alone.layout), alone.actuator).heights, wanted)
+    assert np.ptp(wanted) > 1e-3
 
 
 def test_the_sample_batch_makes_eight_sound_jobs() -> None:

@@ -9,16 +9,19 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from .errors import ParameterError, SceneError
 from .job_outputs import KEYS, Outputs, outputs, word
+from .layout import grid
 from .methods import METHODS
 from .part_table import refuse_unknown, shown
 from .scene import Scene
 from .scene_file import SAMPLES, Setting, find, load, read_table
+from .shape_file import fitted_to
+from .shape_text import packed
 
 __all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_outputs"]
 
@@ -180,9 +183,17 @@ def _job(file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
         raise ParameterError("settings", label, f"must make names of at most {LONGEST} letters", repr(name))
     chosen = [Setting("control.method", word(method), "methods")] if method else []
     try:
-        return Job(name, load(file, [*chosen, *changes]))
-    except SceneError as error:
-        return Job(name, None, str(error))
+        return Job(name, _alone(load(file, [*chosen, *changes])))
+    except (SceneError, ParameterError) as error:
+        return Job(name, None, " ".join(str(error).split()))
+
+
+def _alone(scene: Scene) -> Scene:
+    """Return a scene with the heights of its shape in it, so that it needs no other file."""
+    if scene.shape is None or scene.shape.heights:
+        return scene
+    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
 
 
 def _refuse_one_name_for_two(jobs: tuple[Job, ...]) -> None:
