@@ -69,10 +69,11 @@ class ShapeMesh:
     @cached_property
     def closed(self) -> bool:
         """Whether every edge belongs to two triangles: the mesh has an inside."""
-        _, merged = np.unique(self.vertices + 0.0, axis=0, return_inverse=True)
-        corners = merged.ravel()[self.faces]
-        edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
-        _, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+        corners = _merged(self.vertices)[self.faces]
+        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+        # One number an edge, whichever way it runs.
+        edges = np.minimum(start, end) * len(self.vertices) + np.maximum(start, end)
+        _, count = np.unique(edges[start != end], return_counts=True)
         return bool(np.all(count == 2))
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
@@ -118,6 +119,15 @@ class ShapeMesh:
             face, one, two = face[inside], one[inside], two[inside]
             low = z[face, 0]
             yield cell[inside], low + one * (z[face, 1] - low) + two * (z[face, 2] - low)
+
+
+def _merged(vertices: Floats) -> Indices:
+    """Return a number for each vertex, the same for those at the same place, as in an STL."""
+    order = np.lexsort(vertices.T)
+    placed = vertices[order]
+    number = np.empty(len(vertices), np.int64)
+    number[order] = np.cumsum(np.append(False, np.any(placed[1:] != placed[:-1], axis=1)))
+    return number
 
 
 def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, Indices, Indices]:
