@@ -17,7 +17,7 @@ from .compat import bpy
 from .core.modes import Mode
 from .overlay_layout import Room, free, laid_out
 from .overlay_look import Look, look
-from .overlay_picture import Dot
+from .overlay_picture import Dot, Picture
 from .overlay_sections import Told
 
 __all__ = ["follow", "redraw", "shown", "stop", "told"]
@@ -142,17 +142,20 @@ def _draw() -> None:
     chosen = look(tuple(theme.inner[:3]), tuple(theme.text))
     scale = settings.system.ui_scale
     picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
-    picture.dots[:0] = _marks(context, bed, session, chosen, scale)
+    picture.dots += _marks(context, bed, session, chosen, picture, scale)
     overlay_draw.draw(picture, context.region.width, context.region.height)
 
 
-def _marks(context: Any, bed: Any, session: running.Running, colours: Look, scale: float) -> list[Dot]:
-    """Return a dot on every picked pin, in the colour of its curve."""
+def _marks(
+    context: Any, bed: Any, session: running.Running, colours: Look, picture: Picture, scale: float
+) -> list[Dot]:
+    """Return a dot on every picked pin that the picture does not cover, in the colour of its curve."""
     pins = session.trace.pins
     cells = session.system.grid.positions[list(pins)]
     places = on_screen(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
     marks = []
     for (x, y), colour in zip(places, colours.pins, strict=False):
-        if math.isfinite(x):
+        hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in picture.boxes)
+        if math.isfinite(x) and not hidden:
             marks += [Dot(x, y, 5.5 * scale, colours.back), Dot(x, y, 4.0 * scale, colour)]
     return marks

@@ -12,6 +12,8 @@ __all__ = ["free", "laid_out"]
 WIDTH, MARGIN, PADDING = 290.0, 12.0, 10.0
 #: Opacity of the box behind it all: the bed shines through a little.
 BACK_ALPHA = 0.95
+#: Most of the room's height that is taken: the bed is what one looks at.
+SHARE = 0.75
 
 #: Left, bottom, right and top of a part of the view, pixels.
 Room = tuple[float, float, float, float]
@@ -49,7 +51,7 @@ def laid_out(told: Told, look: Look, room: Room, scale: float) -> Picture:
     left, bottom, right, top = room
     width, margin, padding = WIDTH * scale, MARGIN * scale, PADDING * scale
     sections = [(height(told) * scale, draw) for height, draw in SECTIONS]
-    while sections and sum(height for height, _ in sections) > top - bottom - 2 * (margin + padding):
+    while sections and sum(height for height, _ in sections) > SHARE * (top - bottom) - 2 * padding:
         sections.pop()
     picture = Picture()
     if not sections or right - left < width + 2 * margin:
