@@ -81,3 +81,17 @@ def test_what_cannot_be_done_is_told_in_one_line(words: tuple[str, ...], command
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert done.stderr.strip()
+
+
+def test_a_batch_starts_blender_once_more_for_each_job(command: Command, tmp_path: Path) -> None:
+    jobs = tmp_path / "erste Übung.toml"
+    jobs.write_text(
+        'scenes = ["tap"]\nmethods = ["virtual_master", "cell_states"]\nerrors = false\nexport = ["stl"]\n'
+        "settings.short.simulation.duration = 0.3\n[film]\nwidth = 160\nheight = 100\nrate = 10\n",
+        encoding="utf-8",
+    )
+    done = command("digiclay", "batch", str(jobs), "--out", str(tmp_path / "out"), "--jobs", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 of 2 jobs done" in done.stdout
+    for run in (tmp_path / "out" / "runs").iterdir():
+        assert {"film.mp4", "surface.stl", "metrics.json"} <= {file.name for file in run.iterdir()}
