@@ -143,7 +143,6 @@ def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
     with pytest.raises(SceneError) as caught:
         find("ridge_mund_valley")
     assert str(caught.value) == (
-        "ridge_mund_valley is neither a file nor a sample (elastic_press, force_display, plastic_press, "
-        "push_pull, ridge_mound_valley, shape_display, slow_press, tap, viscous_press). "
+        f"ridge_mund_valley is neither a file nor a sample ({', '.join(sample_names())}). "
         "Did you mean ridge_mound_valley?"
     )
