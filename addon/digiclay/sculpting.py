@@ -66,14 +66,14 @@ def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
     """Return the state to go on from, and what could not be taken up."""
     if kept is None:
         return begin(system), ""
-    try:
-        return unpacked(system, kept), ""
-    except StateError:
-        pass  # of other parts, perhaps: then the heights at least can be had
-    try:
-        return carried(system, kept), CHANGED
-    except StateError as error:
-        return begin(system), f"The bed begins at rest. {error}"
+    # The state of other parts has heights at least; what has none is of no use.
+    refused = ""
+    for read, said in ((unpacked, ""), (carried, CHANGED)):
+        try:
+            return read(system, kept), said
+        except StateError as error:
+            refused = f"The bed begins at rest. {error}"
+    return begin(system), refused
 
 
 def advanced(

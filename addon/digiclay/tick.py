@@ -156,7 +156,10 @@ def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str
         if session.stale:
             at, moment = bed_state.pose(bed), bed_state.moment(bed)
             at = session.pose if at is None else at
+            recorded = session.recording is not None
             session = sculpting.restored(session, bed_state.kept(bed), at, moment)
+            if recorded and session.recording is None:
+                said = "The recording ended: undo went back to before it, or redo to what it did not lead to"
     except DigiclayError as error:
         return str(error), session, said
     return "", session, said

@@ -302,7 +302,7 @@ def test_a_linked_duplicate_gets_pins_of_its_own(bed: Any, clock: Clock) -> None
     notes = tick.start(bpy.context, copy)
     assert any("pins of its own" in note.words for note in notes)
     press(copy, clock)
-    assert (shown(bed) == np.float32(0.4) / 10).all()
+    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
 
 
 def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
@@ -554,3 +554,15 @@ def test_recorded_poses_are_those_of_the_fingertip(bed: Any, clock: Clock) -> No
     path = running.of(bed).path
     np.testing.assert_allclose(path[-1], [6e-3, 0, 40e-3, 1, 0, 0, 0], rtol=0, atol=FLOAT32)
     assert len(path) == pytest.approx(1 + 3 * TICK / 5e-3, abs=1)
+
+
+def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bpy.ops.ed.undo_push(message="Start")
+    press(bed, clock)
+    bpy.ops.ed.undo_push(message="Press")
+    running.put(sculpting.recording(running.of(bed), True))
+    clock.tick(3)
+    bpy.ops.ed.undo()
+    assert ["recording ended" in note.words for note in clock.tick()] == [True]
+    assert running.of(only_bed()).path is None

@@ -151,6 +151,9 @@ def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
         (b'"arrays": []', b'"arrays": [["O", [1]]]'),
         (b'"rows": [', b'"rows": ["a", '),
         (b'"reach": [', b'"reach": [1, '),
+        (b'"memory"', b'"m"'),
+        (b'"memory": ', b'"memory": ' + b"[" * 100_000),
+        (b'"period": 70', b'"period": 1' + b"0" * 400),
     ],
 )
 def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -247,6 +248,22 @@ def test_a_long_recording_copies_itself_seldom() -> None:
         arrays.add(id(keep.rows))
     assert len(keep.path) == 35001
     assert len(arrays) < 12
+
+
+def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
+    hand, session = Hand(), started()
+    circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 60)]
+    session = hand.move(session, [*circle * 8])  # longer than the trace's ten seconds, so that it is full
+    tracemalloc.start()
+    try:
+        session = hand.move(session, circle)
+        before, _ = tracemalloc.get_traced_memory()
+        session = hand.move(session, circle * 4)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # A state kept for a gesture more or less, of at most 20: 25 kB each.
+    assert after - before < 100_000
 
 
 def test_a_finger_far_below_the_floor_or_far_away_does_no_harm() -> None:

@@ -165,8 +165,9 @@ def _read(data: bytes) -> Kept:
         numbers += [*_four(held["reach"]), *_four(held["control"])]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
         kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
-        sound = all(math.isfinite(number) for number in numbers) and held["near"] <= taken
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+        # A memory of nothing is None; one that is not there at all is damage.
+        sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise _unusable(f"is damaged: {type(error).__name__}") from None
     if not sound or not _sound(kept, cells):
         raise _unusable("holds numbers that no state has")
@@ -200,8 +201,8 @@ def _sound(kept: Kept, count: int) -> bool:
 
 
 def _whole(value: Any) -> int:
-    """Return a whole number from 0 on."""
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+    """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
         raise ValueError(f"no count: {value!r}")
     return value
 

@@ -33,7 +33,7 @@ class Session(bpy.types.Operator):  # type: ignore[misc]
             why = "The bed is linked from another file: make it local first (Object > Relations)"
         elif is_baked(bed):
             why = "The bed plays a baked session: free the bake in the Takes panel first"
-        elif bpy.app.background:
+        elif bpy.app.background or context.window is None:
             why = "A live session needs a window; takes can be baked without"
         else:
             return True

@@ -1,0 +1,78 @@
+"""Whatever is done to kept bytes, they are a state or refused: nothing else happens."""
+
+from __future__ import annotations
+
+import numpy as np
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import StateError
+from digiclay.core.keeping import carried, packed, unpacked
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import advance, approaches, begin, periods
+from digiclay.core.state import State
+from digiclay.core.trajectory import along
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.assemble import path
+
+SYSTEM = assemble(resolve({"layout": {"rows": 6, "columns": 10}}))
+*_, LAST = periods(SYSTEM, path((0, 0, 0, 42), (0.2, 0, 0, 37)), begin(SYSTEM), 50)
+KEPT = packed(SYSTEM, LAST)
+FINGER = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1))
+
+
+def goes_on(state: State) -> bool:
+    """Tell whether a state can be simulated and kept again."""
+    (finger,) = approaches(SYSTEM, along(FINGER, SYSTEM.instants / SYSTEM.period))
+    return bool(packed(SYSTEM, advance(SYSTEM, state, finger)))
+
+
+def read(data: bytes) -> None:
+    """Take up bytes both ways; the only thing to go wrong is that they are refused."""
+    for take_up in (unpacked, carried):
+        refused = ""
+        try:
+            state = take_up(SYSTEM, data)
+        except StateError as error:
+            refused = str(error)
+        assert "\n" not in refused
+        assert refused or np.isfinite(state.row(0)).all()
+
+
+@settings(max_examples=300)
+@given(st.integers(0, len(KEPT) - 1), st.integers(0, 255))
+def test_a_byte_that_is_changed_is_noticed_or_makes_another_state(at: int, value: int) -> None:
+    data = bytearray(KEPT)
+    data[at] = value
+    read(bytes(data))
+
+
+@settings(max_examples=300)
+@given(st.integers(0, 700), st.binary(max_size=12))
+def test_bytes_that_are_changed_in_the_header_are_noticed_or_make_another_state(at: int, some: bytes) -> None:
+    read(KEPT[:at] + some + KEPT[at + len(some) :])
+
+
+@given(st.integers(0, len(KEPT)), st.binary(max_size=40))
+def test_bytes_that_are_cut_or_added_are_noticed(at: int, some: bytes) -> None:
+    read(KEPT[:at] + some + KEPT[at:])
+    read(KEPT[:at])
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_noticed(some: bytes) -> None:
+    read(some)
+    read(KEPT[:17] + some)
+
+
+@settings(max_examples=20)
+@given(st.lists(st.tuples(st.integers(-100, 100), st.integers(340, 480)), min_size=2, max_size=5))
+def test_a_state_anywhere_in_a_session_is_taken_up_exactly(spots: list[tuple[int, int]]) -> None:
+    times = np.linspace(0.0, 0.4, len(spots))
+    way = path(*[(t, x / 10, 0, z / 10) for t, (x, z) in zip(times, spots, strict=True)])
+    for state in periods(SYSTEM, way, begin(SYSTEM), 80):
+        if state.period % 20 == 0:
+            data = packed(SYSTEM, state)
+            again = unpacked(SYSTEM, data)
+            assert packed(SYSTEM, again) == data
+            assert goes_on(again)
