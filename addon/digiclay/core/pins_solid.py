@@ -8,7 +8,7 @@ make: they are joined by a bridge as narrow as `BRIDGE`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,15 @@ Codes = NDArray[np.int64]
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05
 #: Who is beyond the edge of the bed.
-OUTSIDE = -1
+NOBODY = -1
+#: Heights above the base are taken to the nearest multiple of this, m: a wall lower than a file's float32
+#: can hold would have no area there.
+STEP = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """The bed divided into parts, one a pin.
+    """The bed divided into parts, one a pin; the sides of a part stand one after the other.
 
     Attributes
     ----------
@@ -38,15 +41,17 @@ class Parts:
         Where the parts meet, m.
     start, end : ndarray of int (e,)
         Corners of each side of each part; the part is to the left.
-    pin, other : ndarray of int (e,)
-        Whose side it is, and who is beyond it; -1 is nobody.
+    pin : ndarray of int (e,)
+        Whose side it is.
+    twin : ndarray of int (e,)
+        The same side seen from the part beyond; -1 at the edge of the bed.
     """
 
     corner: Floats
     start: Codes
     end: Codes
     pin: Codes
-    other: Codes
+    twin: Codes
 
 
 def parts(formed: Formed) -> Parts:
@@ -58,11 +63,11 @@ def parts(formed: Formed) -> Parts:
     real = start != end
     start, end, pin = start[real], end[real], pin[real]
     size = len(corner)
-    order = np.argsort(start * size + end)
-    sides = (start * size + end)[order]
-    found = np.minimum(np.searchsorted(sides, end * size + start), len(sides) - 1)
-    met = sides[found] == end * size + start
-    return Parts(corner, start, end, pin, np.where(met, pin[order[found]], OUTSIDE))
+    sides = start * size + end
+    order = np.argsort(sides)
+    found = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
+    twin = order[found]
+    return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, NOBODY))
 
 
 def pins_solid(
@@ -79,71 +84,58 @@ def pins_solid(
     Returns
     -------
     vertices : ndarray (v, 3)
-        m; first the middle of each pin's top in their order.
+        m; first the middle of each pin's top in their order, to 0.1 µm.
     faces : ndarray of int (f, 3)
         Counter-clockwise seen from outside.
     pin : ndarray of int (f,)
         Whose top, wall or underside a face is.
     """
     level = base_level(formed.height, base=base, base_thickness=base_thickness)
-    made, n = parts(formed), len(formed.height)
-    height = np.append(formed.height, level)  # of nobody, number -1
+    steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
+    height = level + steps * STEP
+    made, n = parts(replace(formed, height=height)), len(steps)
     # Each corner has a vertex at the height of every part about it, and one of the base.
-    k = len(made.corner)
-    at = np.concatenate([made.start, np.arange(k)])
-    z = np.concatenate([height[made.pin], np.full(k, level)])
-    order = np.lexsort((z, at))
-    new = np.ones(len(order), bool)
-    new[1:] = (np.diff(at[order]) != 0) | (np.diff(z[order]) != 0.0)
-    number = np.empty(len(order), np.int64)
-    number[order] = np.cumsum(new) - 1 + 2 * n
+    k, above = len(made.corner), int(steps.max()) + 1
+    keys = np.concatenate([made.start * above + steps[made.pin], np.arange(k) * above])
+    names, number = np.unique(keys, return_inverse=True)
+    number = number.ravel() + 2 * n
     own, ground = number[: len(made.start)], number[len(made.start) :]
-    kept = order[new]
-    middle = np.column_stack([formed.position, formed.height])
+    at, up = np.divmod(names, above)
+    middle = np.column_stack([formed.position, height])
     below = np.column_stack([formed.position, np.full(n, level)])
-    vertices = np.concatenate([middle, below, np.column_stack([made.corner[at[kept]], z[kept]])])
-    ahead = _following(made, own)
-    top = np.stack([made.pin, own, ahead], axis=1)
-    bottom = np.stack([made.pin + n, ground[made.end], ground[made.start]], axis=1)
-    walls, whose = _walls(made, height, own, ahead, ground)
-    faces = np.concatenate([top, bottom, walls]).astype(np.int32)
-    return vertices, faces, np.concatenate([made.pin, made.pin, whose])
+    vertices = np.concatenate([middle, below, np.column_stack([made.corner[at], level + up * STEP])])
+    ahead = own[_following(made.pin)]
+    top = np.stack([made.pin, own, ahead], axis=1).astype(np.int32)
+    bottom = np.stack([made.pin + n, ground[made.end], ground[made.start]], axis=1).astype(np.int32)
+    walls, whose = _walls(made, steps, own, ahead, ground)
+    return vertices, np.concatenate([top, bottom, walls]), np.concatenate([made.pin, made.pin, whose])
 
 
-def _following(made: Parts, own: Codes) -> Codes:
-    """Return for each side the vertex of its part at its end: that at which the part's next side starts."""
-    size = len(made.corner)
-    key = made.pin * size + made.start
-    order = np.argsort(key)
-    following: Codes = own[order[np.searchsorted(key[order], made.pin * size + made.end)]]
+def _following(pin: Codes) -> Codes:
+    """Return for each side the next one of its part."""
+    following = np.arange(1, len(pin) + 1)
+    last = np.flatnonzero(np.diff(pin, append=-1) != 0)
+    following[last] = np.concatenate([[0], last[:-1] + 1])
     return following
 
 
-def _walls(made: Parts, height: Floats, own: Codes, ahead: Codes, ground: Codes) -> tuple[Codes, Codes]:
+def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -> tuple[Indices, Codes]:
     """Return the triangles of the walls a part has above its neighbours, and whose they are.
 
     The vertices of a corner have numbers in the order of their heights, so that those between the
     neighbour's height and one's own stand in line.
     """
-    side = np.flatnonzero(height[made.pin] > height[made.other])
-    pin, other = made.pin[side], made.other[side]
-    size = len(made.corner)
-    key = made.pin * size + made.start
-    order = np.argsort(key)
-
-    def foot(corner: Codes) -> Codes:
-        """Return the neighbour's vertex at a corner; beyond the bed that of the base."""
-        wanted = np.where(other >= 0, other, 0) * size + corner
-        theirs = own[order[np.minimum(np.searchsorted(key[order], wanted), len(order) - 1)]]
-        return np.where(other >= 0, theirs, ground[corner])
-
-    left, right = foot(made.start[side]), foot(made.end[side])
-    rise, climb = own[side] - left, ahead[side] - right
-    i, step = _counted(rise)
-    one = np.stack([left[i] + step, right[i], left[i] + step + 1], axis=1)
-    j, step = _counted(climb)
-    two = np.stack([right[j] + step, right[j] + step + 1, own[side][j]], axis=1)
-    return np.concatenate([one, two]), np.concatenate([pin[i], pin[j]])
+    other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
+    side = np.flatnonzero(steps[made.pin] > other)
+    twin = made.twin[side]
+    # The feet of the wall: the neighbour's vertices, or beyond the bed those of the base.
+    left = np.where(twin >= 0, ahead[twin], ground[made.start[side]])
+    right = np.where(twin >= 0, own[twin], ground[made.end[side]])
+    i, step = _counted(own[side] - left)
+    one = np.stack([left[i] + step, right[i], left[i] + step + 1], axis=1).astype(np.int32)
+    j, step = _counted(ahead[side] - right)
+    two = np.stack([right[j] + step, right[j] + step + 1, own[side][j]], axis=1).astype(np.int32)
+    return np.concatenate([one, two]), made.pin[side][np.concatenate([i, j])]
 
 
 def _counted(counts: Codes) -> tuple[Codes, Codes]:
