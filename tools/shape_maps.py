@@ -75,10 +75,10 @@ def terrain(x: Floats, y: Floats) -> Floats:
 
 
 def heart(x: Floats, y: Floats) -> Floats:
-    """Return a pillow inside the heart curve (x² + y² - 1)³ = x² y³."""
-    x, y = 1.25 * x, 1.25 * y + 0.1
-    inside = np.maximum(x * x * y**3 - (x * x + y * y - 1.0) ** 3, 0.0)
-    return np.sqrt(np.minimum(inside, 0.15))
+    """Return a pillow inside the heart curve x² + (y - 0.7 √|x|)² = 1."""
+    x, y = 1.15 * x, 1.2 * y + 0.15
+    inside = 1.0 - x * x - (y - 0.7 * np.sqrt(np.abs(x))) ** 2
+    return np.sqrt(np.maximum(inside, 0.0))
 
 
 def segment(x: Floats, y: Floats, start: Point, end: Point) -> Floats:
