@@ -21,7 +21,7 @@ SHARE, LETTERS = 0.20, 0.30
 #: Most columns the curve is drawn with.
 MOST = 600
 #: sRGB: the whole session's force, what of it has been, the set point, and what lies behind.
-TO_COME, BEEN, ASKED, PAPER = (0.66, 0.70, 0.75), (0.00, 0.45, 0.70), (0.84, 0.37, 0.00), (0.93, 0.94, 0.95)
+TO_COME, BEEN, ASKED, PAPER = (0.52, 0.57, 0.64), (0.00, 0.45, 0.70), (0.84, 0.37, 0.00), (0.93, 0.94, 0.95)
 #: Least force the strip's height stands for, N.
 LEAST = 0.05
 

@@ -95,6 +95,7 @@ def test_what_it_takes_to_start_a_process_is_told(capsys: pytest.CaptureFixture[
     # A process that imports numpy needs a tenth of a second at the very least, on any machine.
     assert 0.1 < timing["start_up"] < 30.0
     assert "s to start" in capsys.readouterr().out
+    assert Path("two/index.html").read_text(encoding="utf-8").count("start of its process") == 2
 
 
 def test_finished_jobs_are_kept_and_only_changed_ones_are_done_again() -> None:

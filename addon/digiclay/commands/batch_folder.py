@@ -124,7 +124,10 @@ class Folder:
         metrics, timing = _json(run / "metrics.json"), _json(run / TIMING)
         facts = [(said, _value(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
         took = sum(value for value in timing.values() if isinstance(value, float))
-        facts.append(("whole job", duration(took)))
+        facts += [
+            ("start of its process", _value(timing.get("start_up"), 1.0, "s")),
+            ("whole job", duration(took)),
+        ]
         hidden = {*NAMES, TIMING, JOB}
         links = [
             (path.name, f"{RUNS}/{job.name}/{path.name}")
