@@ -5,9 +5,9 @@ from __future__ import annotations
 from ..compat import bpy
 from . import (
     add_bed,
+    bake,
     export_mesh,
     find_features,
-    bake,
     import_run,
     make_mesh,
     open_scene,
