@@ -169,7 +169,7 @@ def test_the_table_is_in_millimetres():
 @pytest.mark.parametrize("bad", [0.0, -1e-3, np.nan, np.inf, "wide"])
 def test_a_threshold_that_makes_no_sense_is_refused(bad):
     with pytest.raises(
-        ParameterError, match=r"^Finding\.threshold must be (above 0 m|a finite number|a number)"
+        ParameterError, match=r"^Finding\.threshold must be (at least 1e-06 m|a finite number|a number)"
     ):
         Finding(threshold=bad)
 

@@ -43,6 +43,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_what_has_no_surface(run.scene, "features")
     formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
     found = features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
+    if arguments.quiet:
+        return 0
     if arguments.json:
         print(json.dumps([one.figures() for one in found], indent=1))
         return 0

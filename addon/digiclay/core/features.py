@@ -24,7 +24,7 @@ class Finding(Parameters):
     """What counts as a feature."""
 
     threshold: float = quantity(
-        0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", above=0.0
+        0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", at_least=1e-6
     )
     smallest: int = quantity(3, "pins a feature has at least", at_least=1)
 
