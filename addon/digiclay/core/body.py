@@ -39,6 +39,8 @@ class Body:
         Names of groups of faces, such as features.
     group : ndarray of int (f,)
         To which group a face belongs: 1 is the first of `groups`, 0 none. Empty without groups.
+    vertex_group : ndarray of int (v,)
+        The same for vertices; empty without groups.
     closed : bool
         Whether it encloses a volume.
     """
@@ -49,6 +51,7 @@ class Body:
     values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     group: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    vertex_group: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
     closed: bool = True
 
 

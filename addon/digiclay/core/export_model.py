@@ -124,11 +124,14 @@ def _skin(sheet: Sheet, model: Model, names: tuple[str, ...], label: Indices) ->
         level = base_level(sheet.height, base_thickness=model.base_thickness)
         vertices, faces = solid(sheet.place, sheet.height, sheet.rows, sheet.columns, base=level)
         values = sheet.values_with_base(level)
-    group = np.zeros(len(faces) if names else 0, np.int32)
+    group, vertex_group = np.empty((2, 0), np.int32)
     if names:
+        group, vertex_group = np.zeros(len(faces), np.int32), np.zeros(len(vertices), np.int32)
         over = faces[: 2 * (sheet.rows - 1) * (sheet.columns - 1)]
-        group[: len(over)] = sheet.nearest(label)[over].max(axis=1)
-    return Body("clay", vertices, faces, values, names, group, closed=model.kind != "surface")
+        vertex_group[: len(sheet.height)] = sheet.nearest(label)
+        group[: len(over)] = vertex_group[over].max(axis=1)
+    closed = model.kind != "surface"
+    return Body("clay", vertices, faces, values, names, group, vertex_group, closed)
 
 
 def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) -> Body:
@@ -140,8 +143,10 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) 
     tops = (vertices[faces, 2] > level).all(axis=1)
     owner[faces[tops]] = pin[tops, None]
     owner[: len(formed.height)] = np.arange(len(formed.height))
-    group = label[pin] if names else np.empty(0, np.int32)
-    return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group)
+    group, vertex_group = np.empty((2, 0), np.int32)
+    if names:
+        group, vertex_group = label[pin], np.where(owner >= 0, label[owner], 0).astype(np.int32)
+    return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group, vertex_group)
 
 
 def _feature(formed: Formed, feature: Feature) -> Body:

@@ -1,0 +1,90 @@
+"""List the features of a bed in the panel, and choose the surface they are measured from."""
+
+# No postponed annotations here: Blender reads an operator's properties from them.
+from typing import Any
+
+from .. import formed_bed
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..core.export_model import features
+from ..core.features import summary
+from ..panels.export import LISTED
+from .surface_options import FindingOptions, chosen, needs_surface
+
+__all__ = ["FindFeatures", "ForgetSurface", "KeepSurface"]
+
+
+class FindFeatures(FindingOptions, bpy.types.Operator):  # type: ignore[misc]
+    """Find the bosses and creases of the active bed and list them in the panel"""
+
+    bl_idname = "digiclay.find_features"
+    bl_label = "List Features"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed."""
+        return needs_surface(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Find them."""
+        try:
+            bed = chosen(context)
+            found = features(formed_bed.formed(bed), formed_bed.model(bed), self.finding())
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        lines = [summary(found)]
+        for one in found:
+            extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
+            crest = f", crest {one.crest_length * 1e3:.0f} mm" if one.crests else ""
+            lines.append(f"{one.name}: {extreme}{crest}")
+            lines.append(f"    {one.area * 1e6:.0f} mm², {one.volume * 1e9:.0f} mm³, {len(one.pins)} pins")
+        bed[LISTED] = "\n".join(lines)
+        self.report({"INFO"}, lines[0])
+        return {"FINISHED"}
+
+
+class KeepSurface(bpy.types.Operator):  # type: ignore[misc]
+    """Measure features from the surface as it is now"""
+
+    bl_idname = "digiclay.keep_surface"
+    bl_label = "Measure from Here"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed."""
+        return needs_surface(cls, context)
+
+    def execute(self, context: Any) -> set[str]:
+        """Keep the surface."""
+        try:
+            formed_bed.keep(chosen(context))
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class ForgetSurface(bpy.types.Operator):  # type: ignore[misc]
+    """Measure features from the bed at rest again"""
+
+    bl_idname = "digiclay.forget_surface"
+    bl_label = "Measure from Rest"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """A bed is needed whose surface was kept."""
+        if not needs_surface(cls, context):
+            return False
+        if not formed_bed.is_kept(chosen(context)):
+            cls.poll_message_set("Features are measured from the bed at rest already")
+            return False
+        return True
+
+    def execute(self, context: Any) -> set[str]:
+        """Forget the surface."""
+        formed_bed.forget(chosen(context))
+        return {"FINISHED"}
