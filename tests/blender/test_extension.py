@@ -13,7 +13,7 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay import bridge, view
+from digiclay import bridge, command_line, view
 from digiclay.core.errors import OutputError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
@@ -53,6 +53,15 @@ def test_the_extension_registers_unregisters_and_registers_again_without_a_trace
     assert footprint() == first
     digiclay.unregister()
     assert footprint() == set()
+
+
+def test_the_command_of_blender_s_command_line_is_taken_back() -> None:
+    digiclay.register()
+    (handle,) = command_line.HANDLES
+    digiclay.unregister()
+    assert command_line.HANDLES == []
+    with pytest.raises(ValueError, match="already been removed"):
+        bpy.utils.unregister_cli_command(handle)
 
 
 def test_importing_the_package_imports_nothing_heavy_and_registers_nothing() -> None:
