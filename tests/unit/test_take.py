@@ -52,9 +52,8 @@ def taken(start: State | None = None) -> tuple[System, Take, State]:
     system = assemble(scene())
     state = start or begin(system)
     first, poses = packed(system, state), gesture()
-    for state in lived(system, state.copy(), poses):  # noqa: B020
-        pass
-    return system, Take(scene(), first, poses, packed(system, state)), state
+    *_, last = lived(system, state.copy(), poses)
+    return system, Take(scene(), first, poses, packed(system, last)), last
 
 
 def test_a_replay_ends_in_the_same_state_bit_for_bit() -> None:

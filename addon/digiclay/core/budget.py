@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -186,7 +186,8 @@ def fitted(scene: Scene, budget: float, *, told: Callable[[str], None] | None = 
 
 def _without(scene: Scene, section: str) -> Scene:
     """Leave out a part."""
-    return replace(scene, **{section: None})
+    left: dict[str, Any] = {section: None}
+    return replace(scene, **left)
 
 
 def _with_step(scene: Scene, step: float) -> Scene:
@@ -224,7 +225,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
 
 def _weight(scene: Scene, system: System) -> int:
     """Return the work of a cell in a control period: steps times state rows, and parts that own no row."""
-    rows = system.rows.driven.stop + sum(getattr(scene, part) is not None for part in WITHOUT_ROWS)
+    rows: int = system.rows.driven.stop + sum(getattr(scene, part) is not None for part in WITHOUT_ROWS)
     return rows * round(scene.simulation.control_period / scene.simulation.physics_step)
 
 

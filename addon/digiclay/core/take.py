@@ -110,7 +110,8 @@ def replayed(take: Take, told: Callable[[int, int], bool] | None = None) -> bool
     """
     system = assemble(take.scene)
     state = unpacked(system, take.start)
-    for done, state in enumerate(lived(system, state, take.poses), 1):  # noqa: B020
+    for done, later in enumerate(lived(system, state, take.poses), 1):
+        state = later
         if told and not told(done, take.periods):
             return False
     return packed(system, state) == take.end
