@@ -18,7 +18,7 @@ from ..property_groups import title
 from ..settings_group import PRESET_WORDS, method_items
 from ..shown_units import SHOWN, si
 
-__all__ = ["AddBed", "add", "entry", "select_only", "stand_at_cursor"]
+__all__ = ["AddBed", "add", "add_shown", "entry", "select_only", "stand_at_cursor"]
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -115,7 +115,12 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
 
 def add(context: Any, scene: Scene) -> Any:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    instant = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
+    finger = scene.fingertip or Fingertip()
+    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
+
+
+def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
+    """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
     coloured = palettes.worn()
     bed = view.build(instant, context.collection, lowest=0.0)
     if not coloured:

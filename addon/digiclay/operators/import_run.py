@@ -4,12 +4,11 @@
 from pathlib import Path
 from typing import Any
 
-from .. import properties, view
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.scene_file import load
 from ..instant import read
-from .add_bed import select_only, stand_at_cursor
+from .add_bed import add_shown, select_only, stand_at_cursor
 
 __all__ = ["ImportRun", "entry"]
 
@@ -42,8 +41,7 @@ class ImportRun(bpy.types.Operator):  # type: ignore[misc]
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        bed = view.build(instant, context.collection, lowest=0.0)
-        properties.adopt(bed, scene)
+        bed = add_shown(context, scene, instant)
         stand_at_cursor(context, bed)
         select_only(context, bed)
         return {"FINISHED"}
