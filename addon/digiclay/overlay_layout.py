@@ -38,7 +38,7 @@ def free(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
 def laid_out(told: Told, look: Look, room: Room, scale: float) -> Picture:
     """Lay the overlay out in the lower right corner of the room there is.
 
-    Where the view is low, sections are left away from the last one on; where it is narrow, all.
+    Where the view is low, sections there is no room for are left away; where it is narrow, all.
 
     Parameters
     ----------
@@ -50,9 +50,12 @@ def laid_out(told: Told, look: Look, room: Room, scale: float) -> Picture:
     """
     left, bottom, right, top = room
     width, margin, padding = WIDTH * scale, MARGIN * scale, PADDING * scale
-    sections = [(height(told) * scale, draw) for height, draw in SECTIONS]
-    while sections and sum(height for height, _ in sections) > SHARE * (top - bottom) - 2 * padding:
-        sections.pop()
+    space, sections = SHARE * (top - bottom) - 2 * padding, []
+    for height_of, draw in SECTIONS:
+        height = height_of(told) * scale
+        if 0.0 < height <= space:
+            sections.append((height, draw))
+            space -= height
     picture = Picture()
     if not sections or right - left < width + 2 * margin:
         return picture

@@ -129,10 +129,12 @@ def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) ->
     assert (high <= [box.x + box.width, box.y + box.height]).all()
 
 
-def test_a_low_view_leaves_sections_away_from_the_last_on_and_a_narrow_one_all() -> None:
+def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
     colours = look(DARK, LIGHT)
     full = laid_out(session(), colours, ROOM, 1.0)
     low = laid_out(session(), colours, (0.0, 0.0, 900.0, 240.0), 1.0)
+    middling = laid_out(session(), colours, (0.0, 0.0, 900.0, 320.0), 1.0)
+    assert ("Heights" in said(middling), "Pins by mode" in said(middling)) == (False, True)
     assert "Pins by mode" in said(full)
     assert "Total force" in said(low)
     assert "Pins by mode" not in said(low)

@@ -19,7 +19,7 @@ SETTLING = 0.5
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Play the script once; return what stood in the scene after each of its steps."""
-    return played("press_tool.py", tmp_path_factory.mktemp("press"))
+    return played("press_tool.py", tmp_path_factory.mktemp("press"), size=(1100, 720))
 
 
 def bed(seen: dict[str, Any], name: str) -> np.ndarray:
