@@ -1,4 +1,4 @@
-"""The presets a user has saved: scene files in Blender's folder for presets, which hold data and no code."""
+"""The presets a user has saved: scene files in the extension's own folder, which hold data and no code."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ FORBIDDEN = frozenset('<>:"/\\|?*')
 
 def folder() -> Path:
     """Return the folder of the presets, which need not be there yet."""
+    if __package__.startswith("bl_ext."):
+        return Path(bpy.utils.extension_path_user(__package__, path="presets"))
+    # Run from its source it is no extension, and has no folder of its own.
     return Path(bpy.utils.user_resource("SCRIPTS", path=str(Path("presets", "digiclay"))))
 
 

@@ -25,7 +25,7 @@ LEVELS = (
     "formed methods export metrics control.servo control.blister",
     "feature_crest pins_solid skin_membrane "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors job_outputs",
+    "skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene",
     "features system observer steppers.bernoulli steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
@@ -34,9 +34,9 @@ LEVELS = (
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display",
-    "export_model simulation jobs control.handover",
-    "assembly form",
-    "accuracy keeping live shadow",
+    "export_model simulation control.handover",
+    "assembly form job_outputs",
+    "jobs accuracy keeping live shadow",
     "session metrics_trial take",
     "metrics_speed sweep budget",
     "sweep_folder",

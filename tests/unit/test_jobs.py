@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from digiclay.core.errors import SceneError
-from digiclay.core.job_outputs import Outputs
+from digiclay.core.job_outputs import Outputs, outputs
 from digiclay.core.jobs import batch, job_outputs
 from digiclay.core.layout import grid
 from digiclay.core.scene_file import SAMPLES, load
@@ -144,3 +145,13 @@ def test_the_sample_batch_makes_eight_sound_jobs() -> None:
     made = batch(SAMPLES.parent / "batches" / "first.toml")
     assert len(made.jobs) == 8
     assert [job.error for job in made.jobs] == [""] * 8
+
+
+def test_what_is_exported_is_read_and_written_with_the_job() -> None:
+    made = outputs({"export": ["stl"], "mesh": {"kind": "features", "skin": "smooth"}})
+    assert (made.mesh.kind, made.mesh.skin) == ("features", "smooth")
+    assert outputs(tomllib.loads(made.text())) == made
+
+
+def test_a_job_without_the_section_exports_the_solid() -> None:
+    assert outputs({"export": ["stl"]}).mesh.kind == "solid"

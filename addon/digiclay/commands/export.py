@@ -82,12 +82,12 @@ def exported(
     row: int,
     kinds: Iterable[str],
     folder: Path,
-    unit: str = "mm",
+    model: Model | None = None,
 ) -> list[Path]:
-    """Write the solid under one row of a history in several formats; return the files."""
-    model = Model(cap=scene.actuator.bore / 2.0)
-    made = bodies(of_history(history, row), model, Finding())
-    return [write(made, folder / f"surface{suffix(kind)}", unit, kind) for kind in kinds]
+    """Write one row of a history in several formats, as the solid unless told otherwise; return the files."""
+    made = model or Model(cap=scene.actuator.bore / 2.0)
+    parts = bodies(of_history(history, row), made, Finding())
+    return [write(parts, folder / f"{STEMS[made.kind]}{suffix(kind)}", "mm", kind) for kind in kinds]
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

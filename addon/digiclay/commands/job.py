@@ -173,7 +173,7 @@ def _steps(
     if history is None:
         return
     if outputs.export:
-        yield "export", lambda: bool(exported(scene, history, -1, outputs.export, out))
+        yield "export", lambda: bool(exported(scene, history, -1, outputs.export, out, outputs.mesh))
     still, turning, film = outputs.still, outputs.turntable, outputs.film
     if still:
         yield "still", lambda: bool(draw_still(scene, history, still, out / "still.png"))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from .errors import ParameterError
+from .export_model import Model
 from .part_table import read_part, refuse_unknown, shown
 from .quantity import Parameters, quantities
 from .shots import Film, Still, Turntable
@@ -16,8 +17,10 @@ __all__ = ["KEYS", "Outputs", "outputs", "word"]
 
 #: Pictures a job can leave, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
+#: Sections of a job.toml: what is exported, and the pictures.
+SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
 #: The keys of a job.toml.
-KEYS = ("export", "errors", *PICTURES)
+KEYS = ("export", "errors", *SECTIONS)
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class Outputs:
     ----------
     export : tuple of str
         Mesh formats.
+    mesh : Model
+        What is made of the final surface in these formats.
     errors : bool
         Whether the run's errors are estimated, which takes twice its time.
     still, turntable, film
@@ -36,6 +41,7 @@ class Outputs:
 
     export: tuple[str, ...] = ()
     errors: bool = True
+    mesh: Model = field(default_factory=Model)
     still: Still | None = None
     turntable: Turntable | None = None
     film: Film | None = None
@@ -49,7 +55,7 @@ class Outputs:
         """Return a job.toml that reads back as an equal value."""
         lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
         lines += [f"export = {word(list(self.export))}", f"errors = {word(self.errors)}"]
-        for section in PICTURES:
+        for section in SECTIONS:
             part = getattr(self, section)
             if part is None:
                 continue
@@ -77,15 +83,15 @@ def outputs(table: Mapping[str, Any]) -> Outputs:
     errors = table.get("errors", True)
     if not isinstance(errors, bool):
         raise ParameterError("errors", "", "must be true or false", shown(errors))
-    drawn: dict[str, Any] = {}
-    for section, kind in PICTURES.items():
+    parts: dict[str, Any] = {}
+    for section, kind in SECTIONS.items():
         if section not in table:
             continue
         own = table[section]
         if not isinstance(own, dict):
             raise ParameterError(section, "", f"must be a section, [{section}]", shown(own))
-        drawn[section] = read_part(section, kind, {}, own)
-    return Outputs(tuple(export), errors, **drawn)
+        parts[section] = read_part(section, kind, {}, own)
+    return Outputs(tuple(export), errors, **parts)
 
 
 def word(value: Any) -> str:
