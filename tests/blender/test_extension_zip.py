@@ -102,6 +102,10 @@ def test_the_preferences_are_those_blender_shows(seen: dict[str, Any]) -> None:
     assert seen["redraw rate"] == 24
 
 
+def test_a_users_presets_stand_in_the_extensions_own_folder(seen: dict[str, Any]) -> None:
+    assert seen["own presets"] == [str(Path("presets", "Mine.toml"))]
+
+
 @pytest.mark.parametrize("command", ["describe", "run", "export", "render"])
 def test_the_installed_command_carries_out(command: str, seen: dict[str, Any]) -> None:
     assert seen[command] == 0

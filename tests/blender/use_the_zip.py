@@ -44,6 +44,10 @@ def main() -> None:
     chosen.redraw_rate = 24
     seen["redraw rate"] = bpy.context.preferences.addons[EXTENSION].preferences.redraw_rate
 
+    part("own_presets").save("Mine", part("properties").scene_of(bed))
+    own = Path(bpy.utils.extension_path_user(EXTENSION))
+    seen["own presets"] = [str(file.relative_to(own)) for file in own.rglob("*.toml")]
+
     command = part("command_line").run
     run = FOLDER / "a tap"
     seen["describe"] = command(["describe", "tap"])
