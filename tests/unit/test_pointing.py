@@ -133,6 +133,11 @@ def test_the_patch_never_leaves_the_finger(depth: float) -> None:
     np.testing.assert_allclose(radius, 1.0 if depth > 0.0 else 0.0, rtol=0, atol=1e-7)
 
 
+def test_a_finger_that_is_not_pressed_in_has_the_patch_of_its_lowest_point() -> None:
+    tilted = np.array([0.9, 0.3, -0.2, 0.25])
+    np.testing.assert_array_equal(patch(Fingertip(), tilted, -0.01), patch(Fingertip(), tilted, 0.0))
+
+
 def test_the_matrices_of_quaternions_turn_a_finger_about() -> None:
     half = np.sqrt(0.5)
     turned = matrices(np.array([[half, 0.0, 0.0, half]]))[0]
