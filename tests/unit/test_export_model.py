@@ -68,6 +68,16 @@ def test_the_pin_tops_have_the_values_of_their_pins(kind):
     np.testing.assert_array_equal(body.values["mode"][:168], bed.mode)
 
 
+def test_all_of_a_pins_top_has_the_values_of_that_pin():
+    place, steps = formed().position, np.random.default_rng(4).permutation(168)
+    (body,) = bodies(Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins"))
+    over = body.values["mode"] != NO_PIN
+    assert over.sum() > 4 * 168
+    # Each height is that of one pin, and its force is a hundredth of the steps it is up.
+    up = np.rint((body.vertices[over, 2] - 0.04) / 1e-4)
+    np.testing.assert_allclose(body.values["force"][over], up / 100.0, rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", ["solid", "pins"])
 def test_the_base_belongs_to_no_pin(kind):
     (body,) = bodies(formed(), Model(kind=kind))

@@ -159,6 +159,19 @@ def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
     np.testing.assert_array_equal(boss.pins, [12])
 
 
+def test_neighbours_exactly_at_the_threshold_leave_no_triangle_without_area():
+    place = grid(Layout(rows=5, columns=5)).positions
+    height = np.zeros(25)
+    height[[6, 7, 8, 9, 11, 14, 16, 17, 18, 19]] = 0.5
+    height[[12, 13]] = 2.0
+    (boss,) = features(Formed.of(place, height, 0.0, 0.0, 0), Finding(threshold=0.5, smallest=1))
+    a, b, c = np.moveaxis(boss.region.place[boss.region.faces], 1, 0)
+    area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of rounding.
+    assert area.min() > 1e-4 * 0.5 * 9e-6
+    assert len(np.unique(boss.region.place, axis=0)) == len(boss.region.place)
+
+
 def test_the_table_is_in_millimetres():
     head, row = table(features(formed(lambda x, y: ridge(x, y))))
     assert head == ("feature", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")

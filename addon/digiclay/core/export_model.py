@@ -138,11 +138,9 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) 
     """Return the stepped bed; walls and undersides are in the feature of their pin."""
     vertices, faces, pin = pins_solid(formed, base_thickness=model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
-    level = vertices[:, 2].min()
-    # Every vertex above the base is a corner of some pin's top.
-    tops = (vertices[faces, 2] > level).all(axis=1)
+    # Every vertex above the base is a corner, or the middle, of some pin's top; these have the middle first.
+    tops = faces[:, 0] < len(formed.height)
     owner[faces[tops]] = pin[tops, None]
-    owner[: len(formed.height)] = np.arange(len(formed.height))
     group, vertex_group = np.empty((2, 0), np.int32)
     if names:
         group, vertex_group = label[pin], np.where(owner >= 0, label[owner], 0).astype(np.int32)
