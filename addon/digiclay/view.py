@@ -80,8 +80,7 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
 
 def show(bed: Any, instant: Instant) -> None:
     """Show another instant of the same bed, its fingertip's pose included."""
-    shown = {"mode": instant.mode, "force": instant.force} if wants_force(bed) else {"mode": instant.mode}
-    bridge.write_cells(bed.data, instant.position, instant.height, **shown)
+    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 
 

@@ -1,4 +1,4 @@
-"""What the viewport's benchmark times is a session that lives: it forms the bed, and leaves nothing behind."""
+"""What the viewport's benchmark times is a session that lives: it forms the bed and leaves nothing."""
 
 from __future__ import annotations
 
