@@ -13,12 +13,15 @@ from .compat import bpy
 
 __all__ = ["ended", "register", "unregister", "watch"]
 
+#: Ticks until the state undo has put into a bed is taken up, that one included.
+STALE = 2
+
 
 @bpy.app.handlers.persistent
 def take_up(*_: Any) -> None:
-    """Have every session take up, at its next tick, what undo or redo has put into its bed."""
+    """Have every session take up, two ticks later, what undo or redo has put into its bed."""
     for session in running.all():
-        running.put(replace(session, stale=True))
+        running.put(replace(session, stale=STALE))
 
 
 @bpy.app.handlers.persistent

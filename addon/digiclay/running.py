@@ -103,8 +103,8 @@ class Running:
         By the user.
     waits : str
         Why the session stands still although it is not paused; empty: it does not.
-    stale : bool
-        Undo or redo has put another state into the bed, which is to be taken up.
+    stale : int
+        Ticks until the state undo or redo has put into the bed is taken up; 0: there is none.
     steps : int
         Single control periods asked for while paused.
     clock : Clock
@@ -136,7 +136,7 @@ class Running:
     errors: LiveErrors | None = None
     paused: bool = False
     waits: str = ""
-    stale: bool = False
+    stale: int = 0
     steps: int = 0
     gestures: tuple[Gesture, ...] = ()
     coming: Gesture | None = None

@@ -189,7 +189,7 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
     free = felt(running.system, state) == 0.0
     return replace(
         running, state=state, kept=now, pose=reachable(pose, running.system.cell.actuator.stroke),
-        clock=running.clock.stopped(), shadow=running.shadow and lifted(running.shadow), stale=False,
+        clock=running.clock.stopped(), shadow=running.shadow and lifted(running.shadow), stale=0,
         recording=keep, gestures=gestures, moment=running.moment + 1, rested=0.0,
         coming=Gesture(state.period, now, pose) if free else None,
     )  # fmt: skip

@@ -91,10 +91,6 @@ def tick(context: Any, now: float) -> list[Note]:
     """Let every session go on up to now, by a clock that never goes back, s; return what there is to tell."""
     notes: list[Note] = []
     most = preferences.of(context).most_periods
-    if any(session.stale for session in running.all()):
-        # What undo has put back has no place in the world until it is evaluated.
-        for window in context.window_manager.windows:
-            window.view_layer.update()
     for session in running.all():
         bed = found(session.uid, session.name)
         if bed is None:
@@ -107,6 +103,11 @@ def tick(context: Any, now: float) -> list[Note]:
 
 def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> list[Note]:
     """Let one session go on."""
+    if session.stale > 1:
+        # What undo has put back has no place in the world until Blender has evaluated it, which it
+        # does before the next tick.
+        running.put(replace(session, stale=session.stale - 1))
+        return []
     before = session
     why, session, said = _looked(context, bed, session)
     notes = [Note("WARNING", f"{bed.name}: {said}")] if said else []

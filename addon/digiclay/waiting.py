@@ -25,7 +25,16 @@ def found(uid: int, name: str) -> Any | None:
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
-    return bed if bed is not None and view.is_bed(bed) and bed.users_scene else None
+    if bed is None or not view.is_bed(bed):
+        return None
+    # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
+    return bed if _shown(bpy.context, bed) or bed.users_scene else None
+
+
+def _shown(context: Any, thing: Any) -> bool:
+    """Tell whether some window shows a scene the object stands in."""
+    layers = (window.view_layer for window in context.window_manager.windows)
+    return any(layer.objects.get(thing.name) == thing for layer in layers)
 
 
 def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
@@ -40,10 +49,10 @@ def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
     """
     if bpy.app.is_job_running("RENDER"):
         return "a render is under way"
-    layers = [window.view_layer for window in context.window_manager.windows]
-    if not any(layer.objects.get(bed.name) == bed for layer in layers):
+    if not _shown(context, bed):
         return "no window shows its scene, or its collection is left out: show it to go on"
-    if bed.mode != "OBJECT":
+    # A mesh can also be edited through another object that shares it.
+    if bed.mode != "OBJECT" or (bed.type == "MESH" and bed.data.is_editmode):
         return "the bed is being edited: go back to Object Mode to go on"
     if bed.type != "MESH" or not bridge.ATTRIBUTES.keys() <= set(bed.data.attributes.keys()):
         return "the bed's mesh is no longer that of its pins: undo that to go on"
@@ -54,7 +63,7 @@ def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
         return (
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
         )
-    if not any(layer.objects.get(tip.name) == tip for layer in layers):
+    if not _shown(context, tip):
         return "its fingertip stands in no scene shown: link it to a collection to go on"
     try:
         bridge.uniform(bed)

@@ -182,7 +182,7 @@ def undone(clock: Clock, times: int = 1) -> None:
     """Undo, and let the sessions take it up."""
     for _ in range(times):
         bpy.ops.ed.undo()
-    clock.tick(1)
+    clock.tick(handlers.STALE)
 
 
 def only_bed() -> Any:
@@ -210,7 +210,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     assert (exact(only_bed()) == 40e-3).all()
     bpy.ops.ed.redo()
     bpy.ops.ed.redo()
-    clock.tick()
+    clock.tick(handlers.STALE)
     assert bed_state.kept(only_bed()) == second
     press(only_bed(), clock)
     assert exact(only_bed())[6 * 13 + 6] < 39e-3
@@ -365,7 +365,7 @@ def waits(bed: Any, clock: Clock, *, words: str) -> None:
 def goes_on(clock: Clock) -> None:
     """Check that the session says that it goes on, and does."""
     period = running.all()[0].state.period
-    notes = clock.tick(3)
+    notes = clock.tick(handlers.STALE + 3)
     assert ["goes on" in note.words for note in notes] == [True]
     assert running.all()[0].state.period > period
 
@@ -394,6 +394,16 @@ def test_a_session_waits_while_its_scene_is_not_shown(bed: Any, clock: Clock) ->
 def test_a_session_waits_while_the_bed_is_edited(bed: Any, clock: Clock) -> None:
     started(bed)
     bpy.ops.object.mode_set(mode="EDIT")
+    waits(bed, clock, words="back to Object Mode")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    goes_on(clock)
+
+
+def test_a_session_waits_while_its_pins_are_edited_through_another_bed(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bpy.ops.object.duplicate(linked=True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bed.mode == "OBJECT"
     waits(bed, clock, words="back to Object Mode")
     bpy.ops.object.mode_set(mode="OBJECT")
     goes_on(clock)
@@ -564,5 +574,5 @@ def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clo
     running.put(sculpting.recording(running.of(bed), True))
     clock.tick(3)
     bpy.ops.ed.undo()
-    assert ["recording ended" in note.words for note in clock.tick()] == [True]
+    assert ["recording ended" in note.words for note in clock.tick(handlers.STALE)] == [True]
     assert running.of(only_bed()).path is None

@@ -8,6 +8,7 @@ yield how long to wait, s.
 
 from __future__ import annotations
 
+import faulthandler
 import importlib
 import importlib.util
 import json
@@ -72,7 +73,7 @@ def pixel(place: Any) -> tuple[int, int]:
     return region.x + round(at.x), region.y + round(at.y)
 
 
-def call(operator: Any, *how: str, **properties: Any) -> set[str]:
+def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
     """Call an operator as the 3D view would."""
     area, region = view()
     with bpy.context.temp_override(window=window(), area=area, region=region):
@@ -178,7 +179,7 @@ def look(name: str) -> None:
     for bed in beds()[:1]:
         session = running.of(bed)
         found["kept"] = len(bed.get("digiclay_state", b""))
-        if bed.mode == "OBJECT":  # a mesh that is being edited cannot be read
+        if not bed.data.is_editmode:  # a mesh that is being edited cannot be read
             cells = bridge.read_cells(bed.data)
             found["heights"] = [float(cells["height"].min()), float(cells["height"].max())]
             found["modes"] = np.bincount(cells["mode"], minlength=8).tolist()
@@ -220,6 +221,7 @@ def finish() -> None:
 
 def main() -> None:
     """Enable the extension under the name Blender gives it, and play the script."""
+    faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
     # Smooth edges cost software GL most of its time.
     bpy.context.preferences.system.viewport_aa = "OFF"

@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 
 EVENTS = 300
+#: After so many of them a session is started where none runs any more.
+REVIVED = 4
 #: What is done, and how often out of the sum.
 CHOICES = {
     "move": 60, "turn": 8, "grab": 30, "undo": 34, "redo": 14, "edit": 12, "select": 16, "delete": 8,
@@ -74,7 +76,7 @@ class Events:
         self.blender.key("DEL", self.somewhere())
 
     def add(self) -> None:
-        if len(self.blender.beds()) < 3:
+        if len(self.blender.beds()) < 3 and bpy.context.mode == "OBJECT":
             self.operator(bpy.ops.mesh.digital_clay_add, rows=11, columns=11)
 
     def operator(self, operator: Any, *how: str, **properties: Any) -> None:
@@ -84,7 +86,8 @@ class Events:
             willing = operator.poll()
         if willing:
             try:
-                self.blender.call(operator, *how, **properties)
+                # With an undo step: data that come and go without one crash Blender at the next undo.
+                self.blender.call(operator, *(how or ("EXEC_DEFAULT",)), True, **properties)
             except RuntimeError as error:
                 if not str(error).startswith("Error: "):  # what an operator reports is no fault
                     raise
@@ -95,6 +98,17 @@ class Events:
         if beds and bpy.context.mode == "OBJECT":
             self.blender.select(self.source.choice(beds))
         self.operator(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+
+    def revive(self) -> None:
+        """Have a session run again: what happens to none tells nothing about it."""
+        if self.blender.part("running").all():
+            return
+        if bpy.context.mode != "OBJECT":
+            self.operator(bpy.ops.object.mode_set, mode="OBJECT")
+        for bed in self.blender.beds():
+            bed.scale = 1, 1, 1
+        self.add()
+        self.start()
 
     def stop(self) -> None:
         self.blender.key("ESC", self.somewhere())
@@ -131,6 +145,7 @@ class Events:
     def scene(self) -> None:
         if len(bpy.data.scenes) < 2:
             bpy.data.scenes.new("Other")
+            bpy.ops.ed.undo_push(message="Scene")
         self.blender.window().scene = self.source.choice([*bpy.data.scenes, bpy.data.scenes[0]])
 
     def play(self) -> None:
@@ -161,7 +176,7 @@ def check(blender: Any) -> None:
         if bed is not None and not session.stale:
             assert blender.part("bed_state").kept(bed) == session.kept
     for bed in blender.beds():
-        if bed.mode == "OBJECT":
+        if not bed.data.is_editmode:
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
 
 
@@ -181,6 +196,8 @@ def script(blender: Any) -> Iterator[float | None]:
     live = 0
     for name in names:
         done.append(name)
+        if len(done) % REVIVED == 0:
+            events.revive()
         getattr(events, name)()
         yield 0.1
         check(blender)

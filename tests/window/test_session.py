@@ -192,7 +192,7 @@ def tried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def test_300_random_events_leave_no_traceback_and_no_broken_state(tried: dict[str, Any]) -> None:
     assert len(tried["done"]) == 300
     # Most of them happened to a session, not to Blender alone.
-    assert tried["live"] > 150
+    assert tried["live"] > 200
 
 
 def test_after_random_events_a_bed_can_be_formed(tried: dict[str, Any]) -> None:
