@@ -17,8 +17,8 @@ STATE, POSE, MOMENT = "digiclay_state", "digiclay_pose", "digiclay_moment"
 def write(bed: Any, running: Running, before: Running | None = None) -> None:
     """Write a session into its bed's properties.
 
-    The moment changes with every tick, even while nothing moves: undo puts back an object only
-    where it differs from one step to the next.
+    The moment changes with every tick, even while nothing moves: it tells which tick it was that
+    undo has come back to.
 
     Parameters
     ----------

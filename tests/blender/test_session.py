@@ -217,7 +217,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
 
 
 def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed: Any, clock: Clock) -> None:
-    # Both steps hold the same heights: without a moment of its own Blender would not put the bed back.
+    # Both steps hold the same heights, and what has been formed since is in neither.
     started(bed)
     clock.tick(3)
     bpy.ops.digiclay.session_pause()
