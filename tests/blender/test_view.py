@@ -11,6 +11,7 @@ from digiclay import bridge, heat, view
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import DigiclayError
 from digiclay.core.fingertip import Fingertip
+from digiclay.core.layout import Layout
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.core.scene_table import resolve
 from digiclay.core.simulation import begin
