@@ -1,9 +1,8 @@
-"""A running session follows the finger, goes back, and is recorded so that it can be played again."""
+"""A running session follows the finger, and goes back."""
 
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,59 +10,16 @@ import pytest
 from digiclay import running, sculpting
 from digiclay.core import live
 from digiclay.core.errors import DigiclayError
-from digiclay.core.fingertip import LEVEL
-from digiclay.core.keeping import packed, unpacked
-from digiclay.core.live import lived
+from digiclay.core.keeping import packed
 from digiclay.core.scene_table import resolve
-from digiclay.running import Running
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-SIZES = {"rows": 15, "columns": 15}
-SCENE = resolve({"layout": SIZES})
-TICK = 1 / 30
+from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
 
 
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
     monkeypatch.setattr(live, "SHARE", 1e9)
-
-
-def pose(x: float = 0.0, z: float = 46.0) -> Floats:
-    """Return a level finger's pose, in mm."""
-    return np.array([x * 1e-3, 0.0, z * 1e-3, *LEVEL])
-
-
-def started() -> Running:
-    """Return a session at its beginning, its clock started."""
-    session, said = sculpting.begun(7, "Bed", SCENE, pose())
-    assert said == ""
-    return sculpting.advanced(session, pose(), 0.0, 100)
-
-
-class Hand:
-    """Moves the finger, in mm, while time goes by."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def move(self, session: Running, poses: Iterable[tuple[float, float]]) -> Running:
-        """Advance tick by tick."""
-        for x, z in poses:
-            self.now += TICK
-            session = sculpting.advanced(session, pose(x, z), self.now, 100)
-        return session
-
-    def press(self, session: Running, x: float = 0.0) -> Running:
-        """Press at a place and lift off again."""
-        down, up = np.linspace(46, 37, 10), np.linspace(37, 46, 10)
-        return self.move(session, [(x, z) for z in (*down, *[37] * 10, *up, *[46] * 20)])
-
-
-def heights(session: Running) -> Floats:
-    """Return the pin tops."""
-    return session.state.row(0)
 
 
 def test_a_press_forms_the_bed_as_it_goes_on() -> None:
@@ -203,51 +159,6 @@ def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
 def test_nothing_changes_where_no_parameter_has() -> None:
     session = started()
     assert sculpting.adapted(session, resolve({"layout": SIZES}))[0] is session
-
-
-def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
-    hand = Hand()
-    session = sculpting.recording(hand.press(started(), -6.0), True)
-    session = hand.press(hand.press(session), 6.0)
-    keep = session.recording
-    assert keep is not None
-    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
-    assert packed(session.system, again) == session.kept
-
-
-def test_undo_shortens_a_recording_to_what_led_there() -> None:
-    hand = Hand()
-    session = sculpting.recording(hand.press(started(), -6.0), True)
-    session = hand.press(session)
-    kept, moment, at = session.kept, session.moment, session.pose
-    session = sculpting.restored(hand.press(session, 6.0), kept, at, moment)
-    session = hand.press(session, 3.0)
-    keep = session.recording
-    assert keep is not None
-    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
-    assert packed(session.system, again) == session.kept
-
-
-def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
-    hand = Hand()
-    session = sculpting.recording(started(), True)
-    early = hand.press(session)
-    here = early.kept, early.pose, early.moment
-    late = hand.press(early, 6.0)
-    there = late.kept, late.pose, late.moment
-    session = hand.press(sculpting.restored(late, *here), -6.0)
-    assert sculpting.restored(session, *there).path is None
-
-
-def test_a_long_recording_copies_itself_seldom() -> None:
-    session = sculpting.recording(started(), True)
-    keep, arrays = session.recording, set()
-    assert keep is not None
-    for moment in range(5000):
-        keep = keep.extended(np.zeros((7, 7)), moment)
-        arrays.add(id(keep.rows))
-    assert len(keep.path) == 35001
-    assert len(arrays) < 12
 
 
 def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:

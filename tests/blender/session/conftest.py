@@ -1,0 +1,44 @@
+"""Every test of a session has the extension enabled, a small bed to ask for, and time of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import digiclay
+import pytest
+from digiclay import handlers
+from digiclay.core import live
+
+from tests.blender.session.live import (
+    Clock,
+)
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
+    monkeypatch.setattr(live, "SHARE", 1e9)
+
+
+@pytest.fixture(autouse=True)
+def extension(factory_file: None) -> Iterator[None]:
+    """Enable the extension, watch undo and loading as a session does, and take all back."""
+    digiclay.register()
+    handlers.watch()
+    yield
+    digiclay.unregister()
+
+
+@pytest.fixture
+def bed() -> Any:
+    """A small bed in the open scene."""
+    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
+    return bpy.context.object
+
+
+@pytest.fixture
+def clock() -> Clock:
+    """The wall's clock of a test."""
+    return Clock()

@@ -1,0 +1,98 @@
+"""A small bed, a clock, and a finger: what the tests of live sessions in Blender share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+import numpy as np
+from digiclay import bed_state, bridge, handlers, properties, running, tick, view
+from digiclay.core.assembly import assemble
+from digiclay.core.keeping import unpacked
+from digiclay.core.simulation import begin
+
+#: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
+FLOAT32 = 0.1 * 2.0**-23
+TICK = 1 / 30
+
+
+class Clock:
+    """Ticks as the window's timer does."""
+
+    now = 0.0
+
+    def tick(self, count: int = 1) -> list[tick.Note]:
+        """Tick some times; return what there is to tell."""
+        notes = []
+        for _ in range(count):
+            self.now += TICK
+            bpy.context.view_layer.update()
+            notes += tick.tick(bpy.context, self.now)
+        return notes
+
+
+def started(bed: Any) -> None:
+    """Start a session; there must be nothing to tell."""
+    assert tick.start(bpy.context, bed) == []
+
+
+def move(bed: Any, clock: Clock, places: Iterable[tuple[float, float]]) -> list[tick.Note]:
+    """Move the fingertip through places x, z of its lowest point, in mm, tick by tick."""
+    notes = []
+    for x, z in places:
+        # The semi-axis upwards is 8 mm: the empty is the ellipsoid's centre.
+        view.fingertip_of(bed).location = np.array([x, 0.0, z + 8.0]) * 1e-3 * bridge.SCALE
+        notes += clock.tick()
+    return notes
+
+
+def press(bed: Any, clock: Clock, x: float = 0.0) -> None:
+    """Press at a place and lift off."""
+    down = [(x, z) for z in np.linspace(46, 37, 8)]
+    assert move(bed, clock, [*down, *[(x, 37.0)] * 8, *down[::-1], *[(x, 46.0)] * 20]) == []
+
+
+def exact(bed: Any) -> np.ndarray:
+    """Return the pin tops the bed keeps, exactly, m."""
+    system = assemble(properties.scene_of(bed))
+    kept = bed_state.kept(bed)
+    return (begin(system) if kept is None else unpacked(system, kept)).row(0)
+
+
+def shown(bed: Any) -> np.ndarray:
+    """Return the pin tops drawn, m."""
+    return bridge.read_cells(bed.data)["height"]
+
+
+def undone(clock: Clock, times: int = 1) -> None:
+    """Undo, and let the sessions take it up."""
+    for _ in range(times):
+        bpy.ops.ed.undo()
+    clock.tick(handlers.STALE)
+
+
+def only_bed() -> Any:
+    """Return the bed, fetched anew: undo invalidates all references."""
+    (found,) = [thing for thing in bpy.context.scene.objects if view.is_bed(thing)]
+    return found
+
+
+def waits(bed: Any, clock: Clock, *, words: str) -> None:
+    """Check that the session waits, says why once, and stands still."""
+    notes = clock.tick(3)
+    assert [note.level for note in notes] == ["WARNING"]
+    assert words in notes[0].words
+    session = running.all()[0]
+    assert words in session.waits
+    period = session.state.period
+    assert clock.tick(3) == []
+    assert running.all()[0].state.period == period
+
+
+def goes_on(clock: Clock) -> None:
+    """Check that the session says that it goes on, and does."""
+    period = running.all()[0].state.period
+    notes = clock.tick(handlers.STALE + 3)
+    assert ["goes on" in note.words for note in notes] == [True]
+    assert running.all()[0].state.period > period

@@ -1,0 +1,140 @@
+"""A live session follows the fingertip, by whatever means it is moved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bed_state, running, sculpting, tick, view
+from digiclay.core.keeping import packed
+
+from tests.blender.session.live import (
+    FLOAT32,
+    TICK,
+    Clock,
+    exact,
+    move,
+    press,
+    shown,
+    started,
+)
+
+
+def test_the_bed_forms_while_the_fingertip_moves(bed: Any, clock: Clock) -> None:
+    started(bed)
+    lowest = []
+    for z in np.linspace(46, 37, 8):
+        move(bed, clock, [(0.0, z)])
+        lowest.append(shown(bed).min())
+    assert lowest[0] == pytest.approx(40e-3, abs=FLOAT32)
+    assert (np.diff(lowest)[-2:] < 0).all()  # it touches at 40 mm, three ticks before the end
+
+
+def test_the_bed_keeps_and_shows_what_the_session_is(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    session = running.of(bed)
+    assert session is not None
+    assert bed_state.kept(bed) == packed(session.system, session.state)
+    assert np.array_equal(bed_state.pose(bed), session.pose)
+    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert exact(bed).min() < 39e-3
+
+
+def drive(tip: Any, how: str) -> None:
+    """Have the fingertip pressed down between the frames 1 and 20, by other means than by hand."""
+    low, high = 0.45, 0.54
+    if how == "animation":
+        for frame, z in ((1, high), (20, low)):
+            tip.location.z = z
+            tip.keyframe_insert("location", index=2, frame=frame)
+    elif how == "driver":
+        curve = tip.driver_add("location", 2)
+        curve.driver.expression = f"{high} - frame / 20 * {high - low}"
+    else:
+        other = bpy.data.objects.new("Other", None)
+        bpy.context.collection.objects.link(other)
+        other.location.z = high
+        other.keyframe_insert("location", index=2, frame=1)
+        other.location.z = low
+        other.keyframe_insert("location", index=2, frame=20)
+        constraint = tip.constraints.new("COPY_LOCATION")
+        constraint.target = other
+        bpy.context.view_layer.objects.active.location.z = 0.0
+
+
+@pytest.mark.parametrize("how", ["animation", "driver", "constraint"])
+def test_the_bed_follows_a_fingertip_moved_by_other_means(bed: Any, clock: Clock, how: str) -> None:
+    tip = view.fingertip_of(bed)
+    drive(tip, how)
+    bpy.context.scene.frame_set(1)
+    started(bed)
+    for frame in range(1, 21):
+        bpy.context.scene.frame_set(frame)
+        clock.tick()
+    clock.tick(5)
+    assert exact(bed).min() < 39e-3
+
+
+def test_a_turned_moved_and_scaled_bed_forms_like_one_that_is_not(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    straight = exact(bed)
+    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
+    other = bpy.context.object
+    other.location, other.rotation_euler, other.scale = (3.0, -2.0, 1.0), (0.4, 0.0, 0.7), (2.0, 2.0, 2.0)
+    started(other)
+    press(other, clock)
+    # The matrices are float32: some 1e-7 of 3 units, at 0.1 m a unit; the clocks start a tick apart.
+    np.testing.assert_allclose(exact(other), straight, rtol=0, atol=2e-5)
+
+
+def test_several_beds_go_on_at_once_each_with_its_own_fingertip(bed: Any, clock: Clock) -> None:
+    bpy.ops.mesh.digital_clay_add(rows=9, columns=11)
+    other = bpy.context.object
+    started(bed)
+    started(other)
+    press(other, clock)
+    assert (exact(bed) == 40e-3).all()
+    assert exact(other).min() < 39e-3
+    assert len(running.all()) == 2
+
+
+def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    before = exact(bed)
+    bed.digiclay.method = "plastic"
+    notes = clock.tick(tick.LOOK)
+    assert ["heights were taken up" in note.words for note in notes] == [True]
+    np.testing.assert_allclose(exact(bed), before, rtol=0, atol=1e-5)  # pins were still coming to rest
+    assert running.of(bed).scene.method == "plastic"
+
+
+def test_a_parameter_that_is_changed_in_mid_session_takes_effect(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bed.digiclay.control.virtual_master.force_setpoint = 0.8
+    assert clock.tick(tick.LOOK) == []
+    assert running.of(bed).scene.set_point == 0.8
+
+
+def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> None:
+    started(bed)
+    clock.tick(40)
+    bed.data.vertices[0].co.z = 9.0
+    clock.tick(5)
+    assert bed.data.vertices[0].co.z == 9.0
+    move(bed, clock, [(0.0, 38.0)] * 2)
+    assert bed.data.vertices[0].co.z < 1.0
+
+
+def test_recorded_poses_are_those_of_the_fingertip(bed: Any, clock: Clock) -> None:
+    started(bed)
+    clock.tick(2)
+    running.put(sculpting.recording(running.of(bed), True))
+    move(bed, clock, [(0.0, 46.0), (3.0, 45.0), (6.0, 40.0)])
+    path = running.of(bed).path
+    np.testing.assert_allclose(path[-1], [6e-3, 0, 40e-3, 1, 0, 0, 0], rtol=0, atol=FLOAT32)
+    assert len(path) == pytest.approx(1 + 3 * TICK / 5e-3, abs=1)

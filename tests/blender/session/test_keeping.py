@@ -1,0 +1,177 @@
+"""Undo, redo, files and copies carry the state of a session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bed_state, handlers, running, sculpting, tick
+from digiclay.core.keeping import packed
+
+from tests.blender.session.live import (
+    FLOAT32,
+    Clock,
+    exact,
+    move,
+    only_bed,
+    press,
+    shown,
+    started,
+    undone,
+)
+
+
+def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bpy.ops.ed.undo_push(message="Start")
+    press(bed, clock, -6.0)
+    bpy.ops.ed.undo_push(message="First")
+    first = bed_state.kept(bed)
+    press(bed, clock, 6.0)
+    bpy.ops.ed.undo_push(message="Second")
+    second = bed_state.kept(bed)
+    undone(clock)
+    session = running.of(only_bed())
+    assert session is not None
+    assert packed(session.system, session.state) == first
+    assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
+    np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
+    undone(clock)
+    assert (exact(only_bed()) == 40e-3).all()
+    bpy.ops.ed.redo()
+    bpy.ops.ed.redo()
+    clock.tick(handlers.STALE)
+    assert bed_state.kept(only_bed()) == second
+    press(only_bed(), clock)
+    assert exact(only_bed())[6 * 13 + 6] < 39e-3
+
+
+def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed: Any, clock: Clock) -> None:
+    # Both steps hold the same heights, and what has been formed since is in neither.
+    started(bed)
+    clock.tick(3)
+    bpy.ops.digiclay.session_pause()
+    clock.tick()
+    bpy.ops.ed.undo_push(message="Start")
+    clock.tick()
+    move(bed, clock, [(0.0, 38.0)])
+    bpy.ops.ed.undo_push(message="Moved in the pause")
+    bpy.ops.digiclay.session_pause()
+    clock.tick(20)
+    assert exact(bed).min() < 39.8e-3
+    undone(clock)
+    assert (exact(only_bed()) == 40e-3).all()
+
+
+def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock: Clock) -> None:
+    bpy.ops.ed.undo_push(message="Nothing")
+    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
+    bpy.ops.ed.undo_push(message="Bed")
+    tick.start(bpy.context, bpy.context.object)
+    bpy.ops.ed.undo()
+    notes = clock.tick()
+    assert [note.level for note in notes] == ["WARNING"]
+    assert "was deleted" in notes[0].words
+    assert running.all() == ()
+
+
+def reloaded(tmp_path: Path) -> Any:
+    """Save the file and open it again; return the bed."""
+    path = str(tmp_path / "session.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    return only_bed()
+
+
+def test_a_file_saved_in_mid_session_goes_on_bit_for_bit(bed: Any, clock: Clock, tmp_path: Path) -> None:
+    started(bed)
+    move(bed, clock, [(0.0, 38.0)] * 10)
+    kept, periods = bed_state.kept(bed), running.of(bed).state.period
+    bed = reloaded(tmp_path)
+    assert running.all() == ()
+    assert "another file was loaded" in running.said()
+    started(bed)
+    session = running.of(bed)
+    assert packed(session.system, session.state) == kept
+    assert session.state.period == periods
+
+
+def test_a_crash_recovered_file_has_the_state_of_the_last_tick(
+    bed: Any, clock: Clock, tmp_path: Path
+) -> None:
+    # What Blender saves by itself is the open file as it stands, without asking anybody.
+    started(bed)
+    move(bed, clock, [(0.0, 38.0)] * 10)
+    kept = bed_state.kept(bed)
+    path = str(tmp_path / "recovery.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    move(bed, clock, [(0.0, 46.0)] * 10)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert bed_state.kept(only_bed()) == kept
+
+
+def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    kept = bed_state.kept(bed)
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    assert copy != bed
+    assert running.of(copy) is None
+    notes = tick.start(bpy.context, copy)
+    assert ["new fingertip" in note.words for note in notes] == [True]
+    assert bed_state.kept(copy) == kept
+    press(copy, clock, 6.0)
+    assert np.abs(exact(copy) - exact(bed)).max() > 1e-3
+
+
+def test_a_linked_duplicate_gets_pins_of_its_own(bed: Any, clock: Clock) -> None:
+    bpy.ops.object.duplicate(linked=True)
+    copy = bpy.context.object
+    assert copy.data == bed.data
+    notes = tick.start(bpy.context, copy)
+    assert any("pins of its own" in note.words for note in notes)
+    press(copy, clock)
+    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
+
+
+def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
+    started(bed)
+    press(bed, clock)
+    kept, name = bed_state.kept(bed), bed.name
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(path) as (_, wanted):
+        wanted.objects = [name]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    appended = only_bed()
+    notes = tick.start(bpy.context, appended)
+    session = running.of(appended)
+    assert packed(session.system, session.state) == kept
+    assert all(note.level == "INFO" for note in notes)
+
+
+@pytest.mark.parametrize("junk", [b"", b"nothing", "a text", 7, [1.0, 2.0]])
+def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed: Any, junk: Any) -> None:
+    bed[bed_state.STATE] = junk
+    bed[bed_state.POSE] = junk
+    bed[bed_state.MOMENT] = "x"
+    notes = tick.start(bpy.context, bed)
+    assert [note.level for note in notes] == ["WARNING"]
+    assert (exact(bed) == 40e-3).all()
+
+
+def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bpy.ops.ed.undo_push(message="Start")
+    press(bed, clock)
+    bpy.ops.ed.undo_push(message="Press")
+    running.put(sculpting.recording(running.of(bed), True))
+    clock.tick(3)
+    bpy.ops.ed.undo()
+    assert ["recording ended" in note.words for note in clock.tick(handlers.STALE)] == [True]
+    assert running.of(only_bed()).path is None

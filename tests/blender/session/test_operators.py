@@ -1,0 +1,93 @@
+"""The operators of a session, and when they decline."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge, running, tick, view
+from digiclay.core.errors import DigiclayError
+
+from tests.blender.session.live import (
+    FLOAT32,
+    Clock,
+    exact,
+    move,
+    press,
+    shown,
+    started,
+)
+
+
+@pytest.mark.parametrize("name", ["session_rewind", "session_reset"])
+def test_a_bed_that_is_edited_is_not_written(bed: Any, clock: Clock, name: str) -> None:
+    started(bed)
+    press(bed, clock)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not getattr(bpy.ops.digiclay, name).poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert getattr(bpy.ops.digiclay, name).poll()
+
+
+def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock, -6.0)
+    formed = exact(bed)
+    press(bed, clock, 6.0)
+    assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
+    np.testing.assert_allclose(exact(bed), formed, rtol=0, atol=1e-5)  # pins were still coming to rest
+    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert bridge.pose(view.fingertip_of(bed))[2] > 45e-3
+    assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
+    assert (exact(bed) == 40e-3).all()
+    assert not bpy.ops.digiclay.session_rewind.poll()
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock: Clock, live: bool) -> None:
+    assert not bpy.ops.digiclay.session_reset.poll()
+    started(bed)
+    move(bed, clock, [(0.0, 38.0)] * 20)
+    if not live:
+        tick.stop(bed.session_uid)
+    assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
+    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
+    assert (exact(bed) == 40e-3).all()
+    bpy.context.view_layer.update()
+    assert bridge.pose(view.fingertip_of(bed))[2] > 45e-3
+
+
+def test_a_single_step_pauses_and_is_one_control_period(bed: Any, clock: Clock) -> None:
+    started(bed)
+    clock.tick(5)
+    before = running.of(bed).state.period
+    bpy.ops.digiclay.session_step()
+    clock.tick(5)
+    assert (running.of(bed).state.period, running.of(bed).paused) == (before + 1, True)
+
+
+def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_one(bed: Any) -> None:
+    started(bed)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    assert bpy.ops.digiclay.session_pause() == {"FINISHED"}
+    assert running.of(bed).paused
+
+
+@pytest.mark.parametrize("name", ["session_pause", "session_step", "session_rewind", "session_stop"])
+def test_without_a_session_the_operators_decline(bed: Any, name: str) -> None:
+    assert not getattr(bpy.ops.digiclay, name).poll()
+
+
+def test_a_live_session_declines_without_a_window_or_a_bed(bed: Any) -> None:
+    assert not bpy.ops.digiclay.session.poll()  # this is Blender without a window
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    assert not bpy.ops.digiclay.session.poll()
+
+
+def test_a_session_does_not_start_on_settings_that_do_not_fit(bed: Any) -> None:
+    bed.digiclay.layout.columns = 14
+    with pytest.raises(DigiclayError, match="169 pins"):
+        tick.start(bpy.context, bed)
+    assert running.all() == ()

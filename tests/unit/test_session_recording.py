@@ -1,0 +1,63 @@
+"""What is recorded of a session can be played again; undo shortens it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from digiclay import sculpting
+from digiclay.core import live
+from digiclay.core.keeping import packed, unpacked
+from digiclay.core.live import lived
+
+from tests.hand import Hand, started
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
+    monkeypatch.setattr(live, "SHARE", 1e9)
+
+
+def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
+    hand = Hand()
+    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = hand.press(hand.press(session), 6.0)
+    keep = session.recording
+    assert keep is not None
+    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
+    assert packed(session.system, again) == session.kept
+
+
+def test_undo_shortens_a_recording_to_what_led_there() -> None:
+    hand = Hand()
+    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = hand.press(session)
+    kept, moment, at = session.kept, session.moment, session.pose
+    session = sculpting.restored(hand.press(session, 6.0), kept, at, moment)
+    session = hand.press(session, 3.0)
+    keep = session.recording
+    assert keep is not None
+    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
+    assert packed(session.system, again) == session.kept
+
+
+def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
+    hand = Hand()
+    session = sculpting.recording(started(), True)
+    early = hand.press(session)
+    here = early.kept, early.pose, early.moment
+    late = hand.press(early, 6.0)
+    there = late.kept, late.pose, late.moment
+    session = hand.press(sculpting.restored(late, *here), -6.0)
+    assert sculpting.restored(session, *there).path is None
+
+
+def test_a_long_recording_copies_itself_seldom() -> None:
+    session = sculpting.recording(started(), True)
+    keep, arrays = session.recording, set()
+    assert keep is not None
+    for moment in range(5000):
+        keep = keep.extended(np.zeros((7, 7)), moment)
+        arrays.add(id(keep.rows))
+    assert len(keep.path) == 35001
+    assert len(arrays) < 12
