@@ -1,11 +1,12 @@
 """The closed-form step: exact for an exponential spring behind a linear flow resistance.
 
 The valve's opening is known in closed form all through a period. Over a physics step its
-conductance, the force lost to relaxation and the finger's speed are frozen at mid step, and
+conductance, the force lost to relaxation and the finger's speed are frozen at their means, and
 what remains is solved exactly (`closed_form`). The step is therefore stable at any length and
-stiffness, without iteration, and second order. A valve that changes reservoir within a step
-needs no care (conductance and drive are averaged at Gauss points of the exact opening), and
-a cell that meets or leaves the finger does so at the exact instant.
+stiffness, without iteration, and second order. What the frozen speeds leave out most of, that
+free pin and finger go bent ways, is put back by its mean, the bow. A valve that changes
+reservoir within a step needs no care (conductance and drive are averaged at Gauss points of the
+exact opening), and a cell that meets or leaves the finger does so at the exact instant.
 """
 
 from __future__ import annotations

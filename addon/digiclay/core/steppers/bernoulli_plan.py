@@ -14,7 +14,7 @@ from ..absent import Unrelaxed
 from ..closed_form import LARGE, TINY
 from ..contact import LARGEST_EXPONENT, Contact
 from ..delay import Queue
-from ..physics import GAUSS, Cell
+from ..physics import Cell
 from ..places import Pulp, Segment
 from ..supply import Supply
 
@@ -22,6 +22,10 @@ __all__ = ["BernoulliPlan", "bernoulli_plan"]
 
 Floats = NDArray[np.float64]
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]
+#: Four-point Gauss-Legendre nodes and weights on [0, 1]: within a step a valve may go all its way.
+NODES: tuple[float, ...] = tuple((0.5 + 0.5 * _NODES).tolist())
+WEIGHTS: tuple[float, ...] = tuple((0.5 * _WEIGHTS).tolist())
 #: A way that bends more than this within a step, in 1/m, is beyond correcting.
 BEND = 0.25
 
@@ -163,7 +167,7 @@ def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, 
     """Return Gauss points of all steps: times and weights, s, and which are whose.
 
     Where the valve goes over to the next command its opening has a kink: a step that holds one
-    takes two points on either side of it.
+    takes its points on either side of it.
     """
     times: list[float] = []
     weights: list[float] = []
@@ -173,8 +177,8 @@ def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, 
         inner = (queue.cut,) if part.start < queue.cut * (1.0 - 1e-9) < end * (1.0 - 2e-9) else ()
         first = len(times)
         for a, b in pairwise((part.start, *inner, end)):
-            times += [a + node * (b - a) for node in GAUSS]
-            weights += [0.5 * (b - a)] * 2
+            times += [a + node * (b - a) for node in NODES]
+            weights += [weight * (b - a) for weight in WEIGHTS]
         nodes.append(slice(first, len(times)))
     return np.array(times), np.array(weights), tuple(nodes)
 
