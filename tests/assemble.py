@@ -166,7 +166,7 @@ def place(x: Floats, y: Floats) -> Floats:
 
 def under(outline: Floats, x: Floats, y: Floats) -> Floats:
     """Return the finger's underside, (k, n), m, for outlines (k, 10)."""
-    return underside(*forms(outline), outline[:, 8:9], place(x, y))
+    return underside(*forms(outline), place(x, y))
 
 
 def one_cell(**parts: Any) -> System:

@@ -146,7 +146,11 @@ def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
 
 
 def test_a_curved_skin_is_shaded_smooth_and_walls_and_pins_are_flat(bed):
-    for kind, skin, some in (("solid", "smooth", True), ("solid", "bilinear", False), ("pins", "smooth", False)):
+    for kind, skin, some in (
+        ("solid", "smooth", True),
+        ("solid", "bilinear", False),
+        ("pins", "smooth", False),
+    ):
         bpy.context.view_layer.objects.active = bed
         bpy.ops.mesh.digital_clay_make(kind=kind, skin=skin)
         polygons = bpy.context.object.data.polygons

@@ -19,7 +19,7 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "body feature_region skin_spline errors modes png closed_form control.travel metrics_signal",
+    "body feature_region skin_spline errors modes png closed_form filled control.travel metrics_signal",
     "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
     "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export metrics control.servo control.blister",
@@ -27,9 +27,10 @@ LEVELS = (
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene",
-    "features system observer steppers.bernoulli steppers.explicit "
+    "features system observer steppers.bernoulli_plan steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
     "control.drive control.neighbours control.shapes",
+    "steppers.bernoulli",
     "feature_solids "
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "

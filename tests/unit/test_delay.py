@@ -11,6 +11,7 @@ from digiclay.core.errors import ParameterError
 from digiclay.core.steppers.bernoulli import BernoulliExponential
 from digiclay.core.steppers.runge_kutta import RungeKutta4
 from digiclay.core.system import System, segments
+from digiclay.core.valve_lag import ValveLag
 from scipy.integrate import quad
 
 from tests.assemble import AWAY, one_cell, record, scripted
@@ -94,7 +95,7 @@ def test_whole_periods_of_dead_time_need_no_cut(dead_time: float) -> None:
 
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
 def test_the_steps_of_a_period_fill_it_without_a_gap(dead_time: float) -> None:
-    cut, _ = segments(RungeKutta4(), queue(Delay(dead_time), PERIOD), PERIOD, 1e-3)
+    cut, _ = segments(RungeKutta4(), queue(Delay(dead_time), PERIOD).cut, PERIOD, 5)
     ends = [part.start + part.length for part in cut]
     assert [part.start for part in cut] == pytest.approx([0.0, *ends[:-1]], abs=1e-18)
     assert ends[-1] == pytest.approx(PERIOD, abs=1e-18)
@@ -102,15 +103,33 @@ def test_the_steps_of_a_period_fill_it_without_a_gap(dead_time: float) -> None:
 
 def test_a_step_ends_where_the_next_command_arrives() -> None:
     waiting = queue(Delay(7.3e-3), PERIOD)
-    cut, _ = segments(BernoulliExponential(), waiting, PERIOD, 1e-3)
+    cut, _ = segments(BernoulliExponential(), waiting.cut, PERIOD, 5)
     seen = {round(part.start, 12): waiting.seen(part.start) for part in cut}
     assert seen == {0.0: 0, 1e-3: 0, 2e-3: 0, 2.3e-3: 1, 3e-3: 1, 4e-3: 1}
+
+
+def steps(stepper: str, valve_lag: ValveLag | None) -> int:
+    """Return how many physics steps a control period is cut into, with a dead time of a fifth of it."""
+    system = one_cell(stepper=stepper, period=PERIOD, step=PERIOD, dead_time=PERIOD / 5, valve_lag=valve_lag)
+    return len(system.plan.segments)
+
+
+def test_the_closed_form_step_goes_on_over_the_kink_of_a_lagging_valve() -> None:
+    assert steps("bernoulli", ValveLag()) == 1
+
+
+def test_a_valve_without_lag_jumps_and_ends_a_step() -> None:
+    assert steps("bernoulli", None) == 2
+
+
+def test_other_steppers_end_a_step_at_the_kink() -> None:
+    assert steps("runge_kutta_4", ValveLag()) == 2
 
 
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
 def test_the_instants_of_each_step_are_the_stepper_s_nodes(dead_time: float) -> None:
     stepper = RungeKutta4()
-    cut, instants = segments(stepper, queue(Delay(dead_time), PERIOD), PERIOD, 1e-3)
+    cut, instants = segments(stepper, queue(Delay(dead_time), PERIOD).cut, PERIOD, 5)
     wanted = [[part.start + node * part.length for node in stepper.nodes] for part in cut]
     assert [instants[list(part.nodes)].tolist() for part in cut] == [
         pytest.approx(w, abs=1e-15) for w in wanted

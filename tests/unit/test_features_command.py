@@ -119,7 +119,10 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
         (["export", "run", "--base-thickness", "0"], "Model.base_thickness must be above 0 m (got 0 m)."),
         (["export", "run", "--base-thickness", "thick"], "--base-thickness must be a number"),
         (["export", "run", "--kind", "features", "--time", "0"], "There is no feature of at least 3 pins"),
-        (["features", "run", "--threshold", "-1"], "Finding.threshold must be at least 1e-06 m (got -0.001 m)."),
+        (
+            ["features", "run", "--threshold", "-1"],
+            "Finding.threshold must be at least 1e-06 m (got -0.001 m).",
+        ),
         (["features", "run", "--threshold", "1 N"], "--threshold must be in m or a multiple of it"),
         (["features", "run", "--smallest", "0"], "Finding.smallest must be at least 1 (got 0)."),
         (["features", "run", "--former", "99"], "--former must be between 0 s and"),

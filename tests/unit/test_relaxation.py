@@ -115,12 +115,26 @@ def test_without_contact_the_pulp_decays_like_a_step_without_tension() -> None:
     assert aged[:, 0] == pytest.approx(stepped, rel=1e-13)  # rounding
 
 
-def test_half_a_step_on_the_relaxed_force_is_that_of_a_still_tension() -> None:
-    own = np.array([0.3, 0.2, 0.1])
-    foreseen = Relaxation().halfway(4e-3) @ [*own, 2.0]
-    assert foreseen == pytest.approx(
-        Relaxation().relaxed(filtered(own, 2.0, 2.0, 2e-3)), rel=1e-13
-    )  # rounding
+@pytest.mark.parametrize("step", [1e-6, 1e-3, 5e-3, 50e-3])
+def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step: float) -> None:
+    own, first, last = np.array([0.3, 0.2, 0.1]), 2.0, 1.2
+
+    def lost_at(time: float) -> float:
+        now = first + (last - first) * time / step
+        return float(Relaxation().relaxed(filtered(own, first, now, time)))
+
+    weights, share = Relaxation().lost(step)
+    foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
+    # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
+    assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
+
+
+def test_what_relaxes_quicker_than_the_step_is_a_share_of_the_tension() -> None:
+    # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
+    quick = Relaxation(times=(1e-9, 1e-9, 1e-9))
+    weights, share = quick.lost(5e-3)
+    assert share == pytest.approx(float(quick.shares.sum()), rel=1e-6)
+    assert np.all(np.abs(weights) < 1e-6)
 
 
 def test_the_rate_vanishes_once_the_filters_hold_the_tension() -> None:

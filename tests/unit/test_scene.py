@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from digiclay.core.errors import ParameterError
-from digiclay.core.scene import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene
+from digiclay.core.scene import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene, Simulation
 from digiclay.core.scene_table import PRESETS, resolve, text
 
 
@@ -192,16 +192,6 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"supply": {"high": -1e5}},
         "supply.high must be above supply.low (got -100000 Pa, low -50000 Pa).",
     ),
-    "period no multiple of the step": (
-        {"simulation": {"physics_step": 2e-3}},
-        "simulation.control_period must be a whole multiple of simulation.physics_step, 0.002 s "
-        "(got 0.005 s).",
-    ),
-    "step longer than the period": (
-        {"simulation": {"physics_step": 1e-2}},
-        "simulation.control_period must be a whole multiple of simulation.physics_step, 0.01 s "
-        "(got 0.005 s).",
-    ),
     "endless steps": (
         {"simulation": {"physics_step": 1e-9}},
         "simulation.physics_step must be at least a 1000th of simulation.control_period, 0.005 s "
@@ -293,3 +283,17 @@ def test_a_written_scene_names_every_parameter() -> None:
     tables = tomllib.loads(text(scene))
     missing = [(name, key) for name in PARTS for key in vars(getattr(scene, name)) if key not in tables[name]]
     assert missing == []
+
+
+@pytest.mark.parametrize(
+    ("step", "count"), [(5e-3, 1), (1e-2, 1), (1e-3, 5), (2e-3, 3), (4.9e-3, 2), (5e-6, 1000)]
+)
+def test_a_period_has_as_few_equal_steps_as_its_longest_allows(step: float, count: int) -> None:
+    assert Simulation(control_period=5e-3, physics_step=step).steps == count
+
+
+def test_a_period_of_many_longest_steps_does_not_gain_one_by_rounding() -> None:
+    # 0.3 / 0.1 is 2.9999999999999996 and 0.7 / 0.1 is 6.999999999999999; 0.6 / 0.2 is 2.9999999999999996.
+    assert [Simulation(control_period=n * 0.1, physics_step=0.1).steps for n in range(1, 11)] == list(
+        range(1, 11)
+    )

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import dataclasses
 import statistics
+import sys
 import timeit
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from ..core import simulation
 from ..core.assembly import assemble
+from ..core.filled import filled
 from ..core.scene import Scene
 from ..core.system import System
 from ..core.trajectory import Trajectory
@@ -26,7 +29,7 @@ from .benchmark_report import table
 __all__ = ["Counted", "Ledger", "floor", "period_calls", "report"]
 
 #: Methods of arrays that make an array; reductions reach `__array_ufunc__` by themselves.
-METHODS = ("take", "copy", "repeat", "reshape", "__getitem__", "__setitem__")
+METHODS = ("take", "copy", "astype", "dot", "reshape", "__getitem__", "__setitem__")
 
 
 class Ledger:
@@ -132,17 +135,35 @@ def _counting() -> Iterator[None]:
     def gathered(*arguments: Any) -> Any:
         state = gather(*arguments)
         held = state.gathered
+        if isinstance(held.block, Counted):
+            return state
         counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
         return dataclasses.replace(state, gathered=dataclasses.replace(held, **counted))
 
     def coming(*arguments: Any) -> list[Any]:
         return [one and _fields_counted(one) for one in approaches(*arguments)]
 
+    constants = [module for module in _core() if hasattr(module, "filled")]
+
+    def full(*arguments: Any) -> Any:
+        return _fields_counted(filled(*arguments))
+
     try:
         simulation.taking_part, simulation.approaches = gathered, coming  # type: ignore[assignment]
+        for module in constants:
+            module.filled = full  # type: ignore[attr-defined]
         yield
     finally:
         simulation.taking_part, simulation.approaches = gather, approaches
+        for module in constants:
+            module.filled = filled  # type: ignore[attr-defined]
+
+
+def _core() -> list[ModuleType]:
+    """Return the modules of the core that have been imported, but the one that makes constants."""
+    package = simulation.__name__.rpartition(".")[0]
+    own = f"{package}.filled"
+    return [module for name, module in sys.modules.items() if name.startswith(f"{package}.") and name != own]
 
 
 def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[list[int], Ledger]:

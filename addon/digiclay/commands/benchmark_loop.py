@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 
-from ..core.closed_form import crossed
+from ..core.closed_form import TINY, crossed
 from ..core.fingertip import JOIN
-from ..core.physics import GAUSS
 from ..core.simulation import begin
+from ..core.steppers.bernoulli_plan import BEND, NODES, WEIGHTS
 from .benchmark_peers import ROOT, Line
 from .benchmark_problems import Measured, Problem
 
@@ -35,7 +35,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
     for row, (cells, k) in enumerate(known.sets[:periods]):
         start = row * system.period
         old, new = known.commands[row - 1].tolist() if row else nothing, known.commands[row].tolist()
-        poses = [line.finger(start + i * step) for i in range(count + 1)]
+        poses = [line.finger(start + i * step / 2) for i in range(2 * count + 1)]
         total, touched = 0.0, set(cells[:k].tolist())
         for i in range(grid.count):
             if i not in touched:
@@ -45,9 +45,9 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
             unders = [own.underside(pose, xs[i], ys[i]) for pose in poses] if near else []
             for s in range(count):
                 command = new[i] if s * step >= dead - 1e-12 else old[i]
-                openings = [command + (y[4] - command) * math.exp(-node * step / tau) for node in GAUSS]
+                openings = [command + (y[4] - command) * math.exp(-node * step / tau) for node in NODES]
                 y[4] = command + (y[4] - command) * math.exp(-step / tau)
-                own.step(y, openings, unders[s : s + 2])
+                own.step(y, openings, unders[2 * s : 2 * s + 3])
             if near:
                 total += own.force(y, unders[-1])
         heights.append([y[0] for y in state])
@@ -66,9 +66,11 @@ class Scalar:
         self.area, self.m = cell.actuator.area, contact.exponent
         self.unit = contact.stiffness / contact.exponent
         self.share = contact.share
+        lost, lost_now = pulp.lost(step)
         self.speeds, self.weights = pulp.rates[:, 0].tolist(), pulp.shares.tolist()
-        self.halfway, self.transition = pulp.halfway(step).tolist(), pulp.transition(step).tolist()
-        self.stiff = contact.share * contact.stiffness / self.area
+        self.lost = [*(lost[:-1] / self.unit / (1.0 - lost_now)), lost[-1] / (1.0 - lost_now)]
+        self.transition = pulp.transition(step).tolist()
+        self.stiff = contact.share * contact.stiffness / self.area * (1.0 - lost_now)
 
     def underside(self, pose: tuple[float, float, float], x: float, y: float) -> float:
         """Return the finger's underside over one cell, m."""
@@ -87,29 +89,31 @@ class Scalar:
 
     def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
         """Move a cell on by a step, in place."""
-        mobility = free = 0.0
-        for opening in openings:
+        mobility = free = bow = 0.0
+        for node, weight, opening in zip(NODES, WEIGHTS, openings, strict=True):
             lift = opening * opening
-            g = 0.5 * self.h * lift / (1.0 / self.laminar + self.resistance * lift) / self.area
+            g = weight * self.h * lift / (1.0 / self.laminar + self.resistance * lift) / self.area
+            rise = g * (self.high if opening > 0.0 else self.low)
             mobility += g
-            free += g * (self.high if opening > 0.0 else self.low)
+            free += rise
+            bow += rise * (0.5 - node)
         if not unders:
             y[0] = min(max(y[0] + free, 0.0), self.stroke)
             return
-        z = [one / self.unit for one in y[1:4]]
-        first = self.tension(y[0], unders[0])
-        relaxed = 1.0 + sum(a * b for a, b in zip(self.halfway, [*z, first], strict=True))
-        decay, slip = self.stiff * mobility + 1e-200, self.m * (free - unders[1] + unders[0])
-        growth, exponent = slip + decay * relaxed + 1e-200, self.m * (y[0] - unders[0])
-        if first + 1.0 > relaxed:
-            relief = math.log1p(decay * (first + 1.0) * math.expm1(growth) / growth)
-            way, mean = growth - relief, relief / decay - 1.0
-        else:
-            way, mean = slip, -1.0
-        if (exponent + way <= math.log(relaxed)) != (first + 1.0 <= relaxed):
-            told = crossed(*(np.array([v]) for v in (exponent, slip, decay, relaxed)))
-            way, mean = float(told[0][0]), float(told[1][0]) - 1.0
-        y[0] = min(max(y[0] + free + (way - slip) / self.m, 0.0), self.stroke)
-        last = self.tension(y[0], unders[1])
-        work = [*z, first, mean if mean > -1.0 else 0.5 * (first + last), last]
-        y[1:4] = [self.unit * sum(a * b for a, b in zip(row, work, strict=True)) for row in self.transition]
+        start, middle, end = unders
+        first, exponent = self.tension(y[0], start), self.m * (y[0] - start)
+        lost = sum(a * b for a, b in zip(self.lost, [*y[1:4], first], strict=True))
+        decay, slip = self.stiff * mobility + TINY, self.m * (free - end + start)
+        bow = min(self.m * (bow - (2.0 * middle - start - end) / 3.0), BEND)
+        idle = first <= lost
+        stiffness = TINY if idle else decay
+        growth = stiffness * (1.0 + lost) + slip + TINY
+        relief = math.log1p(stiffness * math.exp(exponent + bow) * math.expm1(growth) / growth)
+        push, mean = stiffness * (1.0 + lost) - relief, relief / stiffness - 1.0
+        if (math.expm1(max(exponent + slip + push, 0.0)) <= lost) != idle:
+            told = crossed(*(np.array([v]) for v in (exponent, bow, slip, decay, 1.0 + lost)))
+            push, mean = float(told[0][0]), float(told[1][0])
+        y[0] = min(max(y[0] + free + push / self.m, 0.0), self.stroke)
+        tensions = [self.unit * one for one in (first, max(mean, 0.0), self.tension(y[0], end))]
+        work = [*y[1:4], *tensions]
+        y[1:4] = [max(sum(a * b for a, b in zip(row, work, strict=True)), 0.0) for row in self.transition]

@@ -30,7 +30,7 @@ PARTS = {
     "the rest": "gathering the cells that move, and putting them back",
 }
 #: What of the simulation's own functions is contact.
-CONTACT = ("approaches", "_underside", "_feel")
+CONTACT = ("approaches", "_underside")
 EXAMPLES = """\
 examples:
   digiclay benchmark session

@@ -51,9 +51,9 @@ class Unrelaxed:
         """Return no rows."""
         return own
 
-    def halfway(self, step: float) -> Floats:
-        """Return the map to no loss of force, shape (1,)."""
-        return np.zeros(1)
+    def lost(self, step: float) -> tuple[Floats, float]:
+        """Return the map to no loss of force, shape (1,), and no share."""
+        return np.zeros(1), 0.0
 
     def transition(self, step: float) -> Floats:
         """Return the map to no rows, shape (0, 3)."""

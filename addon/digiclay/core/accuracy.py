@@ -65,8 +65,7 @@ def estimated(
     stopped : callable, optional
         Asked after each control period; when it says True, there is no estimate: None.
     """
-    half = replace(scene.simulation, physics_step=scene.simulation.physics_step / 2)
-    system = assemble(replace(scene, simulation=half))
+    system = assemble(replace(scene, simulation=scene.simulation.refined(2)))
     system = replace(
         system, controller=Replay(system.grid, history["command"]), rows=replace(system.rows, control=0)
     )

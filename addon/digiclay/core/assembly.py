@@ -29,7 +29,9 @@ def assemble(scene: Scene) -> System:
     period = scene.simulation.control_period
     cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
     line = queue(scene.delay, period) if scene.delay else Queue()
-    steps, instants = segments(stepper, line, period, scene.simulation.physics_step)
+    # An opening that lags has a kink where the next command comes through; one that does not, a jump.
+    cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
+    steps, instants = segments(stepper, cut, period, scene.simulation.steps)
     bed = grid(scene.layout)
     controller, sensors = _controller(scene, bed, cell), _sensors(scene, cell, line)
     return System(

@@ -118,7 +118,7 @@ class Fitted:
 def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
     """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
     simulation = scene.simulation
-    steps = round(simulation.control_period / simulation.physics_step)
+    steps = simulation.steps
     for fewer in range(1, steps):
         if steps % fewer == 0:
             step = simulation.control_period / fewer
@@ -226,7 +226,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
 def _weight(scene: Scene, system: System) -> int:
     """Return the work of a cell in a control period: steps times state rows, and parts that own no row."""
     rows: int = system.rows.driven.stop + sum(getattr(scene, part) is not None for part in WITHOUT_ROWS)
-    return rows * round(scene.simulation.control_period / scene.simulation.physics_step)
+    return rows * scene.simulation.steps
 
 
 def _own_error(scene: Scene) -> float:

@@ -71,35 +71,49 @@ def careful(exponent: Floats, growth: Floats, decay: Floats) -> tuple[Floats, Fl
     return relief, np.exp(np.minimum(log_grown + ratio, 2.0 * LARGE))
 
 
-def crossed(exponent: Floats, slip: Floats, decay: Floats, pulp: Floats) -> tuple[Floats, Floats]:
+def crossed(
+    exponent: Floats, bow: Floats, slip: Floats, decay: Floats, pulp: Floats
+) -> tuple[Floats, Floats]:
     """Solve for cells that meet or leave the finger within the step.
 
     Parameters
     ----------
     exponent, slip, decay, pulp : ndarray (k,)
         See the module. Below ``log(pulp)`` at the start means meeting, above it leaving.
+    bow : ndarray (k,)
+        How far the way without load runs, on average, above the straight line between its ends.
 
     Returns
     -------
-    way : ndarray (k,)
-        ``e(1) - e(0)``; the instant of meeting or leaving is found exactly.
+    push : ndarray (k,)
+        ``e(1) - e(0) - slip``, the load's part; the instant of meeting or leaving is found exactly
+        on a straight way, and to second order on a bent one.
     mean : ndarray (k,)
-        Mean of ``max(exp(e), 1)``, the part without load by the trapezoidal rule.
+        Mean of ``max(exp(e) - 1, 0)``.
     """
     growth = _not_zero(slip + decay * pulp)
     slip = _not_zero(slip)
     threshold = np.log(pulp)
-    gap = threshold - exponent
-    meets = gap >= 0.0
+    share = _loaded_share(threshold - exponent, slip, growth)
+    # A parabola's mean height over the loaded part, from its mean over all of it.
+    exponent = exponent + bow * share * (3.0 - 2.0 * share)
+    share = _loaded_share(threshold - exponent, slip, growth)
+    start = np.maximum(exponent, threshold)
+    relief, mean = careful(start, _not_zero(share * growth), np.maximum(share * decay, TINY))
+    # Without load the exponent goes straight, up to the threshold or down from it; below 0 is a gap.
+    apart = np.maximum(np.abs((1.0 - share) * slip), TINY)
+    closed = np.minimum(apart, np.maximum(threshold, 0.0))
+    alone = (pulp * -np.expm1(-closed) - closed) / apart
+    return share * decay * pulp - relief, share * (mean - 1.0) + (1.0 - share) * alone
+
+
+def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
+    """Return the share of the step in which a cell is loaded; `gap` is the way up to the threshold."""
     # Leaving: u grows from exp(-e(0)) to 1/pulp; the linear equation tells when.
     shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
     leaving = np.log1p(np.maximum(growth * shrunk, _ALL_BUT_GONE)) / growth
-    share = np.clip(np.where(meets, 1.0 - gap / slip, leaving), 0.0, 1.0)
-    start = np.maximum(exponent, threshold)
-    relief, mean = careful(start, _not_zero(share * growth), np.maximum(share * decay, TINY))
-    way = np.where(meets, gap + share * growth - relief, gap + (1.0 - share) * slip)
-    outside = np.exp(np.maximum(np.where(meets, exponent, exponent + way), 0.0))
-    return way, share * mean + (1.0 - share) * 0.5 * (pulp + outside)
+    share: Floats = np.clip(np.where(gap >= 0.0, 1.0 - gap / slip, leaving), 0.0, 1.0)
+    return share
 
 
 def _not_zero(values: Floats) -> Floats:

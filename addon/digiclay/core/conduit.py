@@ -47,7 +47,9 @@ class OrificeAndConduit(Orifice):
     def laminar_conductance(self, opening: Floats) -> Floats:
         """Return g / (1 + R g), m³/(s Pa)."""
         lift = Orifice.laminar_lift(self, opening)
-        return lift / (1.0 / self.laminar + self.resistance * lift)
+        series = self.resistance * lift
+        series += 1.0 / self.laminar
+        return lift / series
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .filled import filled
 from .quantity import Parameters, quantity
 
 __all__ = ["Contact"]
@@ -33,13 +35,20 @@ class Contact(Parameters):
 
         Parameters
         ----------
-        depth : ndarray (n,)
+        depth : ndarray (..., n)
             Indentation x, m; negative where there is a gap.
         """
-        exponent = np.multiply(depth, self.exponent)
-        exponent -= self.offset * self.exponent
-        np.maximum(exponent, 0.0, out=exponent)
-        np.minimum(exponent, LARGEST_EXPONENT, out=exponent)
+        m, offset, none, most, unit = filled(self.numbers, depth.shape[-1])
+        exponent: Floats = depth * m
+        exponent -= offset
+        np.maximum(exponent, none, out=exponent)
+        np.minimum(exponent, most, out=exponent)
         np.expm1(exponent, exponent)
-        exponent *= self.stiffness / self.exponent
+        exponent *= unit
         return exponent
+
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """What `tension` is made with: m, 1/m; m x0; the exponent's bounds; b/m, N."""
+        m = self.exponent
+        return m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m

@@ -68,7 +68,7 @@ class Fingertip(Parameters):
         outline[:, 3], outline[:, 4], outline[:, 5] = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
         outline[:, 6:8] = tilt
         outline[:, 8] = form[:, 2, 2] ** -0.5
-        outline[:, 9] = np.linalg.eigvalsh(schur)[:, 0]
+        outline[:, 9] = _smaller_eigenvalue(schur)
         return outline
 
 
@@ -104,49 +104,66 @@ def reach(base: float, tilt: float, bend: float, peak: float) -> float:
 
 
 def forms(outline: Floats) -> tuple[Floats, Floats]:
-    """Return the ellipsoid's thickness and its mid surface as quadratic forms of the position.
+    """Return what `underside` needs as quadratic forms of the position.
+
+    With r² the squared reduced radius, t the half thickness over the centre, and
+    ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
+    tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
 
     Parameters
     ----------
-    outline : ndarray (..., 10)
+    outline : ndarray (..., p, 10)
         From `Fingertip.outline`.
 
     Returns
     -------
-    inward : ndarray (..., 6)
-        Coefficients of 1, x, y, x², x y, y² in 1 - r², r² the squared reduced radius.
-    middle : ndarray (..., 6)
-        Those of the height of the mid surface, m.
+    forms : ndarray (..., 2 p, 6)
+        Coefficients of 1, x, y, x², x y, y²: p rows in R, then p rows in the tangent, m.
+    join : ndarray (..., 2, p, 1)
+        c, m, and its root.
     """
-    x, y, z, xx, xy, yy, tilt_x, tilt_y, _, _ = np.moveaxis(outline, -1, 0)
+    x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
     zero = np.zeros_like(x)
     square = xx * x * x + 2.0 * xy * x * y + yy * y * y
-    inward = [1.0 - square, 2.0 * (xx * x + xy * y), 2.0 * (xy * x + yy * y), -xx, -2.0 * xy, -yy]
-    middle = [z + tilt_x * x + tilt_y * y, -tilt_x, -tilt_y, zero, zero, zero]
-    return np.stack(inward, -1), np.stack(middle, -1)
+    inward = np.stack(
+        [1.0 - square, 2.0 * (xx * x + xy * y), 2.0 * (xy * x + yy * y), -xx, -2.0 * xy, -yy], -1
+    )
+    middle = np.stack([z + tilt_x * x + tilt_y * y, -tilt_x, -tilt_y, zero, zero, zero], -1)
+    slope, join = (_SLOPE * half)[..., None], (0.5 * _ROOT * half)[..., None]
+    tangent = middle - slope * inward
+    tangent[..., 0] -= join[..., 0]
+    rows = np.concatenate([inward * (join / (1.0 - JOIN)), tangent], -2)
+    return rows, np.stack([join, np.sqrt(join)], -3)
 
 
-def underside(inward: Floats, middle: Floats, half: Floats, place: Floats) -> Floats:
+def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
     """Return the height of the finger's underside, shape (p, k), m.
 
     Parameters
     ----------
-    inward, middle : ndarray (p, 6)
+    forms : ndarray (2 p, 6)
+    join : ndarray (2, p, 1)
         From `forms`.
-    half : ndarray (p, 1)
-        Half thickness over the centre, m.
     place : ndarray (6, k)
         Rows 1, x, y, x², x y, y² of the places asked for.
     """
-    root: Floats = np.dot(inward, place)
-    kept = np.maximum(root, 1.0 - JOIN)
-    # Beyond the join the tangent: sqrt(kept) + (root - kept) / (2 sqrt(1 - JOIN)).
-    root -= kept
-    root *= _SLOPE
-    root += np.sqrt(kept, kept)
-    root *= half
-    np.subtract(np.dot(middle, place), root, root)
-    return root
+    least, root = join
+    rows = forms.dot(place)
+    inner: Floats = rows[: len(least)]
+    np.maximum(inner, least, out=inner)
+    np.sqrt(inner, inner)
+    inner -= root
+    inner *= inner
+    inner += rows[len(least) :]
+    return inner
+
+
+def _smaller_eigenvalue(matrices: Floats) -> Floats:
+    """Return the smaller eigenvalue of symmetric matrices (k, 2, 2)."""
+    a, b, c = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
+    smaller: Floats = (a * c - b * b) / larger
+    return smaller
 
 
 def matrices(quaternions: Floats) -> Floats:

@@ -8,21 +8,24 @@ on the size of the bed. The set is kept for some periods, with a margin around i
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import NOWHERE, inside
+from .fingertip import reach
+from .layout import Grid
 from .modes import Mode
-from .state import Gathered, State
+from .state import Disc, Gathered, State
 from .system import System
-from .touch import Approach, bounds
+from .touch import Approach
 
 __all__ = ["taking_part"]
 
 Cells = NDArray[np.intp]
 
 #: Control periods after which the set is made anew, without the cells that have come to rest.
-KEPT = 16
+KEPT = 32
 
 
 def taking_part(
@@ -41,42 +44,68 @@ def taking_part(
         Disc x, y, radius that the controller will command, m.
     """
     grid, held = system.grid, state.gathered
-    disc = grid.bounds(*control) if control else NOWHERE
-    reach = bounds(grid, finger.window, held.peak, 0.0) if finger else NOWHERE
-    if state.period < held.until and inside(disc, held.control) and inside(reach, held.reach):
+    if (
+        state.period < held.until
+        and _holds(held.control, control)
+        and _holds(held.reach, _reach(finger, held.peak))
+    ):
         return state
     moving, top = _put_back(system, state)
     peak = min(top + KEPT * system.period * system.fastest, system.cell.actuator.stroke)
     margin = grid.layout.pitch
-    if control:
-        x, y, radius = control
-        disc = grid.bounds(x, y, radius + margin)
-    if finger:
-        reach = bounds(grid, finger.window, peak, margin)
-    near = grid.within(reach)
-    cells = _together(near, moving, grid.within(disc))
+    wide_control, wide_reach = _wider(control, margin), _wider(_reach(finger, peak), margin)
+    near = _inside(grid, wide_reach)
+    cells = _together(near, moving, _inside(grid, wide_control))
     block = state.rows.take(cells, axis=1)
     block[system.rows.force, near.size :] = 0.0
     if near.size and system.cell.touch:
         waited = state.period * system.period - state.aged.take(near)
         system.cell.touch.pulp.age(block[system.cell.pulp_rows, : near.size], waited)
     held = Gathered(
+        system.rows,
         cells,
         near.size,
         block,
         state.modes.take(cells),
         grid.place(cells),
-        reach,
-        disc,
+        wide_reach,
+        wide_control,
         peak,
         state.period + KEPT,
     )
     return State(state.period, state.rows, state.modes, state.aged, top, held, state.memory)
 
 
+def _reach(finger: Approach | None, peak: float) -> Disc | None:
+    """Return the disc that holds every cell the finger may touch while no pin is above `peak`, m."""
+    if finger is None:
+        return None
+    x, y, spread, base, tilt, bend = finger.window
+    radius = reach(base, tilt, bend, peak)
+    return (x, y, radius + spread) if radius >= 0.0 else None
+
+
+def _wider(disc: Disc | None, margin: float) -> Disc | None:
+    """Return a disc with a margin around it, m."""
+    return disc and (disc[0], disc[1], disc[2] + margin)
+
+
+def _holds(outer: Disc | None, inner: Disc | None) -> bool:
+    """Tell whether all of `inner` is in `outer`."""
+    if inner is None:
+        return True
+    return outer is not None and math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2]
+
+
+def _inside(grid: Grid, disc: Disc | None) -> Cells:
+    """Return the cells of a disc, ascending."""
+    return grid.disc(*disc) if disc else np.empty(0, np.intp)
+
+
 def _put_back(system: System, state: State) -> tuple[Cells, float]:
     """Put the gathered cells back; return those that still move, and the highest pin's height."""
     held, rows = state.gathered, system.rows
+    system.cell.lag.settle(held.block[system.cell.lag_rows])
     state.rows[:, held.cells] = held.block
     state.modes[held.cells] = held.mode
     state.aged[held.cells[: held.near]] = state.period * system.period
@@ -89,6 +118,5 @@ def _put_back(system: System, state: State) -> tuple[Cells, float]:
 
 
 def _together(near: Cells, moving: Cells, controlled: Cells) -> Cells:
-    """Return the near cells first, then the others that are not among them, ascending."""
-    others = np.union1d(moving, controlled)
-    return np.concatenate([near, others[~np.isin(others, near, assume_unique=True)]])
+    """Return the near cells first, then the moving and controlled ones that are not among them, ascending."""
+    return np.concatenate([near, np.setdiff1d(np.concatenate([moving, controlled]), near)])

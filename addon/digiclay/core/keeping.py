@@ -19,7 +19,7 @@ from .errors import StateError
 from .keeping_memory import rebuilt, written
 from .modes import Mode
 from .simulation import begin
-from .state import Gathered, Rows, State
+from .state import Disc, Gathered, Rows, State
 from .system import System
 
 __all__ = ["carried", "packed", "unpacked"]
@@ -53,8 +53,8 @@ def packed(system: System, state: State) -> bytes:
         "gathered": {
             "cells": held.cells.size,
             "near": held.near,
-            "reach": list(held.reach),
-            "control": list(held.control),
+            "reach": held.reach,
+            "control": held.control,
             "peak": held.peak,
             "until": held.until,
         },
@@ -97,13 +97,14 @@ def unpacked(system: System, data: bytes) -> State:
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
     held = Gathered(
+        rows,
         cells,
         gathered["near"],
         kept.arrays["block"],
         kept.arrays["mode"],
         system.grid.place(cells),
-        _four(gathered["reach"]),
-        _four(gathered["control"]),
+        _disc(gathered["reach"]),
+        _disc(gathered["control"]),
         gathered["peak"],
         gathered["until"],
     )
@@ -162,7 +163,7 @@ def _read(data: bytes) -> Kept:
             raise _unusable(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], held["peak"], header["control_period"]]
         numbers += [_whole(value) for value in (header["period"], held["until"], held["near"])]
-        numbers += [*_four(held["reach"]), *_four(held["control"])]
+        numbers += [*(_disc(held["reach"]) or ()), *(_disc(held["control"]) or ())]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
         kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.
@@ -207,10 +208,12 @@ def _whole(value: Any) -> int:
     return value
 
 
-def _four(values: Any) -> tuple[int, int, int, int]:
-    """Return the bounds of a part of the bed."""
-    first, last, left, right = (int(value) for value in values)
-    return first, last, left, right
+def _disc(values: Any) -> Disc | None:
+    """Return a part of the bed."""
+    if values is None:
+        return None
+    x, y, radius = (float(value) for value in values)
+    return x, y, radius
 
 
 def _fits(what: str, kept: Any, here: Any) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import ParameterError
 from .quantity import Parameters, quantity
 
-__all__ = ["NOWHERE", "ON_THE_SIDE", "Bounds", "Grid", "Layout", "grid", "inside"]
+__all__ = ["NOWHERE", "ON_THE_SIDE", "Bounds", "Grid", "Layout", "grid"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -147,13 +147,6 @@ class Grid:
         """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
         x, y = self.x.take(cells), self.y.take(cells)
         return np.array([np.ones(cells.size), x, y, x * x, x * y, y * y])
-
-
-def inside(inner: Bounds, outer: Bounds) -> bool:
-    """Tell whether all cells of `inner` are among those of `outer`."""
-    if inner[0] > inner[1] or inner[2] > inner[3]:
-        return True
-    return inner[0] >= outer[0] and inner[1] <= outer[1] and inner[2] >= outer[2] and inner[3] <= outer[3]
 
 
 def grid(layout: Layout) -> Grid:

@@ -13,7 +13,7 @@ from .places import Flow, Lag
 from .supply import Supply
 from .touch import Touch, force
 
-__all__ = ["GAUSS", "Cell", "rates"]
+__all__ = ["GAUSS", "Cell", "felt", "rates"]
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +52,22 @@ class Cell:
         return 1 + (self.touch.pulp.rows if self.touch else 0) + self.lag.rows
 
 
+def felt(cell: Cell, y: Floats, under: Floats) -> Floats:
+    """Return the force on the first k cells of a block, shape (k,), N.
+
+    Parameters
+    ----------
+    cell : Cell
+    y : ndarray (r, n)
+        State rows, see `Cell`.
+    under : ndarray (k,)
+        Underside of the finger over the first k cells, m.
+    """
+    if cell.touch is None:
+        return np.empty(0)
+    return force(cell.touch, y[0, : under.size], under, y[cell.pulp_rows, : under.size])
+
+
 def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     """Return dy/dt of a block of cells.
 
@@ -69,8 +85,7 @@ def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     pressure = np.zeros_like(height)
     change = np.zeros_like(y)
     if cell.touch and under.size:
-        pressed = force(cell.touch, height[: under.size], under, pulp)
-        pressure[: under.size] = cell.actuator.pressure(pressed)
+        pressure[: under.size] = cell.actuator.pressure(felt(cell, y, under))
         tension = cell.touch.contact.tension(height[: under.size] - under)
         change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
     opening = cell.lag.opening(lag, command)

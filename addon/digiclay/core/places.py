@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ class Pulp(Protocol):
 
     def rate(self, own: Floats, tension: Floats) -> Floats: ...
 
-    def halfway(self, step: float) -> Floats: ...
+    def lost(self, step: float) -> tuple[Floats, float]: ...
 
     def transition(self, step: float) -> Floats: ...
 
@@ -91,8 +91,7 @@ class Sensors(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Truth:
+class Truth(NamedTuple):
     """What there is to be measured, of some cells, between two control periods.
 
     Attributes
@@ -127,11 +126,16 @@ class Stepper(Protocol):
         """When, in shares of a physics step, the finger's pose is needed."""
         ...
 
+    @property
+    def bridges(self) -> bool:
+        """Whether a step may hold the instant at which a lagging valve goes over to the next command."""
+        ...
+
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
         """Work out once what all periods share."""
         ...
 
-    def advance(self, plan: Any, driven: Floats, under: Floats) -> None:
+    def advance(self, plan: Any, driven: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place.
 
         Parameters
@@ -142,6 +146,11 @@ class Stepper(Protocol):
             State rows, see `physics.Cell`, then the commands of the queue, oldest first.
         under : ndarray (p, k)
             Underside of the finger over the first k cells at the period's instants, m.
+
+        Returns
+        -------
+        ndarray (k,)
+            Force on the first k cells at the end, N.
         """
         ...
 
@@ -188,8 +197,7 @@ class Measurement:
     own: Floats
 
 
-@dataclass(frozen=True)
-class Orders:
+class Orders(NamedTuple):
     """What a controller makes of a measurement, (m,) each: targets, m; modes; valve commands."""
 
     target: Floats

@@ -18,6 +18,8 @@ from .state import Rows, State
 
 __all__ = ["Recorder", "Recording", "available_memory", "bytes_needed", "refuse_what_cannot_fit", "write"]
 
+Floats = NDArray[np.float64]
+
 #: Bytes one row takes for one cell: height, force and command as float64, mode as int8.
 BYTES_A_CELL = 3 * 8 + 1
 #: Bytes of memory assumed where the system does not tell.
@@ -67,8 +69,11 @@ class Recording:
         """Take in the state after a control period."""
         started = state.period - 1
         if started % self._every == 0:
-            self._command[self._done] = state.row(self._rows.command)
-            self._mode[self._done] = state.mode()
+            held = state.gathered
+            self._fill(self._command, self._done, state, self._rows.command)
+            modes = self._mode[self._done]
+            modes[:] = state.modes
+            modes[held.cells] = held.mode
         if state.period % self._every == 0 or state.period == self._last:
             self._keep(self._done + 1, state)
 
@@ -80,10 +85,17 @@ class Recording:
 
     def _keep(self, row: int, state: State) -> None:
         """Copy what belongs to an instant into a row."""
-        self._height[row] = state.row(0)
-        self._force[row] = state.row(self._rows.force)
+        self._fill(self._height, row, state, 0)
+        self._fill(self._force, row, state, self._rows.force)
         self._period[row] = state.period
         self._done = row
+
+    @staticmethod
+    def _fill(array: Floats, row: int, state: State, index: int) -> None:
+        """Copy a row of the state, as `State.row` gives it, into a row of an array."""
+        values = array[row]
+        values[:] = state.rows[index]
+        values[state.gathered.cells] = state.gathered.block[index]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the rows so far, without the finger: period (t,), height, force, command, mode (t, n)."""

@@ -62,17 +62,32 @@ class Relaxation(Parameters):
 
     def relaxed(self, own: Floats) -> Floats:
         """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n,), of filters z (k, n)."""
-        relaxed: Floats = np.dot(self.shares, own)
+        relaxed: Floats = self.shares.dot(own)
         return relaxed
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
         return self.rates * (tension - own)
 
-    def halfway(self, step: float) -> Floats:
-        """Return the map from (z, T at the start) to S half a step on, should T stay; shape (k + 1,)."""
-        decay = np.exp(-0.5 * step * self.rates[:, 0])
-        return np.append(self.shares * decay, self.shares @ (1.0 - decay))
+    def lost(self, step: float) -> tuple[Floats, float]:
+        """Return the force lost over a step, on average, as a map of (z, T at the start), and a share of T.
+
+        ``S = map . (z, T_0) + share T``, T the tension that there is: exact for a mean over the
+        step if the tension is linear in time, and the whole loss where the filters are quicker
+        than the step.
+
+        Returns
+        -------
+        map : ndarray (k + 1,)
+        share : float
+            In [0, 1).
+        """
+        turns = self.rates[:, 0] * step
+        kept = -np.expm1(-turns) / turns
+        # Of a small number of turns the difference is rounding only; its series takes over there.
+        series = turns / 3.0 - turns * turns / 12.0
+        share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - kept) / turns))
+        return np.append(self.shares * kept, self.shares @ (1.0 - kept) - share), share
 
     def transition(self, step: float) -> Floats:
         """Return the map from (z; T at the start, on average, at the end of a step) to the new z.

@@ -110,7 +110,7 @@ class Simulation(Parameters):
     """How time is cut up, and how much of it there is."""
 
     control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
-    physics_step: float = quantity(1e-3, "longest step of the physics", unit="s", symbol="h", above=0.0)
+    physics_step: float = quantity(5e-3, "longest step of the physics", unit="s", symbol="h", above=0.0)
     stepper: str = quantity("bernoulli", "how a step is integrated", choices=tuple(STEPPERS))
     tolerance: float = quantity(
         1e-6, "error of the heights that the adaptive stepper keeps to", unit="m", symbol="ε", at_least=1e-7
@@ -120,15 +120,21 @@ class Simulation(Parameters):
     )
 
     def check(self) -> None:
-        """A control period is a whole number of physics steps."""
-        ratio = self.control_period / self.physics_step
-        shown = f"{self.control_period:g} s"
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
-            rule = f"must be a whole multiple of simulation.physics_step, {self.physics_step:g} s"
-            raise ParameterError("simulation", "control_period", rule, shown)
-        if ratio > MOST_STEPS + 0.5:
-            rule = f"must be at least a {MOST_STEPS}th of simulation.control_period, {shown}"
+        """A control period has not too many physics steps."""
+        if self.steps > MOST_STEPS:
+            rule = (
+                f"must be at least a {MOST_STEPS}th of simulation.control_period, {self.control_period:g} s"
+            )
             raise ParameterError("simulation", "physics_step", rule, f"{self.physics_step:g} s")
+
+    @property
+    def steps(self) -> int:
+        """Physics steps of a control period, all of one length."""
+        return max(1, math.ceil(self.control_period / self.physics_step * (1.0 - 1e-9)))
+
+    def refined(self, parts: int) -> Simulation:
+        """Return the same with every physics step cut into equal parts."""
+        return replace(self, physics_step=self.control_period / (self.steps * parts))
 
 
 @dataclass(frozen=True)

@@ -70,8 +70,7 @@ class Shadow:
 def cast(scene: Scene) -> Shadow | None:
     """Return the shadow of a session's beginning; None where the step cannot be halved."""
     try:
-        half = replace(scene.simulation, physics_step=scene.simulation.physics_step / 2)
-        system = assemble(replace(scene, simulation=half))
+        system = assemble(replace(scene, simulation=scene.simulation.refined(2)))
     except DigiclayError:
         return None
     order = 2.0**system.stepper.order

@@ -14,9 +14,9 @@ from .errors import DivergenceError
 from .fingertip import underside
 from .gathering import taking_part
 from .places import Measurement, Truth
-from .state import Gathered, State, at_rest
+from .state import Gathered, Part, State, at_rest
 from .system import System
-from .touch import Approach, approach, force
+from .touch import Approach, approach
 from .trajectory import Trajectory
 
 __all__ = ["advance", "approaches", "begin", "periods", "step"]
@@ -24,7 +24,7 @@ __all__ = ["advance", "approaches", "begin", "periods", "step"]
 Floats = NDArray[np.float64]
 
 #: Control periods whose finger poses are worked out at a time.
-CHUNK = 128
+CHUNK = 256
 
 
 def begin(system: System) -> State:
@@ -77,11 +77,9 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
         return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
     under = _underside(system, finger, held)
     memory = _command(system, state, memory)
-    system.stepper.advance(system.plan, held.block[system.rows.driven], under)
-    _feel(system, held, under)
-    system.sensors.update(
-        held.block[system.rows.sensed], _truth(system, held, state.period + 1, held.cells.size)
-    )
+    held.touched.force[:] = system.stepper.advance(system.plan, held.driven, under)
+    if system.rows.sensors:
+        system.sensors.update(held.all.sensed, _truth(held.all, state.period + 1))
     _check_finite(system, state)
     return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
 
@@ -90,60 +88,47 @@ def _attend(system: System, state: State) -> tuple[Any, tuple[float, float, floa
     """Let the controller take in the touched cells; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
-    return system.controller.attend(state.memory, _measured(system, state, state.gathered.near))
+    seen = _measured(system, state.gathered.touched, state.period)
+    return system.controller.attend(state.memory, seen)
 
 
-def _truth(system: System, held: Gathered, period: int, count: int) -> Truth:
-    """Return what there is to be measured of the first `count` gathered cells."""
-    rows, block = system.rows, held.block
-    return Truth(
-        held.cells[:count], period, block[rows.force, :count], block[0, :count], block[rows.command, :count]
-    )
+def _truth(part: Part, period: int) -> Truth:
+    """Return what there is to be measured of some gathered cells."""
+    return Truth(part.cells, period, part.force, part.height, part.command)
 
 
-def _measured(system: System, state: State, count: int) -> Measurement:
-    """Measure the first `count` of the gathered cells."""
-    rows, held = system.rows, state.gathered
-    block = held.block[:, :count]
-    force, height = system.sensors.measure(block[rows.sensed], _truth(system, held, state.period, count))
-    return Measurement(
-        held.place[:, :count], height, force, block[rows.target], held.mode[:count], block[rows.controlled]
-    )
+def _measured(system: System, part: Part, period: int) -> Measurement:
+    """Measure some gathered cells."""
+    force, height = system.sensors.measure(part.sensed, _truth(part, period))
+    return Measurement(part.place, height, force, part.target, part.mode, part.controlled)
 
 
 def _underside(system: System, finger: Approach | None, held: Gathered) -> Floats:
     """Return the finger's underside over the near cells at the period's instants, shape (p, k), m."""
     if finger is None or not held.near:
         return np.empty((system.instants.size, 0))
-    return underside(finger.inward, finger.middle, finger.half, held.place[:, : held.near])
+    return underside(finger.forms, finger.join, held.touched.place)
 
 
 def _command(system: System, state: State, memory: Any) -> Any:
     """Let the controller command the gathered cells, and queue the commands; return its memory."""
     if system.controller is None:
         return memory
-    rows, held = system.rows, state.gathered
-    memory, orders = system.controller.command(memory, _measured(system, state, held.cells.size))
-    held.block[rows.target] = orders.target
-    held.mode[:] = orders.mode
-    commands = held.block[rows.commands]
-    for older, newer in pairwise(commands):
+    part, queue = state.gathered.all, state.gathered.queue
+    memory, orders = system.controller.command(memory, _measured(system, part, state.period))
+    part.target[:] = orders.target
+    part.mode[:] = orders.mode
+    for older, newer in pairwise(queue):
         older[:] = newer
-    commands[-1] = orders.command
+    queue[-1][:] = orders.command
     return memory
-
-
-def _feel(system: System, held: Gathered, under: Floats) -> None:
-    """Work out the forces at the end of the period."""
-    touch, k, block = system.cell.touch, held.near, held.block
-    if touch and k:
-        block[system.rows.force, :k] = force(touch, block[0, :k], under[-1], block[system.cell.pulp_rows, :k])
 
 
 def _check_finite(system: System, state: State) -> None:
     """Refuse to go on with numbers that are not finite, and say which."""
     rows, held = system.rows, state.gathered
-    if math.isfinite(held.block.sum()):
+    # One product tells: what is not finite makes no finite square.
+    if math.isfinite(held.flat.dot(held.flat)):
         return
     bad = np.argwhere(~np.isfinite(held.block))
     if not bad.size:

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import NOWHERE, Bounds
 from .modes import Mode
 
-__all__ = ["Gathered", "Rows", "State", "at_rest"]
+__all__ = ["Disc", "Gathered", "Part", "Rows", "State", "at_rest"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
+#: Centre x, y and radius, m.
+Disc = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ class Gathered:
 
     Attributes
     ----------
+    rows : Rows
+        Which row of the block holds what.
     cells : ndarray of int (m,)
         First those the finger may touch, then the others that move or are controlled.
     near : int
@@ -95,23 +98,80 @@ class Gathered:
         Their control modes, `modes.Mode`.
     place : ndarray (6, m)
         Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
-    reach, control : Bounds
-        Cells of these parts of the bed are in: the finger's, and the controller's.
+    reach, control : (float, float, float) or None
+        Discs of which every cell is in, the finger's and the controller's: centre x, y, radius, m.
     peak : float
         No pin top in the finger's part is higher while this set is in use, m.
     until : int
         Control period by which the set is to be made anew.
     """
 
+    rows: Rows
     cells: Cells
     near: int
     block: Floats
     mode: NDArray[np.int8]
     place: Floats
-    reach: Bounds
-    control: Bounds
+    reach: Disc | None
+    control: Disc | None
     peak: float
     until: int
+
+    # Parts of the block, all of them views. Each is made once: a set lives for many periods.
+
+    @cached_property
+    def all(self) -> Part:
+        """All cells."""
+        return self._part(self.cells.size)
+
+    @cached_property
+    def touched(self) -> Part:
+        """The cells the finger may touch."""
+        return self._part(self.near)
+
+    def _part(self, count: int) -> Part:
+        """Return the rows of the first `count` cells."""
+        rows, block = self.rows, self.block[:, :count]
+        return Part(
+            self.cells[:count],
+            self.place[:, :count],
+            self.mode[:count],
+            block[0],
+            block[rows.command],
+            block[rows.target],
+            block[rows.force],
+            block[rows.controlled],
+            block[rows.sensed],
+        )
+
+    @cached_property
+    def driven(self) -> Floats:
+        """What a stepper works on."""
+        return self.block[self.rows.driven]
+
+    @cached_property
+    def queue(self) -> tuple[Floats, ...]:
+        """The commands on their way, oldest first."""
+        return tuple(self.block[self.rows.commands])
+
+    @cached_property
+    def flat(self) -> Floats:
+        """All numbers of the block in a row."""
+        return self.block.reshape(-1)
+
+
+class Part(NamedTuple):
+    """Rows of the first gathered cells; `Rows` and `Gathered` say what they are."""
+
+    cells: Cells
+    place: Floats
+    mode: NDArray[np.int8]
+    height: Floats
+    command: Floats
+    target: Floats
+    force: Floats
+    controlled: Floats
+    sensed: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +230,14 @@ def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
     values[0] = values[rows.target] = height
     none = np.empty(0, np.intp)
     nobody = Gathered(
+        rows,
         none,
         0,
         np.empty((rows.count, 0)),
         np.empty(0, np.int8),
         np.empty((6, 0)),
-        NOWHERE,
-        NOWHERE,
+        None,
+        None,
         height,
         0,
     )

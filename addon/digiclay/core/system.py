@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .delay import Queue
 from .layout import Grid
 from .physics import Cell
 from .places import Controller, Segment, Sensors, Stepper
@@ -55,10 +54,18 @@ class System:
     rows: Rows
 
 
-def segments(
-    stepper: Stepper, queue: Queue, period: float, step: float
-) -> tuple[tuple[Segment, ...], Floats]:
-    """Cut a control period into physics steps, also where the valve goes over to the next command.
+def segments(stepper: Stepper, cut: float, period: float, count: int) -> tuple[tuple[Segment, ...], Floats]:
+    """Cut a control period into physics steps.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    cut : float
+        Time into the period at which it is cut besides, s; 0: nowhere.
+    period : float
+        Control period, s.
+    count : int
+        Number of steps of equal length.
 
     Returns
     -------
@@ -66,15 +73,14 @@ def segments(
     instants : ndarray (p,)
         When the stepper needs the finger's pose, s.
     """
-    count = max(1, round(period / step))
     times = {round(i * period / count, 15) for i in range(count + 1)}
-    if queue.cut:
-        times = {t for t in times if abs(t - queue.cut) > 1e-9 * period} | {queue.cut}
+    if cut:
+        times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}
     edges = sorted(times)
     pairs = list(pairwise(edges))
     instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
-    cut = tuple(
+    parts = tuple(
         Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
         for a, b in pairs
     )
-    return cut, np.array(instants)
+    return parts, np.array(instants)

@@ -127,8 +127,7 @@ def finer(scene: Scene, parts: int) -> Scene:
     """
     if not 1 <= parts <= MOST_PARTS:
         raise ParameterError("Take", "parts", f"must be from 1 to {MOST_PARTS}", str(parts))
-    step = scene.simulation.physics_step / parts
-    return replace(scene, simulation=replace(scene.simulation, physics_step=step))
+    return replace(scene, simulation=scene.simulation.refined(parts))
 
 
 def difference(take: Take, parts: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact import Contact
+from .filled import filled
 from .fingertip import Fingertip, forms, reach, reaches
 from .layout import NOWHERE, Bounds, Grid
 from .places import Pulp
@@ -37,16 +38,14 @@ class Approach:
 
     Attributes
     ----------
-    inward, middle : ndarray (p, 6)
+    forms : ndarray (2 p, 6)
+    join : ndarray (2, p, 1)
         From `fingertip.forms`.
-    half : ndarray (p, 1)
-        Half thickness over the centre, m.
     window : Window
     """
 
-    inward: Floats
-    middle: Floats
-    half: Floats
+    forms: Floats
+    join: Floats
     window: Window
 
 
@@ -66,10 +65,9 @@ def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
     shape = reaches(outline)
     farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
     windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    half = outline[:, :, 8]
     return [
-        Approach(form, surface, thickness[:, None], tuple(window))
-        for form, surface, thickness, window in zip(*forms(outline), half, windows, strict=True)
+        Approach(rows, join, tuple(window))
+        for rows, join, window in zip(*forms(outline), windows, strict=True)
     ]
 
 
@@ -105,8 +103,9 @@ def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Float
     filters : ndarray (r, k)
         The relaxation's state rows z_i, N.
     """
+    none, share = filled((0.0, touch.contact.share), height.size)
     tension = touch.contact.tension(height - under)
     tension -= touch.pulp.relaxed(filters)
-    np.maximum(tension, 0.0, out=tension)
-    tension *= touch.contact.share
+    np.maximum(tension, none, out=tension)
+    tension *= share
     return tension

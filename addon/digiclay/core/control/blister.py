@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
+from ..filled import filled
 from ..quantity import Parameters, quantity
 
 __all__ = ["Blister"]
@@ -47,9 +49,20 @@ class Blister(Parameters):
         if self.profile == "gaussian":
             bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
             return bell
-        cone: Floats = np.minimum((self.radius - distance) / (self.radius - self.flat_radius), 1.0)
+        rim, slope, flat = filled(self.cone, distance.shape[-1])
+        cone: Floats = rim - distance
+        cone *= slope
+        np.minimum(cone, flat, out=cone)
         return cone
+
+    @cached_property
+    def cone(self) -> tuple[float, float, float]:
+        """The cone's radius, m, its slope, 1/m, and its top."""
+        return self.radius, 1.0 / (self.radius - self.flat_radius), 1.0
 
     def height(self, distance: Floats, edge: float, top: Floats | float) -> Floats:
         """Return ``edge + p(r) (top - edge)``, m, at distances r from the virtual master."""
-        return edge + self.shape(distance) * (top - edge)
+        height = self.shape(distance)
+        height *= top - edge
+        height += edge
+        return height

@@ -37,9 +37,9 @@ class MasterCell:
 
     def after(self, height: float, opening: float, command: float) -> tuple[float, float]:
         """Return height, m, and opening after one period of a held command."""
-        *nodes, end = (a * opening + b * command for a, b in self.openings)
-        rise = self.period * sum(self.speed(node) for node in nodes) / len(nodes)
-        return min(max(height + rise, 0.0), self.stroke), end
+        (a, b), (c, d), (e, f) = self.openings
+        speed = 0.5 * (self.speed(a * opening + b * command) + self.speed(c * opening + d * command))
+        return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
 
 
 def master_cell(cell: Cell, period: float) -> MasterCell:

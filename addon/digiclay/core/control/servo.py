@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..filled import filled
 from ..quantity import Parameters, quantity
 
 __all__ = ["Servo", "locked_under_overload"]
@@ -27,11 +28,13 @@ class Servo(Parameters):
 
     def command(self, target: Floats, height: Floats) -> Floats:
         """Return valve commands, shape (n,), for commanded and measured heights, m."""
+        gain, band, most, least, none = filled((self.gain, self.dead_band, 1.0, -1.0, 0.0), target.size)
         error = target - height
-        command = self.gain * error
-        np.minimum(command, 1.0, out=command)
-        np.maximum(command, -1.0, out=command)
-        command *= np.abs(error) > self.dead_band
+        command: Floats = error * gain
+        np.minimum(command, most, out=command)
+        np.maximum(command, least, out=command)
+        np.abs(error, error)
+        np.putmask(command, error <= band, none)
         return command
 
 
@@ -48,6 +51,7 @@ def locked_under_overload(command: Floats, force: Floats, limit: float) -> Float
     limit : float
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
-    if force.max(initial=0.0) < limit:
+    overload = force >= filled((limit,), force.size)[0]
+    if not np.count_nonzero(overload):
         return command
-    return np.where((force >= limit) & (command > 0.0), 0.0, command)
+    return np.where(overload & (command > 0.0), 0.0, command)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Heading", "ahead_of", "square_distance", "turned"]
+__all__ = ["Heading", "ahead_of", "seen_from", "square_distance", "turned"]
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +49,30 @@ def ahead_of(heading: Heading, x: float, y: float, place: Floats) -> Floats:
     return ahead
 
 
+def seen_from(heading: Heading, x: float, y: float, place: Floats) -> tuple[Floats, Floats]:
+    """Return distances from a point, and how far cells lie ahead of it, see `ahead_of`; shape (m,), m.
+
+    Parameters
+    ----------
+    heading : Heading
+    x, y : float
+        The point, m.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of the cells.
+    """
+    _, _, toward_x, toward_y = heading
+    forms = np.array(
+        (
+            (x * x + y * y, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0),
+            (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0),
+        )
+    )
+    distance, ahead = forms.dot(place)
+    np.abs(distance, distance)  # at the point itself rounding may leave a negative square
+    np.sqrt(distance, distance)
+    return distance, ahead
+
+
 def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
     """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
 
@@ -61,6 +85,6 @@ def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floa
     """
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
-    square: Floats = np.dot(form, place)
-    np.maximum(square, 0.0, out=square)
+    square: Floats = form.dot(place)
+    np.abs(square, square)  # at a point itself rounding may leave a negative one
     return square

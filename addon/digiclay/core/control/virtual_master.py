@@ -8,11 +8,13 @@ effort into the master's height; the cells around follow the blister's profile.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..actuator import Actuator
+from ..filled import filled
 from ..layout import ON_THE_SIDE
 from ..modes import Mode
 from ..places import Measurement, Orders
@@ -21,17 +23,13 @@ from .blister import Blister
 from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
 from .servo import locked_under_overload
-from .travel import Heading, ahead_of, square_distance, turned
+from .travel import Heading, seen_from, square_distance, turned
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
 
 Floats = NDArray[np.float64]
 
-#: Modes of cells outside the blister: not formed, formed.
-OUTSIDE = np.array([Mode.REST, Mode.HOLD], np.int8)
-EDGE, BLISTER, SPRING, FORCE_FOLLOW, FROZEN = (
-    np.int8(mode) for mode in (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
-)
+CODES = (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
 
 
 @dataclass(frozen=True)
@@ -70,32 +68,38 @@ class VirtualMasterControl:
         self, memory: Master, touched: Measurement
     ) -> tuple[Master, tuple[float, float, float] | None]:
         """Locate the finger and move the master; see `places.Controller`."""
-        force = float(touched.force.sum()) if touched.force.size else 0.0
-        master = self._locate(memory, touched, force)
+        pressed = touched.place[:3].dot(touched.force).tolist()
+        master = self._locate(memory, touched, pressed)
         if master.phase is Phase.IDLE:
             return master, None
         # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
         given_up = self._given_up(master)
-        master = master._replace(height=master.felt) if given_up else self._lead(master, force)
+        master = master._replace(height=master.felt) if given_up else self._lead(master, pressed[0])
         return master, (master.x, master.y, self.blister.edge_radius)
 
-    def _locate(self, master: Master, touched: Measurement, total: float) -> Master:
-        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13)."""
-        if total < self.parameters.felt_force:
+    def _locate(self, master: Master, touched: Measurement, pressed: list[float]) -> Master:
+        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
+
+        `pressed` are the sum of all forces, N, and their moments with x and y, N m.
+        """
+        total, x, y = pressed
+        known, place, force = self.parameters, touched.place, touched.force
+        if total < known.felt_force:
             return self._alone(master)
-        place, force = touched.place, touched.force
         if master.phase is not Phase.IDLE:
-            square = square_distance(master.x, master.y, place)
-            near = force * (square <= self.parameters.radius**2 * (1.0 + ON_THE_SIDE))
-            felt, x, y = np.dot(place[:3], near).tolist()
-            if felt >= self.parameters.felt_force:
+            none, near = filled((0.0, known.radius**2 * (1.0 + ON_THE_SIDE)), force.size)
+            far = square_distance(master.x, master.y, place) > near
+            far &= force != none
+            felt = total
+            if np.count_nonzero(far):
+                felt, x, y = place[:3].dot(np.where(far, none, force)).tolist()
+            if felt >= known.felt_force:
                 x, y = x / felt, y / felt
-                return master._replace(
-                    x=x, y=y, alone=0, heading=turned(master.heading, x, y, self.parameters.travel)
-                )
+                return master._replace(x=x, y=y, alone=0, heading=turned(master.heading, x, y, known.travel))
             # The finger has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
-        _, x, y = (np.dot(place[:3], force) / total).tolist()
+            _, x, y = pressed
+        x, y = x / total, y / total
         surface = float(force @ touched.height) / total
         return Master(
             Phase.SPRING,
@@ -148,42 +152,60 @@ class VirtualMasterControl:
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band
-        mode: NDArray[np.int8] = OUTSIDE.take(formed.view(np.int8))
+        rest, band = filled((self.actuator.rest_height, self.parameters.dead_band), target.size)
+        off = target - rest
+        np.abs(off, off)
+        # False and True are the codes of these two modes.
+        mode: NDArray[np.int8] = (off > band).view(np.int8)
         return mode
 
     def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        blister = self.blister
-        distance = square_distance(master.x, master.y, seen.place)
-        np.sqrt(distance, distance)
-        ahead = ahead_of(master.heading, master.x, master.y, seen.place)
-        inside = distance <= blister.radius * (1.0 + ON_THE_SIDE)
-        ring = distance <= blister.edge_radius * (1.0 + ON_THE_SIDE)
+        blister, stroke = self.blister, self.actuator.stroke
+        none, radius, edge_radius, flat_radius, behind, release = filled(self.limits, seen.target.size)
+        edge, formed, spring, follow, froze = filled(CODES, seen.target.size, np.int8)
+        distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
+        inside = distance <= radius
+        ring = distance <= edge_radius
         ring ^= inside
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
-        facing = seen.height[ring & (ahead >= 0.0)]
-        if facing.size:
-            master = master._replace(edge=float(facing.sum()) / facing.size)
-        touched = seen.force > 0.0
-        backward = ahead < self.parameters.behind * distance
-        backward &= distance > blister.flat_radius * (1.0 + ON_THE_SIDE)
-        backward |= seen.mode == FROZEN
-        backward &= inside
-        frozen = backward & (seen.force < self.parameters.release_force)
-        profile = blister.height(distance, master.edge, master.height)
-        np.maximum(profile, 0.0, out=profile)
-        np.minimum(profile, self.actuator.stroke, out=profile)
-        # What is frozen is never called back; a blister that outgrows it takes it along.
-        outgrown = np.maximum if master.height >= master.edge else np.minimum
-        np.putmask(profile, frozen, outgrown(profile, seen.target))
+        facing = ahead >= none
+        facing &= ring
+        count = np.count_nonzero(facing)
+        if count:
+            master = master._replace(edge=float(facing.astype(np.float64).dot(seen.height)) / count)
+        touched = seen.force > none
+        touched &= inside
+        frozen = ahead < behind * distance
+        frozen &= distance > flat_radius
+        frozen |= seen.mode == froze
+        frozen &= inside
+        frozen &= seen.force < release
+        profile = blister.height(distance, min(max(master.edge, 0.0), stroke), master.height)
+        if np.count_nonzero(frozen):
+            # What is frozen is never called back; a blister that outgrows it takes it along.
+            outgrown = np.maximum if master.height >= master.edge else np.minimum
+            np.putmask(profile, frozen, outgrown(profile, seen.target))
         target = seen.target.copy()
         np.putmask(target, inside, profile)
-        np.putmask(mode, inside, BLISTER)
-        np.putmask(mode, inside & touched, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING)
-        np.putmask(mode, ring, EDGE)
-        np.putmask(mode, frozen, FROZEN)
+        np.putmask(mode, inside, formed)
+        np.putmask(mode, touched, follow if master.phase is Phase.SHAPING else spring)
+        np.putmask(mode, ring, edge)
+        np.putmask(mode, frozen, froze)
         return master, target
+
+    @cached_property
+    def limits(self) -> tuple[float, ...]:
+        """What tells cells apart: no force; radii of blister, edge and flat top, m; a cosine; a force, N.
+
+        Circles are widened by a billionth, for the sake of cells exactly on them.
+        """
+        blister = self.blister
+        wider = (
+            radius * (1.0 + ON_THE_SIDE)
+            for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
+        )
+        return (0.0, *wider, self.parameters.behind, self.parameters.release_force)
 
 
 def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell
+from ..physics import Cell, felt
 from ..places import Segment
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
@@ -38,8 +38,8 @@ class AdaptivePlan:
     levels : tuple of BernoulliPlan
         For whole steps, half steps, quarter steps and so on.
     between : tuple of ndarray (i, p)
-        From the finger's underside at the period's instants to that at the ends of a level's
-        steps: exact at the instants, by parabolas between them.
+        From the finger's underside at the period's instants to that at the ends and in the middle
+        of a level's steps: exact at the instants, by parabolas between them.
     allowed, allowed_tension : float
         Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
         filters, N: what so much height makes at first touch, where the pulp is softest.
@@ -66,6 +66,7 @@ class Adaptive:
     name = "adaptive"
     order = 3
     nodes = (0.0, 0.5, 1.0)
+    bridges = False
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> AdaptivePlan:
         """Work out once what all periods share."""
@@ -80,7 +81,7 @@ class Adaptive:
         stiffness = cell.touch.contact.stiffness if cell.touch else 0.0
         return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed)
 
-    def advance(self, plan: AdaptivePlan, driven: Floats, under: Floats) -> None:
+    def advance(self, plan: AdaptivePlan, driven: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place; see `places.Stepper`."""
         cell, k = plan.levels[0].cell, under.shape[1]
         start, share = driven.copy(), np.full(driven.shape[1], FREE)
@@ -100,7 +101,9 @@ class Adaptive:
                 break
             open_cells, coarse = open_cells[wide], fine[:, wide]
         np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
-        cell.lag.settle(driven[cell.lag_rows])
+        pulp = driven[cell.pulp_rows]
+        np.maximum(pulp, 0.0, out=pulp)
+        return felt(cell, driven, under[-1])
 
 
 def _done(plan: AdaptivePlan, level: int, block: Floats, under: Floats) -> Floats:
@@ -111,14 +114,14 @@ def _done(plan: AdaptivePlan, level: int, block: Floats, under: Floats) -> Float
 
 
 def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tuple[Segment, ...], Floats]:
-    """Cut segments into equal parts; return them, and the map from instants to their ends."""
+    """Cut segments into equal parts; return them, and the map from instants to their ends and middles."""
     cut: list[Segment] = []
     rows: list[Floats] = []
     for segment in segments:
         for i in range(parts):
-            at, length = len(cut), segment.length / parts
-            cut.append(Segment(segment.start + i * length, length, (at, at + 1)))
-            rows.append(_parabola(segment, i / parts, count))
+            at, length = 2 * len(cut), segment.length / parts
+            cut.append(Segment(segment.start + i * length, length, (at, at + 1, at + 2)))
+            rows += [_parabola(segment, (i + part) / parts, count) for part in (0.0, 0.5)]
     return tuple(cut), np.array([*rows, _parabola(segments[-1], 1.0, count)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell, rates
+from ..physics import Cell, felt, rates
 from ..places import Segment
 
 __all__ = ["Explicit", "ExplicitPlan", "Rates"]
@@ -42,6 +42,8 @@ class Explicit:
     numbers at the end of the period finds, and says when and where.
     """
 
+    bridges = False
+
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
         """Work out once what all periods share."""
         return ExplicitPlan(cell, queue, segments)
@@ -50,7 +52,7 @@ class Explicit:
         """Return how far the rows go in one step, s long."""
         raise NotImplementedError
 
-    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> None:
+    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place; see `places.Stepper`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = driven[: cell.rows], driven[cell.rows :]
@@ -68,5 +70,5 @@ class Explicit:
             np.clip(y[0], 0.0, stroke, out=y[0])
             if thrown.any():
                 y[0][thrown] = np.inf
-                return
-        cell.lag.settle(y[cell.lag_rows])
+                break
+        return felt(cell, y, under[-1])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell
+from ..physics import Cell, felt
 from ..places import Segment
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
@@ -24,17 +24,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RichardsonPlan:
-    """What all periods share: the closed-form plans for the steps, and for their halves.
-
-    Attributes
-    ----------
-    ends : ndarray of int (s + 1,)
-        Which of the period's instants are ends of whole steps.
-    """
+    """What all periods share: the closed-form plans for the steps, and for their halves."""
 
     coarse: BernoulliPlan
     fine: BernoulliPlan
-    ends: NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -43,32 +36,35 @@ class Richardson:
 
     name = "richardson"
     order = 3
-    nodes = (0.0, 0.5, 1.0)
+    nodes = (0.0, 0.25, 0.5, 0.75, 1.0)
+    bridges = False
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> RichardsonPlan:
         """Work out once what all periods share."""
         closed_form = BernoulliExponential()
-        ends = np.array([part.nodes[0] for part in segments] + [segments[-1].nodes[-1]], np.intp)
+        whole = tuple(Segment(part.start, part.length, part.nodes[::2]) for part in segments)
         return RichardsonPlan(
-            closed_form.plan(cell, queue, segments), closed_form.plan(cell, queue, halved(segments)), ends
+            closed_form.plan(cell, queue, whole), closed_form.plan(cell, queue, halved(segments))
         )
 
-    def advance(self, plan: RichardsonPlan, driven: Floats, under: Floats) -> None:
+    def advance(self, plan: RichardsonPlan, driven: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place; see `places.Stepper`."""
         closed_form, cell = BernoulliExponential(), plan.coarse.cell
         coarse = driven.copy()
-        closed_form.advance(plan.coarse, coarse, under.take(plan.ends, axis=0))
+        closed_form.advance(plan.coarse, coarse, under)
         closed_form.advance(plan.fine, driven, under)
         y = driven[: cell.rows]
         y += (y - coarse[: cell.rows]) / 3.0
         np.clip(y[0], 0.0, cell.actuator.stroke, out=y[0])
-        cell.lag.settle(y[cell.lag_rows])
+        pulp = y[cell.pulp_rows]
+        np.maximum(pulp, 0.0, out=pulp)
+        return felt(cell, y, under[-1])
 
 
 def halved(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
-    """Cut segments that have an instant in their middle in two."""
+    """Cut segments that have an instant in the middle of each half in two."""
     return tuple(
-        Segment(part.start + part.length * i / 2, part.length / 2, part.nodes[i : i + 2])
+        Segment(part.start + part.length * i / 2, part.length / 2, part.nodes[2 * i : 2 * i + 3])
         for part in segments
         for i in (0, 1)
     )

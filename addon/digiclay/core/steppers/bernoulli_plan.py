@@ -1,0 +1,200 @@
+"""What the closed-form step works out once: its maps from openings, finger and filters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..absent import Unrelaxed
+from ..closed_form import LARGE, TINY
+from ..contact import LARGEST_EXPONENT, Contact
+from ..delay import Queue
+from ..physics import Cell
+from ..places import Pulp, Segment
+from ..supply import Supply
+
+__all__ = ["BernoulliPlan", "bernoulli_plan"]
+
+Floats = NDArray[np.float64]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]
+#: Four-point Gauss-Legendre nodes and weights on [0, 1]: within a step a valve may go all its way.
+NODES: tuple[float, ...] = tuple((0.5 + 0.5 * _NODES).tolist())
+WEIGHTS: tuple[float, ...] = tuple((0.5 * _WEIGHTS).tolist())
+#: A way that bends more than this within a step, in 1/m, is beyond correcting.
+BEND = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class BernoulliPlan:
+    """What all periods share. Heights under the finger are counted in 1/m, tensions in b/m.
+
+    Attributes
+    ----------
+    cell : Cell
+    segments : tuple of Segment
+        The s physics steps of a period.
+    response : ndarray (g + 1, r)
+        From opening and queued commands to the openings at all g Gauss points, and at the end.
+    moves : ndarray (4 s, 2 g)
+        From conductances at the Gauss points, and the same with the signs of the openings, to
+        what each step has: free rise, m; the same and its `bow`, in 1/m; decay, see `closed_form`.
+    path : ndarray (3 s + 1, p)
+        From the finger's underside at the period's instants to what each step has, in 1/m: rise
+        and its bow; underside at the start, and at the end of the last.
+    nodes : tuple of slice
+        The Gauss points of each step.
+    weights : ndarray (g,)
+        Their weights, s.
+    lost, transition : tuple of ndarray
+        The relaxation's maps, one a step: to the tension at which the pulp begins to push, and
+        to the filters and the force at its end, N.
+    shares : tuple of float
+        Share of the tension that does push, one a step: the rest is lost within it.
+    unloaded : callable
+        Conductance of a valve without load, m³/(s Pa), from its opening.
+    numbers : tuple of float
+        The contact's m, 1/m; m x0; the largest exponent; 0, 1, 1/2 and `TINY`; and the
+        exponent below which every flow is laminar and nothing overflows.
+    unit : float
+        b/m, N.
+    to_load : float
+        Pressure that a unit of tension makes, Pa.
+    """
+
+    cell: Cell
+    segments: tuple[Segment, ...]
+    response: Floats
+    moves: Floats
+    path: Floats
+    nodes: tuple[slice, ...]
+    weights: Floats
+    lost: tuple[Floats, ...]
+    transition: tuple[Floats, ...]
+    shares: tuple[float, ...]
+    unloaded: Callable[[Floats], Floats]
+    numbers: tuple[float, ...]
+    unit: float
+    to_load: float
+
+
+def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
+    """Work out once what all periods share."""
+    times, weights, nodes = _gauss_points(queue, segments)
+    end = segments[-1].start + segments[-1].length
+    pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
+    to_decay = contact.share * contact.stiffness / cell.actuator.area
+    m, supply = contact.exponent, cell.supply
+    to_load, unit = to_decay / m, contact.stiffness / m
+    shares = tuple(1.0 - pulp.lost(part.length)[1] for part in segments)
+    steps, bows = np.zeros((2, len(nodes), len(times)))
+    for s, part in enumerate(segments):
+        own = nodes[s]
+        steps[s, own] = weights[own] / cell.actuator.area
+        bows[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
+
+    widest = float(cell.flow.laminar_conductance(1.0))
+    hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
+
+    def under_supply(opening: Floats) -> Floats:
+        return cell.flow.conductance(opening, supply.pressure(opening))
+
+    return BernoulliPlan(
+        cell,
+        segments,
+        cell.lag.response(queue, [*times, end]),
+        _moves(supply, steps, m * bows, to_decay * np.array(shares)[:, None] * steps, m),
+        m * _path(segments),
+        nodes,
+        weights,
+        tuple(_lost(pulp, part.length, unit) for part in segments),
+        tuple(_transition(pulp, part.length, unit, contact.share) for part in segments),
+        shares,
+        cell.flow.laminar_conductance if cell.flow.knee > supply.largest else under_supply,
+        (m, m * contact.offset, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY, hard),
+        unit,
+        to_load,
+    )
+
+
+def _hard(cell: Cell, to_load: float, steepest: float) -> float:
+    """Return the exponent from which on some flow may turn turbulent or an exponential overflow.
+
+    Parameters
+    ----------
+    cell : Cell
+    to_load : float
+        Pressure that a unit of tension makes, Pa.
+    steepest : float
+        No step's decay is larger where every flow is laminar.
+    """
+    # How far the load may drive up the drop before some flow could turn turbulent.
+    spare = cell.flow.knee - cell.supply.largest
+    if spare <= 0.0:
+        return -math.inf
+    return min(0.5 * LARGE, math.log1p(spare / to_load), math.log(0.5 * LARGE / max(steepest, TINY)))
+
+
+def _moves(supply: Supply, steps: Floats, bows: Floats, decay: Floats, exponent: float) -> Floats:
+    """Return `BernoulliPlan.moves` from the weights (s, g) of free rise, its bow and the decay."""
+    middle, half = 0.5 * (supply.high + supply.low), 0.5 * (supply.high - supply.low)
+    rows = [[middle * part, half * part] for part in (steps, exponent * steps, bows)]
+    return np.block([*rows, [decay, np.zeros_like(decay)]])
+
+
+def _path(segments: tuple[Segment, ...]) -> Floats:
+    """Return `BernoulliPlan.path`, in m.
+
+    The bow of a way is its mean above the straight line between its ends, here of the parabola
+    through start, middle and end.
+    """
+    count = len(segments)
+    path = np.zeros((3 * count + 1, segments[-1].nodes[-1] + 1))
+    for s, part in enumerate(segments):
+        path[s, list(part.nodes)] = -1.0, 0.0, 1.0
+        path[count + s, list(part.nodes)] = -1.0 / 3.0, 2.0 / 3.0, -1.0 / 3.0
+        path[2 * count + s, part.nodes[0]] = 1.0
+    path[-1, -1] = 1.0
+    return path
+
+
+def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, Floats, tuple[slice, ...]]:
+    """Return Gauss points of all steps: times and weights, s, and which are whose.
+
+    Where the valve goes over to the next command its opening has a kink: a step that holds one
+    takes its points on either side of it.
+    """
+    times: list[float] = []
+    weights: list[float] = []
+    nodes: list[slice] = []
+    for part in segments:
+        end = part.start + part.length
+        inner = (queue.cut,) if part.start < queue.cut * (1.0 - 1e-9) < end * (1.0 - 2e-9) else ()
+        first = len(times)
+        for a, b in pairwise((part.start, *inner, end)):
+            times += [a + node * (b - a) for node in NODES]
+            weights += [weight * (b - a) for weight in WEIGHTS]
+        nodes.append(slice(first, len(times)))
+    return np.array(times), np.array(weights), tuple(nodes)
+
+
+def _lost(pulp: Pulp, step: float, unit: float) -> Floats:
+    """Return the map from filters, N, and tension, units, to the tension at which the pulp begins to push."""
+    lost, share = pulp.lost(step)
+    lost[:-1] /= unit
+    lost /= 1.0 - share
+    return lost
+
+
+def _transition(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
+    """Return the map from filters, N, and tensions, units, see `Pulp.transition`, to filters and force, N."""
+    transition = pulp.transition(step)
+    transition[:, -3:] *= unit
+    last = np.zeros(transition.shape[1])
+    last[-1] = unit
+    return np.vstack([transition, share * (last - pulp.relaxed(transition))])
