@@ -69,8 +69,7 @@ def summit(grid: Grid, heights: Floats) -> tuple[float, float]:
 def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
     """Return the height at which a level finger that comes down over a place first touches, m."""
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
-    inward, middle = forms(outline)
-    under = underside(inward, middle, outline[:, 8:9], grid.place(np.arange(grid.count)))
+    under = underside(*forms(outline), grid.place(np.arange(grid.count)))
     return float(np.max(heights - under[0]))
 
 
