@@ -59,6 +59,8 @@ def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
         "layout": {"rows": 1, "columns": 1},
         "control": "absent",
         "sensors": {"observer": "valve"},
+        # The observer is judged here, not the integration.
+        "simulation": {"physics_step": 1e-3},
     }
     return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
 

@@ -22,9 +22,10 @@ __all__ = ["BernoulliPlan", "bernoulli_plan"]
 
 Floats = NDArray[np.float64]
 
-#: Three-point Gauss-Legendre nodes and weights on [0, 1]: a valve goes through most of its way in a step.
-NODES = (0.5 - 0.15**0.5, 0.5, 0.5 + 0.15**0.5)
-WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]
+#: Four-point Gauss-Legendre nodes and weights on [0, 1]: within a step a valve may go all its way.
+NODES: tuple[float, ...] = tuple((0.5 + 0.5 * _NODES).tolist())
+WEIGHTS: tuple[float, ...] = tuple((0.5 * _WEIGHTS).tolist())
 #: A way that bends more than this within a step, in 1/m, is beyond correcting.
 BEND = 0.25
 
