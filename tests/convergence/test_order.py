@@ -114,14 +114,19 @@ def test_the_order_holds_near_equilibrium_too(stepper: str, problem: str) -> Non
     assert order(errors(stepper, *SMOOTH[problem])) == pytest.approx(STEPPERS[stepper].order, abs=0.3)
 
 
-@pytest.mark.parametrize("stepper", ["bernoulli", "runge_kutta_4"])
-def test_a_free_pin_is_moved_with_order_four(stepper: str) -> None:
-    # The closed-form step takes the exact opening at two Gauss points, which is order 4 where no load acts.
-    assert order(errors(stepper, *FREE)) == pytest.approx(4.0, abs=0.3)
+def test_a_free_pin_is_moved_with_order_four_by_runge_kutta() -> None:
+    assert order(errors("runge_kutta_4", *FREE)) == pytest.approx(4.0, abs=0.3)
+
+
+def test_the_closed_form_step_moves_a_free_pin_as_exactly_as_the_reference() -> None:
+    # It takes the exact opening at four Gauss points, order 8: what is left is the reference's error.
+    assert errors("bernoulli", *FREE).max() < 1e-11
 
 
 @pytest.mark.parametrize("problem", KINKED)
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_across_a_kink_the_order_stays_near_two_or_the_declared_one_below(stepper: str, problem: str) -> None:
-    # Where in a step the kink falls differs from run to run, and scatters the errors: 0.4.
-    assert order(errors(stepper, *KINKED[problem])) > min(STEPPERS[stepper].order, 2) - 0.4
+    # Where in a step the kink falls differs from run to run, and scatters the errors: 0.4. Below 2 nm
+    # Richardson's are mixed with the reference's own across a valve's reversal.
+    found = errors(stepper, *KINKED[problem])
+    assert found.max() < 2e-9 or order(found) > min(STEPPERS[stepper].order, 2) - 0.4

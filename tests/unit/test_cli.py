@@ -101,7 +101,10 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "value": (["run", "my.toml", "--set", "fluid.density=0"], "--set: fluid.density must be above 0 kg/m3"),
     "key": (["run", "my.toml", "--set", "fluid.densty=1"], "Did you mean fluid.density?"),
     "combination": (["run", "my.toml", "--set", "layout.pitch=1 mm"], "must be at least actuator.bore"),
-    "steps": (["run", "my.toml", "--set", "simulation.physics_step=1 ns"], "must be at least a 1000th of"),
+    "steps": (
+        ["run", "my.toml", "--set", "simulation.physics_step=0.001 us"],
+        "must be at least a 1000th of",
+    ),
     "duration": (["run", "my.toml", "--set", "simulation.duration=-1"], "must be at least 0 s (got -1 s)"),
     "cells": (["run", "my.toml", "--set", "layout.columns=0"], "layout.columns must be at least 1 (got 0)"),
     "setting": (["run", "my.toml", "--set", "nothing"], "must be KEY=VALUE (got 'nothing')"),

@@ -120,8 +120,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
     rim = patch(finger, np.array(turn), depth)
     x, y = rim.T
     place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
-    inward, middle = forms(outline)
-    height = underside(inward, middle, outline[:, 8:9], place)[0]
+    height = underside(*forms(outline), place)[0]
     np.testing.assert_allclose(height, depth, rtol=0, atol=1e-12)
 
 
