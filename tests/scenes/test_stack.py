@@ -229,6 +229,10 @@ def test_sensors_keep_a_scene_out_of_stacks() -> None:
     assert why_not(scene("tap", "sensors.force_noise=0.001")) == "their sensors are no part of a stack yet"
 
 
+def test_a_shape_to_start_from_keeps_a_scene_out_of_stacks() -> None:
+    assert why_not(scene("dome_peaked")) == "a shape comes up before their method takes over"
+
+
 @pytest.mark.parametrize(
     "setting",
     ["layout.rows=21", "delay=absent", "simulation.physics_step=2e-3", "blister.profile=gaussian"],

@@ -36,6 +36,8 @@ def why_not(scene: Scene) -> str:
     """Return why a scene cannot stand in a stack; empty for one that can."""
     if scene.sensors is not None:
         return "their sensors are no part of a stack yet"
+    if scene.shape and not (scene.control and scene.method == "shape_display"):
+        return "a shape comes up before their method takes over"
     if scene.control and scene.method not in STACKED:
         return f"what {scene.method} does depends on which cells take part"
     return ""
