@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.core.errors import DivergenceError, ParameterError
 from digiclay.core.methods import METHODS
-from digiclay.core.scene import Scene
+from digiclay.core.scene import Scene, Waypoint
 from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import Result, run
 from digiclay.core.stack.assembly import STACKED, structure, why_not
@@ -151,6 +151,32 @@ def test_the_papers_session_in_a_stack_is_the_papers_session() -> None:
         for gain, end in gains
     ]
     assert_as_alone(together(scenes)[1], scenes[1])
+
+
+def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> None:
+    rests = ("1e-3", "1.5e-3")
+    low = [scene("tap", f"actuator.rest_height={rest}", "control.method=plastic") for rest in rests]
+    scenes = [moved(one, 0.0, -39e-3) for one in low]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+        pressed = found.history["force"] > 0.0
+        assert found.history["height"][pressed].min() == 0.0
+
+
+def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
+    points = tuple(
+        Waypoint(time=time, position=(0.0, 0.0, z))
+        for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))
+    )
+    known = scene("tap", "control.method=plastic")
+    twice = replace(
+        known,
+        trajectory=replace(known.trajectory, waypoints=points),
+        simulation=replace(known.simulation, duration=0.9),
+    )
+    scenes = [twice, moved(twice, 1e-3, -0.5e-3)]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
 
 
 @pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
