@@ -111,7 +111,7 @@ def stack(sizes: list[StackSize], out: Path) -> Path:
         panel.set_xlabel("runs in one call")
         panel.set_ylabel("runs a second, to one at a time")
         panel.set_title("Many sessions in one call")
-        panel.legend(loc="upper left", fontsize=8.5)
+        panel.legend(loc="lower right", fontsize=8.5)
         return _written(figure, out)
 
 
