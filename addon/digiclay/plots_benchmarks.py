@@ -15,8 +15,9 @@ from .core.export import write_whole
 if TYPE_CHECKING:  # only named in annotations
     from .commands.benchmark_problems import Work
     from .commands.benchmark_scale import Size
+    from .commands.benchmark_stack import Size as StackSize
 
-__all__ = ["precision", "scale"]
+__all__ = ["precision", "scale", "stack"]
 
 #: Colour, marker and line style of each method: ours are filled and drawn through, peers are open and dashed.
 LOOKS: dict[str, tuple[str, str, str]] = {
@@ -85,6 +86,32 @@ def scale(sizes: list[Size], out: Path) -> Path:
         panel.set_ylabel("a control period, µs")
         panel.set_title("The same finger on larger beds")
         panel.legend(loc="lower right")
+        return _written(figure, out)
+
+
+def stack(sizes: list[StackSize], out: Path) -> Path:
+    """Draw how many times the runs a second a stack comes to, over its runs, and return the path."""
+    with _Canvas(6.0, 3.6) as figure:
+        panel = figure.subplots()
+        for study, colour, marker in (("control", "#0072B2", "o"), ("device", "#D55E00", "s")):
+            own = [one for one in sizes if one.study == study]
+            runs = [one.runs for one in own]
+            for gains, line, label in (
+                ([one.alone / one.stacked for one in own], "-", "simulated"),
+                ([one.judged_alone / one.judged_stacked for one in own], "--", "recorded and judged"),
+            ):
+                panel.loglog(
+                    runs, gains, line, color=colour, marker=marker,
+                    markerfacecolor=colour if line == "-" else "white", label=f"{study} varies, {label}",
+                )  # fmt: skip
+        panel.axhline(6.0, color="#777777", linestyle=":", linewidth=1.2, label="the goal")
+        panel.set_xticks(runs, [str(count) for count in runs])
+        panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
+        panel.minorticks_off()
+        panel.set_xlabel("runs in one call")
+        panel.set_ylabel("runs a second, to one at a time")
+        panel.set_title("Many sessions in one call")
+        panel.legend(loc="lower right", fontsize=8.5)
         return _written(figure, out)
 
 

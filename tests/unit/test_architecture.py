@@ -19,28 +19,30 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "body feature_region skin_spline errors modes png closed_form filled control.travel metrics_signal",
+    "body feature_region skin_spline errors modes png closed_form filled control.travel metrics_signal "
+    "stack.columns",
     "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
     "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export metrics control.servo control.blister",
     "feature_crest pins_solid skin_membrane "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
-    "sheet shape_file physics scene",
+    "stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
+    "sheet shape_file physics scene stack.control",
     "features system observer steppers.bernoulli_plan steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
-    "control.drive control.neighbours control.shapes",
-    "steppers.bernoulli",
+    "control.drive control.neighbours control.shapes stack.physics",
+    "steppers.bernoulli stack.gathering stack.fingers stack.bernoulli",
     "feature_solids "
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
-    "control.push_pull control.force_display control.shape_display",
-    "export_model simulation control.handover",
+    "control.push_pull control.force_display control.shape_display "
+    "stack.recording stack.simulation",
+    "export_model simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
-    "jobs accuracy keeping live shadow",
+    "jobs accuracy keeping live shadow stack.assembly",
     "session metrics_trial take",
-    "metrics_speed sweep budget",
-    "sweep_folder",
+    "metrics_speed sweep budget stack.session",
+    "sweep_folder sweep_bundles",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}

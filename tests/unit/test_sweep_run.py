@@ -20,13 +20,15 @@ from digiclay.core.scene import Scene
 from digiclay.core.scene_file import Setting, find
 from digiclay.core.sweep import Point, Record, evaluate, finish, points
 from digiclay.core.sweep_axis import axis
+from digiclay.core.sweep_bundles import evaluate_all
 from digiclay.core.sweep_folder import Column, columns
 from digiclay.plots_sweep import sweep_figure
 
 #: A tenth of a second of a scene is enough for most of this.
 SHORT = [Setting("simulation.duration", "0.1")]
 ADDON = Path(__file__).parents[2] / "addon"
-MANY = ["sweep", "slow_press", "--vary", "control.force_gain=1:6:10", "--workers", "2", "--quiet"]
+#: Beds of different sizes, which run one at a time.
+MANY = ["sweep", "slow_press", "--vary", "layout.rows=20:29:10", "--workers", "2", "--quiet"]
 
 
 @pytest.fixture(autouse=True)
@@ -62,9 +64,15 @@ class Broken(Executor):
 
 
 def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> dict[int, Record]:
-    """Run points; return what was kept."""
+    """Run points, each in a bundle of its own; return what was kept."""
     done: dict[int, Record] = {}
-    finish(executor, task, todo, lambda point, record: done.update({point.index: record}), **known)
+    finish(
+        executor,
+        task,
+        [[point] for point in todo],
+        lambda point, record: done.update({point.index: record}),
+        **known,
+    )
     return done
 
 
@@ -74,9 +82,9 @@ def never() -> bool:
 
 
 def test_any_executor_will_do() -> None:
-    at_once = finished(AtOnce(), evaluate, some(), stopped=never)
+    at_once = finished(AtOnce(), evaluate_all, some(), stopped=never)
     with ThreadPoolExecutor(2) as threads:
-        in_threads = finished(threads, evaluate, some(), stopped=never)
+        in_threads = finished(threads, evaluate_all, some(), stopped=never)
     assert [at_once[i]["figures"]["rfd"] for i in range(3)] == [
         in_threads[i]["figures"]["rfd"] for i in range(3)
     ]
@@ -101,10 +109,10 @@ def test_a_session_that_was_stopped_is_no_finished_point() -> None:
 def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
     begun: list[Scene] = []
 
-    def task(scene: Scene) -> Record:
-        begun.append(scene)
+    def task(scenes: list[Scene]) -> list[Record | None]:
+        begun.extend(scenes)
         time.sleep(0.3)
-        return {"figures": {}}
+        return [{"figures": {}}]
 
     with ThreadPoolExecutor(1) as one:
         done = finished(one, task, some(9), stopped=lambda: bool(begun))
@@ -113,7 +121,7 @@ def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
 
 def test_workers_that_die_are_told_in_one_line() -> None:
     with pytest.raises(OutputError, match=r"A worker died.*fewer --workers"):
-        finished(Broken(), evaluate, some(), stopped=never)
+        finished(Broken(), evaluate_all, some(), stopped=never)
 
 
 def interrupted(out: Path, number: int) -> tuple[int, str]:

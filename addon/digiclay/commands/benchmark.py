@@ -13,6 +13,7 @@ from . import (
     benchmark_precision,
     benchmark_scale,
     benchmark_session,
+    benchmark_stack,
     benchmark_stiff,
     benchmark_terms,
     benchmark_viewport,
@@ -28,6 +29,7 @@ examples:
   digiclay benchmark precision      error against run time, beside SciPy
   digiclay benchmark terms tap      what each part of the model costs, and what leaving it out does
   digiclay benchmark scale          a control period from 625 pins to a million
+  digiclay benchmark stack          sessions a second, one at a time and many in one call
   digiclay benchmark export         writing a bed as a mesh, from 625 pins to a million
   digiclay benchmark viewport       a tick of a live session in Blender
 """
@@ -43,6 +45,6 @@ def add(commands: Any) -> None:
     kinds = parser.add_subparsers(title="benchmarks", metavar="WHAT", required=True)
     for kind in (
         benchmark_session, benchmark_stiff, benchmark_precision, benchmark_terms, benchmark_scale,
-        benchmark_export, benchmark_viewport,
+        benchmark_export, benchmark_viewport, benchmark_stack,
     ):  # fmt: skip
         kind.add(kinds)

@@ -20,14 +20,17 @@ from ..core.errors import DigiclayError, OutputError, ParameterError
 from ..core.export import write_whole
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find
-from ..core.sweep import Point, Record, evaluate, figure, finish, points
+from ..core.sweep import Point, Record, figure, finish, points
 from ..core.sweep_axis import Axis, axis
+from ..core.sweep_bundles import Bundles, bundles, evaluate_all
 from ..core.sweep_folder import Folder, columns, grid, opened, table
 from .arguments import add_scene
 from .progress import PAUSE, WIDTH
 from .stop import Stop
 
 __all__ = ["add", "local", "workers"]
+
+Task = Callable[[list[Scene]], list[Record | None]]
 
 EXAMPLES = """\
 examples:
@@ -37,7 +40,8 @@ examples:
 
 The folder holds points/, a small file for each finished point; sweep.csv; and for one or two
 axes a picture of each metric. Stopped by Ctrl-C, it goes on when the same command is given again;
-a point that failed is done again if its file is removed.
+a point that failed is done again if its file is removed. Points of one bed, parts and steps run
+together in stacks, which takes a fraction of the time; it is said which cannot.
 """
 
 
@@ -77,8 +81,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if not any(point.scene and point.scene.recorder for point in every):
         raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
     folder = opened(arguments.out, every, axes, __version__)
+    parts = bundles(every)
     with Stop() as stop:
-        done = _finished(arguments, folder, every, axes, stop)
+        done = _finished(arguments, folder, parts, axes, stop)
         if stop() and len(done) < len(every):
             if not arguments.quiet:
                 said = f"Stopped: {len(done)} of {len(every)} points are done and kept in {arguments.out}."
@@ -91,7 +96,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
     if not arguments.quiet:
         tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-        print(f"{len(every)} points{tail}", *notes, f"written to {arguments.out}", sep="\n")
+        told = [*parts.told(), *notes, f"written to {arguments.out}"]
+        print(f"{len(every)} points{tail}", *told, sep="\n")
     return 0
 
 
@@ -108,17 +114,20 @@ def _settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setti
 
 
 def _finished(
-    arguments: argparse.Namespace, folder: Folder, every: Sequence[Point], axes: Sequence[Axis], stop: Stop
+    arguments: argparse.Namespace, folder: Folder, parts: Bundles, axes: Sequence[Axis], stop: Stop
 ) -> dict[int, Record]:
     """Run the points that are not in the folder yet; return all that are done."""
     done = folder.done()
-    todo = [point for point in every if point.index not in done]
-    bar = Points(sys.stderr, len(done), len(every), shown=not arguments.quiet)
+    every = (*parts.stacks, *parts.alone)
+    # A stack of which a point is missing is run as a whole, or its results would be others in the last bit.
+    todo = [bundle for bundle in every if any(point.index not in done for point in bundle)]
+    bar = Points(sys.stderr, len(done), sum(len(bundle) for bundle in every), shown=not arguments.quiet)
 
     def keep(point: Point, record: Record) -> None:
-        folder.keep(point, axes, record)
-        done[point.index] = record
-        bar.draw(len(done))
+        if point.index not in done:
+            folder.keep(point, axes, record)
+            done[point.index] = record
+            bar.draw(len(done))
 
     if todo:
         count = min(arguments.workers or _cores(), len(todo))
@@ -161,7 +170,7 @@ def _cores() -> int:
 
 
 @contextmanager
-def local(count: int) -> Iterator[tuple[Executor, Callable[[Scene], Record | None], Callable[[], None]]]:
+def local(count: int) -> Iterator[tuple[Executor, Task, Callable[[], None]]]:
     """Give an executor on this machine, what it is to run, and what stops the sessions that run.
 
     One worker is a thread of this process; more are processes, started afresh.
@@ -170,7 +179,7 @@ def local(count: int) -> Iterator[tuple[Executor, Callable[[Scene], Record | Non
         ended = threading.Event()
         with ThreadPoolExecutor(1) as one:
             try:
-                yield one, partial(evaluate, stopped=ended.is_set), ended.set
+                yield one, partial(evaluate_all, stopped=ended.is_set), ended.set
             finally:
                 ended.set()
                 one.shutdown(cancel_futures=True)
@@ -207,9 +216,9 @@ def _begin(halted: Any) -> None:
 _halted: Callable[[], bool] | None = None
 
 
-def _run(scene: Scene) -> Record | None:
-    """Run a point in a worker."""
-    return evaluate(scene, _halted)
+def _run(scenes: list[Scene]) -> list[Record | None]:
+    """Run a bundle in a worker."""
+    return evaluate_all(scenes, _halted)
 
 
 class Points:

@@ -193,13 +193,14 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
         raise ParameterError("History", "time", "must have at least one row", "none")
     touching = in_contact(total)
     # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
-    behind = np.round(lag(position, force, history["fingertip"]), 12)
-    weight = weights(time)[in_contact(force.sum(axis=1))]
+    pressed = force.sum(axis=1)
+    behind = np.round(lag(position, force, history["fingertip"], pressed), 12)
+    felt = in_contact(pressed)
+    weight = weights(time)[felt]
     formed, area = height[-1] - height[0], cell_area(position)
     rows = shaping(total, history["mode"])
     beyond, settled = _followed(time, total, float(set_point), first_touch(total))
-    above = surface_under(height, force, history["fingertip"])
-    felt = in_contact(force.sum(axis=1))
+    above = surface_under(height, force, history["fingertip"], pressed)
     ridge = ridge_errors(position, height[-1], history["fingertip"], rows)
     each = np.ones(len(ridge))
     found: dict[str, float | None] = {

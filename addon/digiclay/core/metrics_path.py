@@ -42,7 +42,7 @@ def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
     return rows
 
 
-def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
+def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floats | None = None) -> Floats:
     """Return how far the blister is behind the finger, in the rows in contact.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
@@ -56,6 +56,8 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
         N.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
+    total : ndarray, shape (t,), optional
+        Sum of the forces, where it is known already.
 
     Returns
     -------
@@ -63,14 +65,16 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
         m.
     """
     pressed = np.asarray(force, dtype=np.float64)
-    total = pressed.sum(axis=1)
+    total = pressed.sum(axis=1) if total is None else total
     rows = in_contact(total)
-    centroid = pressed[rows] @ np.asarray(position, dtype=np.float64) / total[rows, None]
+    centroid = (pressed @ np.asarray(position, dtype=np.float64))[rows] / total[rows, None]
     distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
     return distance
 
 
-def surface_under(height: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
+def surface_under(
+    height: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floats | None = None
+) -> Floats:
     """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
@@ -81,6 +85,8 @@ def surface_under(height: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> 
         m, N.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
+    total : ndarray, shape (t,), optional
+        Sum of the forces, where it is known already.
 
     Returns
     -------
@@ -88,9 +94,9 @@ def surface_under(height: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> 
         m.
     """
     pressed = np.asarray(force, dtype=np.float64)
-    total = pressed.sum(axis=1)
+    total = pressed.sum(axis=1) if total is None else total
     rows = in_contact(total)
-    mean = np.einsum("tn,tn->t", pressed[rows], np.asarray(height, dtype=np.float64)[rows]) / total[rows]
+    mean = np.einsum("tn,tn->t", pressed, np.asarray(height, dtype=np.float64))[rows] / total[rows]
     above: Floats = mean - np.asarray(fingertip, dtype=np.float64)[rows, 2]
     return above
 
@@ -127,8 +133,9 @@ def ridge_errors(
     nearest = np.empty(chosen.size, dtype=np.intp)
     for first in range(0, chosen.size, CHUNK):
         part = slice(first, first + CHUNK)
-        gap = tip[chosen[part], None, :2] - place
-        nearest[part] = np.argmin(np.einsum("tnk,tnk->tn", gap, gap), axis=1)
+        square = (tip[chosen[part], 0, None] - place[:, 0]) ** 2
+        square += (tip[chosen[part], 1, None] - place[:, 1]) ** 2
+        nearest[part] = np.argmin(square, axis=1)
     last = {int(cell): i for i, cell in enumerate(nearest)}
     stretch = np.concatenate([[0], np.cumsum(np.diff(chosen) > 1)]) if chosen.size else chosen
     errors = []

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from .simulation import begin, periods
 from .system import System
 from .trajectory import Trajectory
 
-__all__ = ["Result", "fits", "run", "save"]
+__all__ = ["Ended", "Result", "fits", "judged", "run", "save"]
 
 History = dict[str, NDArray[Any]]
 
@@ -125,19 +125,56 @@ def run(
         if stopped and stopped():
             break
     took = time.perf_counter() - started
-    history: History | None = None
     if recording:
         recording.finish(state)
-        history = _history(scene, system, trajectory, recording)
-    metrics = _metrics(scene, history, state.period, took, versions or {})
+    rows = recording.arrays() if recording else None
+    return judged(scene, system, trajectory, rows, state, took, versions or {})
+
+
+class Ended(Protocol):
+    """What counts of the state a session ended in."""
+
+    @property
+    def period(self) -> int: ...
+
+    @property
+    def memory(self) -> Any: ...
+
+
+def judged(
+    scene: Scene,
+    system: System,
+    trajectory: Trajectory,
+    rows: History | None,
+    state: Ended,
+    took: float,
+    versions: Mapping[str, str],
+) -> Result:
+    """Return the result of a session that has come to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+    system : System
+    trajectory : Trajectory
+    rows : dict of ndarray, or None
+        From `Recording.arrays`; None without a recorder.
+    state : Ended
+        The state it ended in.
+    took : float
+        Time the simulation took, s.
+    versions : mapping
+        What else to note as versions the run was made with.
+    """
+    history = None if rows is None else _history(scene, system, trajectory, rows)
+    metrics = _metrics(scene, history, state.period, took, versions)
     # Methods that track a finger count how often it was lost; the others have nothing to lose.
     metrics["losses"] = getattr(state.memory, "losses", None)
     return Result(scene, history, state.period, took, metrics)
 
 
-def _history(scene: Scene, system: System, trajectory: Trajectory, recording: Recording) -> History:
+def _history(scene: Scene, system: System, trajectory: Trajectory, rows: History) -> History:
     """Return the arrays of ``history.npz``."""
-    rows = recording.arrays()
     moments = rows.pop("period") * scene.simulation.control_period
     return {
         "time": moments,

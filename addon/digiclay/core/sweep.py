@@ -19,10 +19,10 @@ from .metrics import METRICS
 from .quantity import nearest
 from .scene import Scene
 from .scene_file import Setting, load
-from .session import run
+from .session import Result, run
 from .sweep_axis import MOST, Axis
 
-__all__ = ["FIGURES", "Point", "Record", "evaluate", "figure", "finish", "points"]
+__all__ = ["FIGURES", "Point", "Record", "evaluate", "figure", "finish", "points", "recorded"]
 
 Record = dict[str, Any]
 
@@ -121,26 +121,32 @@ def evaluate(scene: Scene, stopped: Callable[[], bool] | None = None) -> Record 
         return {"error": "There is not enough memory."}
     except Exception as error:  # whatever is wrong with one point, the others are worth having
         return {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
-    return None if result.incomplete else {"figures": {name: result.metrics.get(name) for name in FIGURES}}
+    return None if result.incomplete else recorded(result)
+
+
+def recorded(result: Result) -> Record:
+    """Return what is kept of a session that came to its end."""
+    return {"figures": {name: result.metrics.get(name) for name in FIGURES}}
 
 
 def finish(
     executor: Executor,
-    task: Callable[[Scene], Record | None],
-    todo: Iterable[Point],
+    task: Callable[[list[Scene]], list[Record | None]],
+    todo: Iterable[Sequence[Point]],
     keep: Callable[[Point, Record], None],
     *,
     stopped: Callable[[], bool],
 ) -> None:
-    """Have an executor run the points that are to be done; keep each as soon as it is.
+    """Have an executor run the points that are to be done; keep each as soon as its bundle is.
 
     Parameters
     ----------
     executor : Executor
         Any.
     task : callable
-        What it runs: `evaluate`, in a form it can hand on.
-    todo : iterable of Point
+        What it runs, on a bundle: `sweep_bundles.evaluate_all`, in a form it can hand on.
+    todo : iterable of sequences of Point
+        In bundles that are run at a time.
     keep : callable
         Told of each point that came to an end.
     stopped : callable
@@ -151,16 +157,18 @@ def finish(
     OutputError
         When the executor itself breaks down.
     """
-    arrived: SimpleQueue[Future[Record | None]] = SimpleQueue()
-    waiting: dict[Future[Record | None], Point] = {}
+    arrived: SimpleQueue[Future[list[Record | None]]] = SimpleQueue()
+    waiting: dict[Future[list[Record | None]], list[Point]] = {}
     try:
-        for point in todo:
-            if point.scene is None:
-                keep(point, {"error": point.error})
-                continue
-            future = executor.submit(task, point.scene)
-            waiting[future] = point
-            future.add_done_callback(arrived.put)
+        for bundle in todo:
+            for point in bundle:
+                if point.scene is None:
+                    keep(point, {"error": point.error})
+            able = [point for point in bundle if point.scene]
+            if able:
+                future = executor.submit(task, [point.scene for point in able if point.scene])
+                waiting[future] = able
+                future.add_done_callback(arrived.put)
         while waiting:
             if stopped():
                 for future in waiting:
@@ -169,10 +177,11 @@ def finish(
                 future = arrived.get(timeout=PAUSE)
             except Empty:
                 continue
-            point = waiting.pop(future)
-            record = None if future.cancelled() else future.result()
-            if record is not None:
-                keep(point, record)
+            records = [] if future.cancelled() else future.result()
+            # Of a bundle that was cancelled there are no records.
+            for point, record in zip(waiting.pop(future), records, strict=False):
+                if record is not None:
+                    keep(point, record)
     except BrokenExecutor:
         rule = "A worker died, perhaps for lack of memory; what was done is kept."
         raise OutputError(f"{rule} Run the same again with fewer --workers.") from None

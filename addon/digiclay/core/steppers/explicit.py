@@ -56,6 +56,7 @@ class Explicit:
         """Move a block of cells on by one control period, in place; see `places.Stepper`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = driven[: cell.rows], driven[cell.rows :]
+        thrown = np.zeros(y.shape[1], np.bool_)
         for part in plan.segments:
             command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
 
@@ -66,9 +67,7 @@ class Explicit:
 
             with np.errstate(over="ignore", invalid="ignore"):
                 y += self.increment(rates_at, y, part.length)
-                thrown = ~(np.abs(y[0] - 0.5 * stroke) < BEYOND * stroke)
+                thrown |= ~(np.abs(y[0] - 0.5 * stroke) < BEYOND * stroke)
             np.clip(y[0], 0.0, stroke, out=y[0])
-            if thrown.any():
-                y[0][thrown] = np.inf
-                break
+        y[0][thrown] = np.inf
         return felt(cell, y, under[-1])

@@ -1,0 +1,229 @@
+"""The closed-form step where the cells' numbers differ from run to run: `steppers.bernoulli`, run by run.
+
+See there for what it does and why it holds. A linear map (o, i) is one of (o, i, b) here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..closed_form import TINY, careful, crossed, pressed
+from ..contact import LARGEST_EXPONENT
+from ..physics import Cell
+from ..steppers.bernoulli_plan import BEND, BernoulliPlan
+from .columns import Floats, numbers
+
+__all__ = ["Unlike", "mapped", "unlike"]
+
+
+@dataclass(frozen=True, eq=False)
+class Unlike:
+    """The closed-form step for b runs; for what is not said here see `steppers.bernoulli_plan`.
+
+    Attributes
+    ----------
+    cell : Cell
+        Of all runs.
+    response, moves, path : ndarray (.., b), or without the last axis where all runs have the same
+    nodes : tuple of slice
+    weights : ndarray (g, 1, b)
+        Divided by the area, s/m².
+    lost : tuple of ndarray (1, k + 1, b)
+    transition : tuple of ndarray (k + 1, k + 3, b)
+    shares : ndarray (s, b)
+    laminar : bool
+        No unloaded valve is turbulent; the same in all runs.
+    exponent, offset, to_load, hard : ndarray (b,)
+        `offset` is m x0; `hard` the last of `BernoulliPlan.numbers`.
+    """
+
+    cell: Cell
+    response: Floats
+    moves: Floats
+    path: Floats
+    nodes: tuple[slice, ...]
+    weights: Floats
+    lost: tuple[Floats, ...]
+    transition: tuple[Floats, ...]
+    shares: Floats
+    laminar: bool
+    exponent: Floats
+    offset: Floats
+    to_load: Floats
+    hard: Floats
+
+    def advance(self, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on, in place; see `physics.Movement`."""
+        cell, k, count = self.cell, under.shape[1], len(self.nodes)
+        openings = mapped(self.response, driven[cell.lag_rows.start :])
+        lag = driven[cell.lag_rows]
+        lag[:] = openings[len(openings) - len(lag) :]
+        openings = openings[:-1]
+        # Below the openings' own conductances those with the openings' signs: the sign picks the reservoir.
+        conductance = np.empty((2 * len(openings), *openings.shape[1:]))
+        size, signed = conductance[: len(openings)], conductance[len(openings) :]
+        size[:] = self._unloaded(openings)
+        np.copysign(size, openings, signed)
+        free = mapped(self.moves[:count], conductance)
+        if k:
+            loaded = mapped(self.moves[count:], conductance[:, :k])
+            self._under_fingers(driven, under, openings[:, :k], free, loaded)
+        height = driven[0, k:]
+        for rise in free[:, k:]:
+            rise += height
+            np.maximum(rise, 0.0, height)
+            np.minimum(height, cell.actuator.stroke, height)
+
+    def _unloaded(self, openings: Floats) -> Floats:
+        """Return the conductance of a valve without load, m³/(s Pa)."""
+        flow = self.cell.flow
+        if self.laminar:
+            conductance: Floats = flow.laminar_conductance(openings)
+            return conductance
+        return flow.conductance(openings, self.cell.supply.pressure(openings))
+
+    def _under_fingers(
+        self, driven: Floats, under: Floats, openings: Floats, free: Floats, loaded: Floats
+    ) -> None:
+        """Move the cells under the fingers on step by step, and their pulp with them."""
+        k, rows, count, m = under.shape[1], self.cell.pulp_rows, len(free), self.exponent
+        path = mapped(self.path, under)
+        height = driven[0, :k].copy()
+        exponent = height * m
+        exponent -= self.offset
+        exponent -= path[2 * count]
+        # The filters, then the tension at the start of a step, on average and at its end.
+        work = np.empty((rows.stop + 2, *height.shape))
+        filters, first, mean, last = work[:-3], work[-3], work[-2], work[-1]
+        filters[:] = driven[rows, :k]
+        _tension(exponent, last)
+        for s in range(count):
+            rise, lift = free[s, :k], path[s]
+            first[:] = last
+            slip = loaded[s] - lift
+            bow = loaded[count + s] - path[count + s]
+            decay = loaded[2 * count + s] + TINY
+            lost = mapped(self.lost[s], work[:-2])[0]
+            relaxed = lost + 1.0
+            idle = first <= lost
+            stiffness = decay.copy()
+            np.putmask(stiffness, idle, TINY)
+            push = stiffness * relaxed
+            growth = push + slip
+            growth += TINY
+            end, bent = exponent + slip, exponent + bow
+            if not np.count_nonzero(np.maximum(bent, end) >= self.hard):
+                relief = pressed(np.exp(bent), growth, stiffness)
+                np.divide(relief, stiffness, mean)
+            else:
+                decay, rise[:] = self._loaded_valve(s, openings, exponent, relaxed, lift)
+                slip = m * rise - lift
+                stiffness = np.where(idle, TINY, decay)
+                push = stiffness * relaxed
+                np.clip(bow, -BEND, BEND, out=bow)
+                relief, mean[:] = careful(exponent + bow, push + slip + TINY, stiffness)
+                end = exponent + slip
+            push -= relief
+            mean -= 1.0
+            end += push
+            _tension(end, last)
+            crossing = (last <= lost) != idle
+            if np.count_nonzero(crossing):
+                parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+                push[crossing], mean[crossing] = crossed(*parts)
+                end = exponent + slip + push
+                _tension(end, last)
+            push /= m
+            rise += push
+            rise += height
+            np.maximum(rise, 0.0, height)
+            np.minimum(height, self.cell.actuator.stroke, height)
+            stopped = rise != height
+            if np.count_nonzero(stopped):
+                # The mean found above is that of a pin that no end stop holds.
+                end = m * height - self.offset - path[2 * count + s + 1]
+                _tension(end, last)
+                np.putmask(mean, stopped, 0.5 * (first + last))
+            # Where the finger is not touched all through the step the mean is that of no tension.
+            np.maximum(mean, 0.0, mean)
+            # Of a tension that falls steeply a straight line would make a filter that pulls. The last row
+            # is the force.
+            np.maximum(mapped(self.transition[s], work)[:-1], 0.0, filters)
+            exponent = end
+        driven[0, :k] = height
+        driven[rows, :k] = filters
+
+    def _loaded_valve(
+        self, s: int, openings: Floats, exponent: Floats, relaxed: Floats, lift: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return decay and free rise of step s where the load decides on the valve's branch."""
+        m, opening, weights = self.exponent, openings[self.nodes[s]], self.weights[self.nodes[s]]
+        to_load = self.to_load * self.shares[s]
+        pressure = self.cell.supply.pressure(opening)
+        grown = middle = _grown(exponent)
+        for _ in range(2):
+            load = to_load * np.maximum(middle - relaxed, 0.0)
+            conductance = self.cell.flow.conductance(opening, pressure - load)
+            decay = m * to_load * (weights * conductance).sum(axis=0) + TINY
+            free = (weights * conductance * pressure).sum(axis=0)
+            slip = m * free - lift
+            growth = slip + decay * relaxed + TINY
+            relief, _ = careful(exponent, growth, decay)
+            way = np.where(grown > relaxed, growth - relief, slip)
+            middle = 0.5 * (grown + _grown(exponent + way))
+        return decay, free
+
+
+def unlike(cell: Cell, plans: Sequence[BernoulliPlan]) -> Unlike:
+    """Put the closed-form steps of some runs together: of the same nodes, and laminar all or none of them."""
+    first, steps = plans[0], range(len(plans[0].nodes))
+    maps: dict[str, Any] = {
+        name: _of_all([getattr(plan, name) for plan in plans]) for name in ("response", "moves", "path")
+    }
+    return Unlike(
+        cell=cell,
+        nodes=first.nodes,
+        weights=np.stack([plan.weights[:, None] / plan.cell.actuator.area for plan in plans], axis=-1),
+        lost=tuple(_of_all([plan.lost[s][None] for plan in plans]) for s in steps),
+        transition=tuple(_of_all([plan.transition[s] for plan in plans]) for s in steps),
+        shares=np.stack([plan.shares for plan in plans], axis=-1),
+        laminar=first.cell.flow.knee > first.cell.supply.largest,
+        exponent=numbers([plan.numbers[0] for plan in plans]),
+        offset=numbers([plan.numbers[1] for plan in plans]),
+        to_load=numbers([plan.to_load for plan in plans]),
+        hard=numbers([plan.numbers[-1] for plan in plans]),
+        **maps,
+    )
+
+
+def _of_all(maps: Sequence[Floats]) -> Floats:
+    """Return a map of all runs: (o, i) if they have one and the same, else (o, i, b)."""
+    if all(np.array_equal(one, maps[0]) for one in maps):
+        return maps[0]
+    return np.stack(maps, axis=-1)
+
+
+def mapped(maps: Floats, rows: Floats) -> Floats:
+    """Return rows (o, n, b) that a linear map, (o, i) or one a run (o, i, b), makes of rows (i, n, b)."""
+    if maps.ndim == 2:
+        flat: Floats = np.dot(maps, rows.reshape(len(rows), -1))
+        return flat.reshape(-1, *rows.shape[1:])
+    made: Floats = np.einsum("oib,inb->onb", maps, rows)
+    return made
+
+
+def _tension(exponent: Floats, out: Floats) -> None:
+    """Work out the elastic force in units of b/m, into `out`; 0 where there is a gap."""
+    np.maximum(exponent, 0.0, out)
+    np.minimum(out, LARGEST_EXPONENT, out)
+    np.expm1(out, out)
+
+
+def _grown(exponent: Floats) -> Floats:
+    """Return exp(e), 1 where there is a gap."""
+    grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
+    return grown

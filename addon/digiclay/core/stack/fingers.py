@@ -1,0 +1,103 @@
+"""The fingers of many runs: how they come, and their undersides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..system import System
+from ..touch import approach
+from ..trajectory import Trajectory
+from .columns import Floats
+
+__all__ = ["Fingers", "fingers", "undersides"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fingers:
+    """How the fingers come in t control periods, at p instants of each.
+
+    The last axis is b, or 1 where all runs have one and the same finger; see `touch.Approach`.
+
+    Attributes
+    ----------
+    forms : ndarray (t, 2 p, 6, b)
+    join : ndarray (t, 2, p, 1, b)
+    window : ndarray (t, 6, b)
+    """
+
+    forms: Floats
+    join: Floats
+    window: Floats
+
+
+def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, count: int) -> Fingers:
+    """Work out how the fingers come.
+
+    Parameters
+    ----------
+    systems : sequence of System
+        With a fingertip.
+    ways : sequence of Trajectory
+        Each run's.
+    first, count : int
+        Control periods.
+    """
+    runs = list(zip(systems, ways, strict=True))
+    alike = all(_same(run, runs[0]) for run in runs)
+    known = [_approaches(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
+    return Fingers(*(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+
+
+def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
+    """Tell whether two runs have the same finger at the same times."""
+    (system, way), (first, its) = one, other
+    assert system.cell.touch is not None
+    assert first.cell.touch is not None
+    return (
+        system.cell.touch.fingertip == first.cell.touch.fingertip
+        and way.interpolation == its.interpolation
+        and system.period == first.period
+        and np.array_equal(system.instants, first.instants)
+        and all(
+            np.array_equal(getattr(way, name), getattr(its, name))
+            for name in ("times", "positions", "orientations")
+        )
+    )
+
+
+def _approaches(system: System, way: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
+    """Work out how one finger comes: the arrays of `Fingers`, without their last axis."""
+    assert system.cell.touch is not None
+    starts = (first + np.arange(count)) * system.period
+    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
+    coming = approach(system.cell.touch.fingertip, poses)
+    forms, join = (np.array([getattr(one, name) for one in coming]) for name in ("forms", "join"))
+    return forms, join, np.array([one.window for one in coming])
+
+
+def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
+    """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.underside`.
+
+    Parameters
+    ----------
+    coming : Fingers
+    period : int
+        Which of its periods.
+    place : ndarray (6, k, b)
+    """
+    forms, (least, root) = coming.forms[period], coming.join[period]
+    if forms.shape[-1] == 1:
+        flat = np.dot(forms[..., 0], place.reshape(6, -1))
+        rows = flat.reshape(-1, *place.shape[1:])
+    else:
+        rows = np.einsum("pcb,ckb->pkb", forms, place)
+    under: Floats = rows[: len(least)]
+    np.maximum(under, least, under)
+    np.sqrt(under, under)
+    under -= root
+    under *= under
+    under += rows[len(least) :]
+    return under

@@ -1,0 +1,173 @@
+"""One control period after another, of many runs at once: `core.simulation` with an axis for the runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DivergenceError
+from ..places import Measurement
+from ..state import Rows
+from ..system import System
+from . import beds
+from .beds import NO_DISC, Beds, Disc, Gathered
+from .columns import Floats, numbers
+from .control import StackedController
+from .fingers import Fingers, undersides
+from .gathering import Gathering, taking_part
+from .physics import Movement, Touches
+
+__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "kept"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """All that does not change in b sessions on one layout.
+
+    Attributes
+    ----------
+    systems : tuple of System
+        Those of the runs.
+    rows : Rows
+    touch : Touches or None
+    pulp_rows : slice
+        The rows that the relaxation owns.
+    controller : StackedController or None
+        None: every valve stays shut.
+    movement : Movement
+    gathering : Gathering
+    """
+
+    systems: tuple[System, ...]
+    rows: Rows
+    touch: Touches | None
+    pulp_rows: slice
+    controller: StackedController | None
+    movement: Movement
+    gathering: Gathering
+
+
+def begin(stack: Stack) -> Beds:
+    """Return the beds before the sessions."""
+    memory = stack.controller.begin() if stack.controller else None
+    heights = numbers([system.cell.actuator.rest_height for system in stack.systems])
+    return beds.at_rest(stack.rows, stack.systems[0].grid.count, heights, memory)
+
+
+def advance(stack: Stack, state: Beds, coming: Fingers | None, at: int) -> Beds:
+    """Simulate one control period of all runs in the arrays of `state`, which is used up.
+
+    Parameters
+    ----------
+    stack : Stack
+    state : Beds
+    coming : Fingers or None
+        How the fingers come in some periods.
+    at : int
+        Which of these is to be simulated.
+    """
+    memory, control = _attend(stack, state)
+    held = taking_part(stack.gathering, state, coming.window[at] if coming else None, control)
+    after = state.period + 1
+    if not held.cells.size:
+        return Beds(after, state.rows, state.modes, state.aged, held, memory)
+    instants, runs = stack.systems[0].instants.size, held.cells.shape[1]
+    near = held.place[:, : held.near]
+    under = undersides(coming, at, near) if coming and held.near else np.empty((instants, 0, runs))
+    memory = _command(stack, held, memory)
+    stack.movement.advance(held.block[stack.rows.driven], under)
+    _feel(stack, held, under)
+    return Beds(after, state.rows, state.modes, state.aged, held, memory)
+
+
+def _attend(stack: Stack, state: Beds) -> tuple[Any, Disc]:
+    """Let the controllers take in the touched cells; return their memory and the discs they will control."""
+    if stack.controller is None:
+        return None, NO_DISC
+    touched = _measured(stack, state.gathered, state.gathered.near)
+    memory, disc = stack.controller.attend(state.memory, touched)
+    return memory, disc
+
+
+def _measured(stack: Stack, held: Gathered, count: int) -> Measurement:
+    """Measure the first `count` of the gathered cells of every run."""
+    rows, block = stack.rows, held.block[:, :count]
+    mode, place, own = held.mode[:count], held.place[:, :count], block[rows.controlled]
+    return Measurement(place, block[0], block[rows.force], block[rows.target], mode, own)
+
+
+def _command(stack: Stack, held: Gathered, memory: Any) -> Any:
+    """Let the controllers command the gathered cells, and queue the commands; return their memory."""
+    if stack.controller is None:
+        return memory
+    rows = stack.rows
+    memory, orders = stack.controller.command(memory, _measured(stack, held, len(held.cells)))
+    held.block[rows.target] = orders.target
+    held.mode[:] = orders.mode
+    commands = held.block[rows.commands]
+    for older, newer in pairwise(commands):
+        older[:] = newer
+    commands[-1] = orders.command
+    return memory
+
+
+def _feel(stack: Stack, held: Gathered, under: Floats) -> None:
+    """Work out the forces at the end of the period."""
+    if stack.touch and held.near:
+        near = held.block[:, : held.near]
+        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
+
+
+def broken(state: Beds) -> NDArray[np.bool_]:
+    """Tell which runs, (b,), hold numbers that are not finite."""
+    finite: NDArray[np.bool_] = np.isfinite(state.gathered.block.sum(axis=(0, 1)))
+    return ~finite
+
+
+def blow_up(stack: Stack, state: Beds, run: int) -> DivergenceError:
+    """Return the error a run that holds a number which is not finite ends in; see `core.simulation`."""
+    system, held, rows = stack.systems[run], state.gathered, stack.rows
+    row, place = np.argwhere(~np.isfinite(held.block[..., run]))[0].tolist()
+    names = {0: "height", rows.force: "force", rows.target: "commanded height"}
+    lag = range(rows.physics)[system.cell.lag_rows]
+    return DivergenceError(
+        (state.period - 1) * system.period,
+        int(held.cells[place, run]),
+        names.get(row, "valve opening" if row in lag else "relaxation"),
+        float(held.block[row, place, run]),
+        "Use a shorter physics step, or the stepper 'bernoulli'.",
+    )
+
+
+def kept(state: Beds, controller: StackedController | None, runs: Sequence[int]) -> Beds:
+    """Return the beds of some of the runs.
+
+    Parameters
+    ----------
+    state : Beds
+    controller : StackedController or None
+        Of all runs.
+    runs : sequence of int
+    """
+    chosen, held = np.array(runs, np.intp), state.gathered
+    # The discs are not worth keeping: the set is made anew.
+    gathered = Gathered(
+        held.cells[:, chosen],
+        held.near,
+        held.block[..., chosen],
+        held.mode[:, chosen],
+        held.place[..., chosen],
+        NO_DISC,
+        NO_DISC,
+        held.peak[chosen],
+        until=0,
+    )
+    memory = controller.kept(state.memory, chosen) if controller else None
+    several = (state.rows, state.modes, state.aged)
+    rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
+    return Beds(state.period, rows, modes, aged, gathered, memory)

@@ -1,0 +1,122 @@
+"""Which points of a sweep run in one stack, and which one at a time, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from .errors import DigiclayError
+from .scene import Scene
+from .stack.assembly import structure, why_not
+from .stack.session import run_together
+from .sweep import Point, Record, evaluate, recorded
+
+__all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
+
+#: Fewer points than this are as quick one at a time.
+LEAST = 4
+#: From twice as many points on there are two stacks: a larger one gains little, and busies one core only.
+RUNS = 32
+#: Bytes the histories of a stack may take before they are judged, and bytes a cell takes in a control period.
+BUDGET, BYTES_A_CELL = 2**30, 25
+#: Cells that take part at a time with a method that looks after a blister only; else it may be all.
+FEW = 200
+
+
+@dataclass(frozen=True)
+class Bundles:
+    """The points of a sweep, in bundles that run at a time.
+
+    Attributes
+    ----------
+    stacks : tuple of tuple of Point
+        Of `LEAST` points or more.
+    alone : tuple of tuple of Point
+        Of one point each.
+    why : tuple of str
+        Why some run alone, one line a reason.
+    """
+
+    stacks: tuple[tuple[Point, ...], ...]
+    alone: tuple[tuple[Point, ...], ...]
+    why: tuple[str, ...]
+
+    def told(self) -> list[str]:
+        """Return how the points run, as lines for a person."""
+        lines = []
+        if self.stacks:
+            count = sum(len(stack) for stack in self.stacks)
+            lines.append(f"{count} points run in {_some(len(self.stacks), 'stack')}")
+        return [*lines, *self.why]
+
+
+def bundles(points: Sequence[Point]) -> Bundles:
+    """Put points of one structure together, as many as make a stack; in the order of the points.
+
+    Which stand together depends on the points alone, not on what is done already or how many
+    workers there are: the same sweep comes to the same results to the last bit.
+    """
+    alike: dict[object, list[Point]] = {}
+    alone: list[Point] = []
+    why: dict[str, int] = {}
+    for point in points:
+        reason = why_not(point.scene) if point.scene else ""
+        if point.scene is None or reason:
+            alone.append(point)
+            if reason:
+                why[reason] = why.get(reason, 0) + 1
+        else:
+            alike.setdefault(structure(point.scene), []).append(point)
+    stacks = []
+    for group in alike.values():
+        most = _most(group[0].scene)
+        if min(len(group), most) < LEAST:
+            alone += group
+            reason = (
+                f"fewer than {LEAST} have the same bed, parts and steps"
+                if len(group) < LEAST
+                else "their histories are too long to keep many at once"
+            )
+            why[reason] = why.get(reason, 0) + len(group)
+            continue
+        pieces = max(1, len(group) // RUNS, -(-len(group) // most))
+        edges = [len(group) * i // pieces for i in range(pieces + 1)]
+        stacks += [tuple(group[a:b]) for a, b in pairwise(edges)]
+    alone.sort(key=lambda point: point.index)
+    lines = tuple(f"{_some(count, 'point')} one at a time: {reason}" for reason, count in why.items())
+    return Bundles(tuple(stacks), tuple((point,) for point in alone), lines)
+
+
+def _most(scene: Scene | None) -> int:
+    """Return how many runs like this one may be in a stack."""
+    assert scene is not None
+    cells = scene.cells if scene.blister is None else min(scene.cells, FEW)
+    periods = scene.periods // scene.recorder.every if scene.recorder else 1
+    return BUDGET // max(1, periods * cells * BYTES_A_CELL)
+
+
+def _some(count: int, what: str) -> str:
+    """Say how many."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def evaluate_all(scenes: Sequence[Scene], stopped: Callable[[], bool] | None = None) -> list[Record | None]:
+    """Run a bundle; return the record of each of its points, None for one that was stopped.
+
+    What goes wrong with a stack as a whole is found out with its points one by one.
+    """
+    records: list[Record | None] = [None] * len(scenes)
+    if len(scenes) > 1:
+        try:
+            for number, result in run_together(scenes, stopped=stopped):
+                if isinstance(result, DigiclayError):
+                    records[number] = {"error": " ".join(str(result).split())}
+                else:
+                    records[number] = recorded(result)
+        except Exception:  # each point meets it again by itself, and says what it is
+            records = [None] * len(scenes)
+    for number, scene in enumerate(scenes):
+        if records[number] is None and not (stopped and stopped()):
+            records[number] = evaluate(scene, stopped)
+    return records

@@ -1,0 +1,268 @@
+"""Runs in a stack come to what they come to alone, and what befalls one of them is its own affair."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.errors import DivergenceError, ParameterError
+from digiclay.core.methods import METHODS
+from digiclay.core.scene import Scene, Waypoint
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.session import Result, run
+from digiclay.core.stack.assembly import STACKED, structure, why_not
+from digiclay.core.stack.session import run_together
+
+#: Sums in another order: a last bit here and there. Heights are centimetres, forces tenths of a newton.
+HEIGHT, FORCE = 1e-12, 1e-10
+#: A sample of each method that stands in stacks.
+SAMPLES = {
+    "virtual_master": "ridge_mound_valley",
+    "cell_states": "ridge_mound_valley",
+    "elastic": "elastic_press",
+    "plastic": "plastic_press",
+    "force_display": "force_display",
+    "shape_display": "shape_display",
+}
+
+
+def scene(name: str, *settings: str) -> Scene:
+    """Return a sample with some settings, ``key=value``."""
+    return load(find(name), [Setting(*setting.split("=")) for setting in settings])
+
+
+def moved(known: Scene, x: float, z: float) -> Scene:
+    """Return a scene whose finger takes the same way elsewhere, m."""
+    points = tuple(
+        replace(point, position=(point.position[0] + x, point.position[1], point.position[2] + z))
+        for point in known.trajectory.waypoints
+    )
+    return replace(known, trajectory=replace(known.trajectory, waypoints=points))
+
+
+def together(scenes: Sequence[Scene]) -> list[Any]:
+    """Run scenes in a stack; return what each came to."""
+    assert len({structure(one) for one in scenes}) == 1
+    done: dict[int, Any] = {}
+    for number, result in run_together(scenes):
+        history = getattr(result, "history", None)
+        if history is not None:  # valid until the next result is asked for
+            result = replace(result, history={name: rows.copy() for name, rows in history.items()})
+        done[number] = result
+    return [done[number] for number in range(len(scenes))]
+
+
+def assert_as_alone(found: Result, known: Scene) -> None:
+    """Check a result of a stack against the session by itself."""
+    alone = run(known)
+    assert found.history is not None
+    assert alone.history is not None
+    assert found.history.keys() == alone.history.keys()
+    for name, values in alone.history.items():
+        tolerance = HEIGHT if name == "height" else FORCE
+        np.testing.assert_allclose(found.history[name], values, rtol=0, atol=tolerance, err_msg=name)
+    judged = ("control_periods", "rfd", "contact_share", "incomplete")
+    known_by = {name: value for name, value in alone.metrics.items() if name in judged and value is not None}
+    assert {name: found.metrics[name] for name in known_by} == pytest.approx(known_by, rel=1e-9)
+    assert found.metrics["losses"] == alone.metrics["losses"]
+
+
+@pytest.mark.parametrize("method", STACKED)
+def test_runs_with_fingers_and_ends_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
+    known = scene(SAMPLES[method], f"control.method={method}", "simulation.duration=1.5")
+    scenes = [
+        replace(
+            moved(known, 0.7e-3 * i, -0.2e-3 * i),
+            simulation=replace(known.simulation, duration=1.5 - 0.1 * i),
+        )
+        for i in range(3)
+    ]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("control.force_gain", ("2", "5", "8")),
+        ("control.position_gain", ("200", "500", "800")),
+        ("control.loss_time", ("0.01", "0.05", "0.1")),
+        ("control.travel", ("1e-3", "2e-3", "4e-3")),
+        ("blister.radius", ("12e-3", "15e-3", "16e-3")),
+        ("blister.sigma", ("6e-3", "9e-3")),
+        ("fingertip.length", ("8e-3", "10e-3", "12e-3")),
+        ("contact.stiffness", ("150", "250", "400")),
+        ("relaxation.times", ("[2e-3, 0.1, 1.0]", "[4e-3, 0.07, 1.4]")),
+        ("actuator.bore", ("1.8e-3", "2e-3")),
+        ("actuator.rest_height", ("30e-3", "40e-3")),
+        ("supply.high", ("0.4e5", "0.6e5")),
+        ("valve.stroke", ("25e-6", "30e-6", "40e-6")),
+        ("valve_lag.time_constant", ("1e-3", "3e-3")),
+        ("delay.dead_time", ("1e-3", "2e-3")),
+        ("fluid.viscosity", ("1e-6", "1.6e-6", "3e-6")),
+        ("fluid.viscosity", ("1.6e-9", "2e-9")),  # the flow is turbulent
+        ("simulation.control_period", ("4e-3", "5e-3")),
+    ],
+)
+def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
+    key: str, values: Sequence[str]
+) -> None:
+    profile = "gaussian" if key == "blister.sigma" else "cone"
+    scenes = [scene("tap", f"{key}={value}", f"blister.profile={profile}") for value in values]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "cell_states"])
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [("valve.stroke", ("25e-6", "40e-6")), ("actuator.rest_height", ("39e-3", "41e-3"))],
+)
+def test_the_other_methods_hold_on_devices_of_their_own(method: str, key: str, values: Sequence[str]) -> None:
+    scenes = [scene("tap", f"{key}={value}", f"control.method={method}") for value in values]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+@pytest.mark.parametrize(
+    ("sample", "key", "values"),
+    [
+        ("elastic_press", "control.stiffness", ("10", "20", "40")),
+        ("elastic_press", "control.settling_time", ("20e-3", "40e-3")),
+        ("plastic_press", "control.yield_force", ("0.02", "0.05")),
+        ("plastic_press", "control.damping", ("5", "8")),
+    ],
+)
+def test_behaviours_with_parameters_of_their_own_do_what_they_do_alone(
+    sample: str, key: str, values: Sequence[str]
+) -> None:
+    scenes = [scene(sample, f"{key}={value}", "simulation.duration=1.0") for value in values]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+def test_the_papers_session_in_a_stack_is_the_papers_session() -> None:
+    gains = ((3, 10), (5, 26.5))
+    scenes = [
+        scene("ridge_mound_valley", f"control.force_gain={gain}", f"simulation.duration={end}")
+        for gain, end in gains
+    ]
+    assert_as_alone(together(scenes)[1], scenes[1])
+
+
+def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> None:
+    rests = ("1e-3", "1.5e-3")
+    method = ("control.method=elastic", "control.stiffness=5")
+    low = [scene("tap", f"actuator.rest_height={rest}", *method) for rest in rests]
+    scenes = [moved(one, 0.0, -41e-3) for one in low]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+        pressed = found.history["force"] > 0.0
+        assert found.history["height"][pressed].min() == 0.0
+
+
+def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
+    points = tuple(
+        Waypoint(time=time, position=(0.0, 0.0, z))
+        for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))
+    )
+    known = scene("tap", "control.method=plastic")
+    twice = replace(
+        known,
+        trajectory=replace(known.trajectory, waypoints=points),
+        simulation=replace(known.simulation, duration=0.9),
+    )
+    scenes = [twice, moved(twice, 1e-3, -0.5e-3)]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+@pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
+def test_any_stepper_can_move_a_stack(stepper: str) -> None:
+    settings = (f"simulation.stepper={stepper}", "simulation.physics_step=5e-4", "simulation.duration=0.4")
+    scenes = [scene("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
+    assert_as_alone(together(scenes)[1], scenes[1])
+
+
+def test_a_recorder_that_leaves_out_rows_leaves_out_the_same() -> None:
+    settings = ("recorder.every=7", "simulation.duration=1.003")
+    scenes = [scene("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
+    assert_as_alone(together(scenes)[0], scenes[0])
+
+
+def test_without_a_recorder_there_is_no_history() -> None:
+    scenes = [scene("tap", f"control.force_gain={gain}", "recorder=absent") for gain in (3, 5)]
+    assert [one.history for one in together(scenes)] == [None, None]
+
+
+def test_without_a_finger_or_a_controller_a_stack_stands_still() -> None:
+    settings = ("control=absent", "fingertip=absent", "simulation.duration=0.1")
+    scenes = [replace(scene("tap", *settings), name=name) for name in "ab"]
+    assert_as_alone(together(scenes)[1], scenes[1])
+
+
+def blown_up() -> list[Scene]:
+    """Return three scenes in steps far too long for Euler; only the middle one's finger gets to the bed."""
+    long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
+    known = scene("slow_press", "simulation.stepper=euler", *long)
+    return [moved(known, 0.0, 20e-3), known, moved(known, 1e-3, 20e-3)]
+
+
+def test_a_run_that_diverges_ends_in_its_own_error() -> None:
+    scenes = blown_up()
+    with pytest.raises(DivergenceError) as alone:
+        run(scenes[1])
+    found = together(scenes)[1]
+    assert isinstance(found, DivergenceError)
+    assert str(found) == str(alone.value)
+
+
+def test_when_a_run_diverges_the_others_go_on() -> None:
+    scenes = blown_up()
+    found = together(scenes)
+    assert_as_alone(found[0], scenes[0])
+    assert_as_alone(found[2], scenes[2])
+
+
+def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on() -> None:
+    known = scene("tap")
+    endless = replace(known, simulation=replace(known.simulation, duration=1e6))
+    found = together([endless, known])
+    assert isinstance(found[0], ParameterError)
+    assert str(found[0]).startswith("recorder.every must be at least")
+    assert_as_alone(found[1], known)
+
+
+def test_a_stack_that_is_stopped_gives_up_what_is_not_done() -> None:
+    scenes = [scene("tap", f"control.force_gain={gain}") for gain in (3, 5)]
+    assert list(run_together(scenes, stopped=lambda: True)) == []
+
+
+def test_the_run_times_of_a_stack_are_shares_of_it() -> None:
+    first, second = together([scene("tap", f"control.force_gain={gain}") for gain in (3, 5)])
+    assert first.run_time == second.run_time > 0.0
+
+
+def test_every_method_stands_in_stacks_or_says_why_not() -> None:
+    for method in METHODS:
+        known = scene("tap", f"control.method={method}")
+        assert bool(why_not(known)) == (method not in STACKED), method
+
+
+def test_sensors_keep_a_scene_out_of_stacks() -> None:
+    assert why_not(scene("tap", "sensors.force_noise=0.001")) == "their sensors are no part of a stack yet"
+
+
+def test_a_shape_to_start_from_keeps_a_scene_out_of_stacks() -> None:
+    assert why_not(scene("dome_peaked")) == "a shape comes up before their method takes over"
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["layout.rows=21", "delay=absent", "simulation.physics_step=2e-3", "blister.profile=gaussian"],
+)
+def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
+    assert structure(scene("tap", setting)) != structure(scene("tap"))

@@ -1,0 +1,202 @@
+"""Which points of a sweep run together, what is said of it, and that it makes no difference."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.assembly import assemble
+from digiclay.core.contact import Contact
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.stack.assembly import put_together
+from digiclay.core.stack.columns import kind, together
+from digiclay.core.stack.fingers import fingers
+from digiclay.core.stack.gathering import reach
+from digiclay.core.stack.simulation import advance, begin
+from digiclay.core.supply import Supply
+from digiclay.core.sweep import Point, evaluate, points
+from digiclay.core.sweep_axis import axis
+from digiclay.core.sweep_bundles import RUNS, bundles, evaluate_all
+from digiclay.core.touch import approach
+
+SHORT = [Setting("simulation.duration", "0.1")]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
+    """Return the points of a sweep over a tap."""
+    return points(find("tap"), settings or SHORT, [axis(one) for one in varied])
+
+
+def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
+    """Return which points are in which bundle."""
+    return [[point.index for point in part] for part in parts]
+
+
+def test_numbers_that_differ_become_an_array_and_the_others_stay() -> None:
+    part = together([Contact(stiffness=100.0), Contact(stiffness=200.0)])
+    np.testing.assert_array_equal(part.stiffness, [100.0, 200.0])
+    assert part.exponent == Contact().exponent
+
+
+def test_the_formulas_of_a_part_hold_for_many_runs() -> None:
+    supplies = [Supply(high=4e4), Supply(low=-3e4)]
+    openings = np.linspace(-1.0, 1.0, 12).reshape(6, 2)
+    alone = np.column_stack([one.pressure(openings[:, run]) for run, one in enumerate(supplies)])
+    np.testing.assert_array_equal(together(supplies).pressure(openings), alone)
+
+
+def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
+    assert kind(Contact(stiffness=100.0)) == kind(Contact())
+    scene = load(find("tap"))
+    assert kind(scene.layout) != kind(load(find("tap"), [Setting("layout.rows", "15")]).layout)
+
+
+def test_the_reach_of_many_fingers_is_that_of_each() -> None:
+    from digiclay.core.fingertip import Fingertip
+    from digiclay.core.fingertip import reach as alone
+
+    poses = np.zeros((3, 2, 7))
+    poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
+    windows = [one.window for one in approach(Fingertip(), poses)]
+    _, _, found = reach(np.array(windows).T, np.full(3, 0.04))
+    expected = [alone(base, tilt, bend, 0.04) + spread for _, _, spread, base, tilt, bend in windows]
+    np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-12)
+    assert found[2] < 0.0  # the last one is far above the bed
+
+
+def calls(count: int) -> list[int]:
+    """Return how many functions of numpy and others each control period of so many taps calls."""
+    scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
+    systems = [assemble(scene) for scene in scenes if scene]
+    stack = put_together(systems)
+    state, ways = begin(stack), [scene.trajectory.trajectory() for scene in scenes if scene]
+    made, counted = [0], []
+
+    def count_one(frame: Any, event: str, argument: Any) -> None:
+        made[0] += event == "c_call"
+
+    coming = fingers(systems, ways, 0, 100)
+    for period in range(100):
+        made[0] = 0
+        sys.setprofile(count_one)
+        try:
+            state = advance(stack, state, coming, period)
+        finally:
+            sys.setprofile(None)
+        counted.append(made[0])
+    return counted
+
+
+def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
+    # The median: now and then a set of cells is made anew, and not in the same periods.
+    assert np.median(calls(16)) == np.median(calls(4))
+
+
+def test_points_of_one_structure_run_together() -> None:
+    parts = bundles(some("control.force_gain=1,2,3,4", "layout.rows=11,13"))
+    assert indices(parts.stacks) == [[0, 2, 4, 6], [1, 3, 5, 7]]
+    assert parts.told() == ["8 points run in 2 stacks"]
+
+
+def test_a_stack_has_no_more_runs_than_pay() -> None:
+    for count, sizes in ((2 * RUNS - 1, [2 * RUNS - 1]), (2 * RUNS + 1, [RUNS, RUNS + 1])):
+        parts = bundles(some(f"control.force_gain=1:6:{count}"))
+        assert [len(stack) for stack in parts.stacks] == sizes
+
+
+def test_long_sessions_make_smaller_stacks() -> None:
+    long = [Setting("simulation.duration", "200")]
+    parts = bundles(some("control.force_gain=1:6:20", settings=long))
+    # 40,000 control periods of 121 cells at 25 bytes are 121 MB, and a stack may hold 1 GiB.
+    assert [len(stack) for stack in parts.stacks] == [6, 7, 7]
+
+
+def test_points_without_their_like_run_alone_and_it_is_said() -> None:
+    parts = bundles(some("layout.rows=11,13,15"))
+    assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2]])
+    assert parts.told() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
+
+
+def test_sessions_of_hours_run_alone_and_it_is_said() -> None:
+    hours = [Setting("simulation.duration", "1e4")]
+    parts = bundles(some("control.force_gain=1:6:5", settings=hours))
+    assert parts.stacks == ()
+    assert parts.told() == ["5 points one at a time: their histories are too long to keep many at once"]
+
+
+def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
+    parts = bundles(some("control.method=viscous,push_pull,elastic", "valve_lag.time_constant=1e-3:2e-3:4"))
+    assert indices(parts.stacks) == [[8, 9, 10, 11]]
+    assert parts.told() == [
+        "4 points run in 1 stack",
+        "4 points one at a time: what viscous does depends on which cells take part",
+        "4 points one at a time: what push_pull does depends on which cells take part",
+    ]
+
+
+def test_values_that_do_not_go_together_are_in_no_stack() -> None:
+    triggers = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
+    method = [*SHORT, Setting("control.method", "cell_states")]
+    parts = bundles(some(*triggers, settings=method))
+    assert (indices(parts.stacks), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
+
+
+def test_a_bundle_comes_to_the_figures_of_its_points() -> None:
+    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
+    found = evaluate_all(scenes)
+    for record, scene in zip(found, scenes, strict=True):
+        alone = evaluate(scene)
+        assert record is not None
+        assert alone is not None
+        times = ("run_time", "real_time_factor")
+        own, other = (
+            {name: value for name, value in one["figures"].items() if name not in times and value is not None}
+            for one in (record, alone)
+        )
+        assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
+
+
+def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    def faulty(*given: Any, **known: Any) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr("digiclay.core.sweep_bundles.run_together", faulty)
+    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
+    assert all(record and "figures" in record for record in evaluate_all(scenes))
+
+
+def test_a_stack_that_is_stopped_has_no_records() -> None:
+    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
+    assert evaluate_all(scenes, lambda: True) == [None, None]
+
+
+def test_a_sweep_says_how_its_points_were_run(capsys: pytest.CaptureFixture[str]) -> None:
+    varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1"]
+    assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
+    assert "4 points\n4 points run in 1 stack\n" in capsys.readouterr().out
+
+
+def test_a_point_done_again_comes_to_the_same_bits(here: Path) -> None:
+    sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:5", "--set", "simulation.duration=0.2"]
+    main([*sweep, "--out", "out", "--quiet"])
+    file = here / "out" / "points" / "000003.json"
+    before = json.loads(file.read_text(encoding="utf-8"))["figures"]
+    file.unlink()
+    main([*sweep, "--out", "out", "--quiet"])
+    after = json.loads(file.read_text(encoding="utf-8"))["figures"]
+    times = ("run_time", "real_time_factor")
+    assert {n: v for n, v in after.items() if n not in times} == {
+        n: v for n, v in before.items() if n not in times
+    }
