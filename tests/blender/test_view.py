@@ -292,9 +292,7 @@ def test_a_bed_whose_nodes_were_removed_is_refused_by_name_and_shows_no_forces(b
         view.colour_by(bed, "force")
 
 
-def test_an_imported_run_keeps_its_forces_for_the_export_though_nothing_drawn_tells_them(
-    formed: Instant,
-) -> None:
+def test_an_instant_shown_keeps_its_forces_though_nothing_drawn_tells_them(formed: Instant) -> None:
     bed = view.build(Instant.at_rest(Layout(rows=6, columns=8)), bpy.context.collection)
     assert not view.wants_force(bed)
     view.show(bed, formed)

@@ -62,7 +62,6 @@ def process(*arguments: str, block: str = "") -> subprocess.Popen[str]:
     [
         (["run", "my.toml", "--render"], "bpy", "digiclay[blender]"),
         (["run", "my.toml", "--plots"], "matplotlib", "pip install digiclay[plots]"),
-        (["run", "my.toml", "--export", "stl"], "trimesh", "pip install trimesh"),
     ],
 )
 def test_a_missing_library_is_told_before_any_work(
