@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from digiclay import sculpting
 from digiclay.core.fingertip import LEVEL
 from digiclay.core.scene_table import resolve
-from digiclay.running import Running
+from digiclay.live import sculpting
+from digiclay.live.running import Running
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

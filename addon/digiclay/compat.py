@@ -22,10 +22,12 @@ except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
 __all__ = [
-    "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "quiet", "scratch",
+    "PACKAGE", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "quiet", "scratch",
     "set_node_setting", "shader_nodes", "strips", "to_video",
 ]  # fmt: skip
 
+#: The name Blender knows the extension by.
+PACKAGE = __package__
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
     "scenes", "objects", "collections", "meshes", "curves", "fonts", "lights",

@@ -4,8 +4,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from . import palettes
 from .compat import bpy
+from .device import palettes
 
 __all__ = ["Choices", "Preferences", "of", "register", "unregister"]
 

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import (
-    command_line,
-    display,
-    handlers,
-    image_reader,
-    operators,
-    panels,
-    preferences,
-    press_tool,
-    properties,
-)
+from . import command_line, operators, panels, preferences
+from .device import display
+from .exchange import image_reader
+from .live import handlers
+from .press import press_tool
+from .settings import properties
 
 __all__ = ["MODULES", "register", "unregister"]
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
-from digiclay.instant import Instant
+from digiclay.device.instant import Instant
 
 
 @pytest.fixture(autouse=True)

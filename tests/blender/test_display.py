@@ -9,9 +9,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bed_state, bridge, display, overlay, palettes, properties, running, sculpting, view
+from digiclay import bridge
 from digiclay.core.errors import DigiclayError
 from digiclay.core.modes import Mode
+from digiclay.device import display, palettes, view
+from digiclay.live import bed_state, running, sculpting
+from digiclay.overlay import overlay
+from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -6,13 +6,16 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, formed_bed, properties, view
+from digiclay import bridge
 from digiclay.core.assembly import assemble
 from digiclay.core.export import FORMATS, suffix
 from digiclay.core.keeping import packed
 from digiclay.core.layout import Layout, grid
 from digiclay.core.simulation import begin, step
-from digiclay.instant import Instant
+from digiclay.device import view
+from digiclay.device.instant import Instant
+from digiclay.exchange import formed_bed
+from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 

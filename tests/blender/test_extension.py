@@ -13,11 +13,12 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay import bridge, command_line, view
+from digiclay import bridge, command_line
 from digiclay.core.errors import OutputError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
-from digiclay.instant import Instant
+from digiclay.device import view
+from digiclay.device.instant import Instant
 
 #: Positions are float32 and drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23

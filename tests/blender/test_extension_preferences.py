@@ -8,10 +8,11 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay import palettes, preferences
+from digiclay import preferences
 from digiclay.bridge import linear
 from digiclay.core.modes import Mode
-from digiclay.parts import ROLE
+from digiclay.device import palettes
+from digiclay.device.parts import ROLE
 
 #: What is left of linear light to people without one kind of cone (Machado, Oliveira and Fernandes 2009).
 VISION = {

@@ -10,15 +10,15 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import film as films
-from digiclay import film_file, render
 from digiclay.compat import scratch, strips
 from digiclay.core.errors import OutputError, ParameterError
 from digiclay.core.fingertip import LEVEL
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.core.shots import Film, Turntable
-from digiclay.instant import Instant
+from digiclay.device.instant import Instant
+from digiclay.pictures import film as films
+from digiclay.pictures import film_file, render
 
 WIDTH, HEIGHT = 160, 100
 SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}

@@ -8,11 +8,14 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, properties, takes, view
+from digiclay import bridge
 from digiclay.core.scene_file import SAMPLES, find, load, sample_names
 from digiclay.core.shape_file import sample_shapes
 from digiclay.core.take import replayed
+from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
+from digiclay.recorded import takes
+from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 

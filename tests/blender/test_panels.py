@@ -6,9 +6,10 @@ from typing import Any
 
 import bpy
 import pytest
-from digiclay import panels, view
+from digiclay import panels
 from digiclay.core.methods import METHODS
 from digiclay.core.scene import SECTIONS
+from digiclay.device import view
 from digiclay.panels.base import CATEGORY, bed_of
 from digiclay.panels.section import in_use
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import bpy
 import pytest
-from digiclay import own_presets, properties
 from digiclay.core.errors import OutputError
 from digiclay.core.scene_file import load
 from digiclay.core.scene_table import PRESETS, resolve
+from digiclay.settings import own_presets, properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -9,9 +9,12 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay import aim, bridge, press_tool, properties, view
+from digiclay import bridge
 from digiclay.core.errors import DigiclayError
 from digiclay.core.layout import grid
+from digiclay.device import view
+from digiclay.press import aim, press_tool
+from digiclay.settings import properties
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
 LARGER = 8.0

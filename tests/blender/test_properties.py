@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, properties, settings_table
+from digiclay import bridge
 from digiclay.core.errors import ParameterError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.methods import METHODS
@@ -16,7 +16,8 @@ from digiclay.core.quantity import quantities
 from digiclay.core.scene import OPTIONAL, SECTIONS, Scene, parameters
 from digiclay.core.scene_file import find, load, sample_names
 from digiclay.core.scene_table import PRESETS, resolve
-from digiclay.shown_units import unit_of
+from digiclay.settings import properties, settings_table
+from digiclay.settings.shown_units import unit_of
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -7,10 +7,13 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bed_state, bridge, properties, view
+from digiclay import bridge
 from digiclay.core.errors import ParameterError
 from digiclay.core.layout import grid
 from digiclay.core.modes import Mode
+from digiclay.device import view
+from digiclay.live import bed_state
+from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 #: Positions are float32 and drawn ten times as large.

@@ -11,11 +11,12 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay import render, stage, view
 from digiclay.core.errors import DigiclayError, OutputError
 from digiclay.core.layout import Layout
 from digiclay.core.modes import COLOURS, Mode
-from digiclay.instant import Instant
+from digiclay.device import view
+from digiclay.device.instant import Instant
+from digiclay.pictures import render, stage
 
 WIDTH, HEIGHT = 240, 150
 
@@ -127,7 +128,7 @@ def test_rendering_without_blender_says_in_one_line_what_to_install(tmp_path: Pa
     (tmp_path / "bpy.py").write_text("raise ModuleNotFoundError(\"No module named 'bpy'\", name='bpy')\n")
     code = (
         "from digiclay.core.errors import DigiclayError\n"
-        "try:\n    import digiclay.render\n"
+        "try:\n    import digiclay.pictures.render\n"
         "except DigiclayError as error:\n    print(error)\n"
     )
     path = f"{tmp_path}:{Path(digiclay.__file__).parents[1]}"

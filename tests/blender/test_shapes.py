@@ -8,13 +8,17 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bed_state, bridge, image_reader, properties, view
+from digiclay import bridge
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import ParameterError
 from digiclay.core.keeping import unpacked
 from digiclay.core.layout import Layout, grid
 from digiclay.core.shape_file import sample_shapes
 from digiclay.core.shape_text import unpacked as heights_of
+from digiclay.device import view
+from digiclay.exchange import image_reader
+from digiclay.live import bed_state
+from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
 

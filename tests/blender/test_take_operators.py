@@ -8,8 +8,11 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bake, bed_state, bridge, running, sculpting, takes, tick, view
+from digiclay import bridge
 from digiclay.core.scene_file import load
+from digiclay.device import view
+from digiclay.live import bed_state, running, sculpting, tick
+from digiclay.recorded import bake, takes
 from numpy.typing import NDArray
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bake, bridge, takes, view
+from digiclay import bridge
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import DigiclayError
 from digiclay.core.fingertip import LEVEL, Fingertip
@@ -20,7 +20,9 @@ from digiclay.core.scene import Scene
 from digiclay.core.scene_table import resolve
 from digiclay.core.simulation import begin
 from digiclay.core.take import Take
-from digiclay.instant import Instant
+from digiclay.device import view
+from digiclay.device.instant import Instant
+from digiclay.recorded import bake, takes
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, heat, view
+from digiclay import bridge
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import DigiclayError
 from digiclay.core.fingertip import Fingertip
@@ -15,7 +15,8 @@ from digiclay.core.layout import Layout
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.core.scene_table import resolve
 from digiclay.core.simulation import begin
-from digiclay.instant import Instant
+from digiclay.device import heat, view
+from digiclay.device.instant import Instant
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23

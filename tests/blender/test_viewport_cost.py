@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 import pytest
-from digiclay import running, viewport_cost
 from digiclay.cli import main
+from digiclay.live import running, viewport_cost
 
 
 def test_every_part_of_a_tick_is_timed_and_nothing_is_left_in_the_file() -> None:

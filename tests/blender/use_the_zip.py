@@ -39,12 +39,12 @@ def main() -> None:
     )
     seen["added"] = sorted(bpy.ops.mesh.digital_clay_add(rows=6, columns=6))
     bed = bpy.context.object
-    seen["scene"] = part("properties").scene_of(bed).cells
+    seen["scene"] = part("settings.properties").scene_of(bed).cells
     chosen = part("preferences").of(bpy.context)
     chosen.redraw_rate = 24
     seen["redraw rate"] = bpy.context.preferences.addons[EXTENSION].preferences.redraw_rate
 
-    part("own_presets").save("Mine", part("properties").scene_of(bed))
+    part("settings.own_presets").save("Mine", part("settings.properties").scene_of(bed))
     own = Path(bpy.utils.extension_path_user(EXTENSION))
     seen["own presets"] = [str(file.relative_to(own)) for file in own.rglob("*.toml")]
 

@@ -10,9 +10,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 from digiclay.commands.counted import Counted, duration
+from digiclay.commands.gallery import Card, page
 from digiclay.commands.thumbnail import height_map
 from digiclay.core.png import png
-from digiclay.gallery import Card, page
 
 
 class Reader(HTMLParser):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.core.fingertip import LEVEL, Fingertip
 from digiclay.core.layout import Layout, grid
-from digiclay.gesture import (
+from digiclay.press.gesture import (
     ABOVE,
     APPROACH,
     DEEPEST,

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay import heat
 from digiclay.core.modes import COLOURS, Mode
-from digiclay.overlay_layout import free, laid_out
-from digiclay.overlay_look import LETTERS, LINES, contrast, look
-from digiclay.overlay_picture import Box, Picture, axis, scaled
-from digiclay.overlay_sections import Told
+from digiclay.device import heat
+from digiclay.overlay.layout import free, laid_out
+from digiclay.overlay.look import LETTERS, LINES, contrast, look
+from digiclay.overlay.picture import Box, Picture, axis, scaled
+from digiclay.overlay.sections import Told
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -9,10 +9,10 @@ import sys
 
 import numpy as np
 import pytest
-from digiclay import plots
 from digiclay.core.errors import OutputError, ParameterError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
+from digiclay.plots import plots
 
 
 def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
@@ -201,7 +201,7 @@ def test_matplotlib_is_not_imported_before_it_is_needed():
 def test_without_matplotlib_it_says_what_to_install():
     script = (
         "import sys; sys.modules['matplotlib'] = None\n"
-        "from digiclay import plots\nfrom digiclay.core.errors import OutputError\n"
+        "from digiclay.plots import plots\nfrom digiclay.core.errors import OutputError\n"
         "case = {'position': [[0, 0]], 'time': [0], 'total_force': [0], 'height': [[0]]}\n"
         "try:\n    plots.session(case, 'session.png', 0.4)\n"
         "except OutputError as error:\n    print(error)\n"

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay import running, sculpting
 from digiclay.core import live
 from digiclay.core.errors import DigiclayError
 from digiclay.core.keeping import packed
 from digiclay.core.scene_table import resolve
+from digiclay.live import running, sculpting
 
 from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
 

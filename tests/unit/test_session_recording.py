@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay import sculpting
 from digiclay.core import live
 from digiclay.core.keeping import packed, unpacked
 from digiclay.core.live import lived
+from digiclay.live import sculpting
 
 from tests.hand import Hand, started
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.shown_units import SHOWN, in_words, shown, si, unit_of
+from digiclay.settings.shown_units import SHOWN, in_words, shown, si, unit_of
 from hypothesis import given
 from hypothesis import strategies as some
 

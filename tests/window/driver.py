@@ -117,12 +117,12 @@ def add_bed() -> Iterator[float | None]:
 
 def beds() -> list[Any]:
     """Return the beds of the scene shown."""
-    return [thing for thing in window().scene.objects if part("view").is_bed(thing)]
+    return [thing for thing in window().scene.objects if part("device.view").is_bed(thing)]
 
 
 def fingertip(number: int = 0) -> Any:
     """Return the fingertip of a bed."""
-    return part("view").fingertip_of(beds()[number])
+    return part("device.view").fingertip_of(beds()[number])
 
 
 def select(thing: Any) -> None:
@@ -162,7 +162,7 @@ def grab(
 
 def settle(ticks: int = 3) -> Iterator[float | None]:
     """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
-    running = part("running")
+    running = part("live.running")
     start = max((session.moment for session in running.all()), default=0)
     for _ in range(100):
         yield 0.1
@@ -174,7 +174,7 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
 
 def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
-    bridge, running = part("bridge"), part("running")
+    bridge, running = part("bridge"), part("live.running")
     found: dict[str, Any] = {"beds": len(beds()), "sessions": len(running.all()), "said": running.said()}
     for bed in beds()[:1]:
         session = running.of(bed)
@@ -183,7 +183,7 @@ def look(name: str) -> None:
             cells = bridge.read_cells(bed.data)
             found["heights"] = [float(cells["height"].min()), float(cells["height"].max())]
             found["modes"] = np.bincount(cells["mode"], minlength=8).tolist()
-        tip = part("view").fingertip_of(bed)
+        tip = part("device.view").fingertip_of(bed)
         if tip is not None and not (session and session.waits):
             found["pose"] = bridge.pose(tip).tolist()
         if session is not None:

@@ -63,14 +63,14 @@ def browser(blender: Any) -> Iterator[float | None]:
 
 def form(blender: Any, bed: Any) -> None:
     """Show a ridge and a pit on the pins of a bed."""
-    instant = blender.part("instant").Instant
+    instant = blender.part("device.instant").Instant
     cells = blender.part("bridge").read_cells(bed.data)
     x, y = cells["position"].T * 1e3
     along = np.clip(np.abs(x) - 15.0, 0.0, None)
     raised = 14.0 * np.exp(-(along**2 + (y - 12.0) ** 2) / 60.0) - 9.0 * np.exp(
         -(x**2 + (y + 18) ** 2) / 80.0
     )
-    blender.part("view").show(
+    blender.part("device.view").show(
         bed,
         instant(
             position=cells["position"], height=0.04 + 1e-3 * raised,

@@ -59,7 +59,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield None
     yield from blender.settle()
     blender.look("in another scene")
-    blender.SEEN["in another scene"]["waits"] = blender.part("running").all()[0].waits
+    blender.SEEN["in another scene"]["waits"] = blender.part("live.running").all()[0].waits
     blender.window().scene = scene
     yield from blender.settle()
     blender.look("scene back")

@@ -61,9 +61,9 @@ def note(blender: Any, name: str) -> None:
     blender.SEEN[name] |= {
         "bed": heights(blender).round(4).tolist(),
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
-        "overlay": blender.part("overlay").shown(),
+        "overlay": blender.part("overlay.overlay").shown(),
         "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
-        "picked": list(blender.part("display").picked(blender.beds()[0])),
+        "picked": list(blender.part("device.display").picked(blender.beds()[0])),
     }
 
 

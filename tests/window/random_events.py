@@ -101,7 +101,7 @@ class Events:
 
     def revive(self) -> None:
         """Have a session run again: what happens to none tells nothing about it."""
-        if self.blender.part("running").all():
+        if self.blender.part("live.running").all():
             return
         if bpy.context.mode != "OBJECT":
             self.operator(bpy.ops.object.mode_set, mode="OBJECT")
@@ -165,16 +165,16 @@ class Events:
 
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
-    running, keeping = blender.part("running"), blender.part("core.keeping")
+    running, keeping = blender.part("live.running"), blender.part("core.keeping")
     for session in running.all():
         state = keeping.unpacked(session.system, session.kept)
         height = state.row(0)
         assert np.isfinite(height).all()
         assert height.min() >= 0.0
         assert height.max() <= session.system.cell.actuator.stroke
-        bed = blender.part("waiting").found(session.uid, session.name)
+        bed = blender.part("live.waiting").found(session.uid, session.name)
         if bed is not None and not session.stale:
-            assert blender.part("bed_state").kept(bed) == session.kept
+            assert blender.part("live.bed_state").kept(bed) == session.kept
     for bed in blender.beds():
         if not bed.data.is_editmode:
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
@@ -201,7 +201,7 @@ def script(blender: Any) -> Iterator[float | None]:
         getattr(events, name)()
         yield 0.1
         check(blender)
-        live += bool(blender.part("running").all())
+        live += bool(blender.part("live.running").all())
     blender.SEEN["live"] = live
     blender.shot("session_random")
 

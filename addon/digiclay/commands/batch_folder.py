@@ -18,8 +18,8 @@ from ..core.errors import OutputError
 from ..core.export import write_whole
 from ..core.jobs import JOB, SCENE, Batch, Job
 from ..core.scene_table import text
-from ..gallery import Card, page
 from .counted import duration
+from .gallery import Card, page
 from .job import RUNS, TIMING
 from .thumbnail import NAMES
 

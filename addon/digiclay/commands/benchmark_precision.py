@@ -83,7 +83,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     print(text)
     kept(arguments.out, "precision", text, [one.name for one in fields(Work)], [astuple(one) for one in work])
     if arguments.out:
-        from ..plots_benchmarks import precision
+        from ..plots.benchmarks import precision
 
         precision(work, arguments.out / "precision.png")
     return 0

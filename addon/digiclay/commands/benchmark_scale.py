@@ -143,7 +143,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Size)]
     kept(arguments.out, "scale", text, head, [[getattr(one, name) for name in head] for one in sizes])
     if arguments.out:
-        from ..plots_benchmarks import scale
+        from ..plots.benchmarks import scale
 
         scale(sizes, arguments.out / "scale.png")
     return 0

@@ -108,7 +108,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Size)]
     kept(arguments.out, "stack", text, head, [[getattr(one, name) for name in head] for one in sizes])
     if arguments.out:
-        from ..plots_benchmarks import stack
+        from ..plots.benchmarks import stack
 
         stack(sizes, arguments.out / "stack.png")
     return 0

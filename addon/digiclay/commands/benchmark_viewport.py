@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .benchmark_report import add_kind, kept, made_with, progress, table
 
 if TYPE_CHECKING:  # Blender is imported when it is needed
-    from ..viewport_cost import Cost
+    from ..live.viewport_cost import Cost
 
 __all__ = ["BEDS", "add"]
 
@@ -31,7 +31,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Measure every bed, and print the table."""
     importlib.import_module("..compat", __package__)  # says what to install, before any work is done
     from ..compat import bpy
-    from ..viewport_cost import PARTS, measured
+    from ..live.viewport_cost import PARTS, measured
 
     ticks = 40 if arguments.quick else 200
     costs = []

@@ -84,7 +84,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     may_be_written(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
     from ..paper.figures_compare import comparison
-    from ..plots import _save
+    from ..plots.plots import _save
 
     scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
     found: dict[str, Metrics] = {}

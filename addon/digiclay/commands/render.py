@@ -148,8 +148,8 @@ def draw_still(
     scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still, out: Path, row: int | None = None
 ) -> Path:
     """Draw an instant, or one row of a history; Blender is imported only now."""
-    from ..instant import Instant
-    from ..render import still
+    from ..device.instant import Instant
+    from ..pictures.render import still
 
     instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
     names = ("width", "height", "engine", "samples", "colour", "arrows")
@@ -166,8 +166,8 @@ def draw_turntable(
     row: int | None = None,
 ) -> Path | None:
     """Draw an instant, or one row of a history, turning once; None when it was stopped."""
-    from ..film import turntable
-    from ..instant import Instant
+    from ..device.instant import Instant
+    from ..pictures.film import turntable
 
     instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
     return turntable(instant, out, looks, progress=progress, stopped=stopped)
@@ -182,7 +182,7 @@ def draw_film(
     stopped: Callable[[], bool] | None = None,
 ) -> Path | None:
     """Draw a session; None when it was stopped."""
-    from ..film import film
+    from ..pictures.film import film
 
     told = {"progress": progress, "stopped": stopped}
     return film(history, out, looks, set_point=scene.set_point, **told, **sizes(scene))

@@ -148,7 +148,7 @@ def _extras(arguments: argparse.Namespace, result: Result, folder: Path) -> Iter
     if arguments.export:
         yield lambda: exported(scene, history, -1, arguments.export, folder)
     if arguments.plots:
-        from .. import plots
+        from ..plots import plots
 
         yield lambda: plots.session(history, folder / "session.png", scene.set_point or 0.0)
         yield lambda: plots.surface(history, folder / "surface.png")

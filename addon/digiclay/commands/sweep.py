@@ -149,7 +149,7 @@ def _pictures(
     """Draw the figures over one or two axes; return what there is to be said of it."""
     if len(axes) > 2:
         return [f"{len(axes)} axes: a table only, no pictures"]
-    from .. import plots_sweep
+    from ..plots import plots_sweep
 
     known = columns(every, axes)
     try:

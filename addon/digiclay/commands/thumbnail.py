@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..core.errors import OutputError
 from ..core.export import write_whole
 from ..core.png import png
-from ..heat import COLOURS
+from ..device.heat import COLOURS
 
 __all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]
 

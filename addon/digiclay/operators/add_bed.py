@@ -3,7 +3,7 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import own_presets, palettes, preferences, properties, view
+from .. import preferences
 from ..compat import bpy
 from ..core.actuator import Actuator
 from ..core.errors import DigiclayError
@@ -12,11 +12,13 @@ from ..core.layout import Layout
 from ..core.methods import METHODS
 from ..core.scene import Scene
 from ..core.scene_table import PRESETS
-from ..devices import device
-from ..instant import Instant
-from ..property_groups import title
-from ..settings_group import PRESET_WORDS, method_items
-from ..shown_units import SHOWN, si
+from ..device import palettes, view
+from ..device.instant import Instant
+from ..settings import own_presets, properties
+from ..settings.devices import device
+from ..settings.group import PRESET_WORDS, method_items
+from ..settings.property_groups import title
+from ..settings.shown_units import SHOWN, si
 
 __all__ = ["AddBed", "add", "add_shown", "entry", "select_only", "stand_at_cursor"]
 

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import bake, properties, running, takes
 from ..compat import bpy
 from ..core.assembly import assemble
 from ..core.fingertip import Fingertip
 from ..core.keeping import packed
 from ..core.simulation import begin
 from ..core.take import Take
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..live import running
+from ..recorded import bake, takes
+from ..settings import properties
 from .long_work import LongWork
 
 __all__ = ["Bake", "FreeBake"]

@@ -4,12 +4,12 @@
 from pathlib import Path
 from typing import Any
 
-from .. import formed_bed
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.export import FORMATS, UNITS, suffix, write
 from ..core.export_model import bodies
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..exchange import formed_bed
 from .surface_options import SurfaceOptions, chosen, needs_surface, sentence
 
 __all__ = ["ExportMenu", "ExportMesh", "entry"]

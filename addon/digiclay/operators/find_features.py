@@ -3,11 +3,11 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import formed_bed
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.export_model import features
 from ..core.features import summary
+from ..exchange import formed_bed
 from ..panels.export import LISTED
 from .surface_options import FindingOptions, chosen, needs_surface
 

@@ -7,7 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.scene_file import load
-from ..instant import read
+from ..device.instant import read
 from .add_bed import add_shown, select_only, stand_at_cursor
 
 __all__ = ["ImportRun", "entry"]

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import body_mesh, bridge, formed_bed
+from .. import bridge
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.export_model import bodies
+from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
 from .surface_options import SurfaceOptions, chosen, needs_surface
 

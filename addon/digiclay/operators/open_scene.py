@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .. import bridge, sample_take, shape_show, takes, view
+from .. import bridge
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
@@ -14,7 +14,10 @@ from ..core.scene_file import find, load, sample_names
 from ..core.scene_table import resolve
 from ..core.shape import Shape
 from ..core.shape_file import sample_shapes
-from ..property_groups import title
+from ..device import view
+from ..exchange import shape_show
+from ..recorded import sample_take, takes
+from ..settings.property_groups import title
 from .add_bed import add, select_only, stand_at_cursor
 
 __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]

@@ -3,10 +3,11 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import aim, display
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..panels.base import bed_of
+from ..device import display
+from ..device.view import bed_of
+from ..press import aim
 
 __all__ = ["ClearPins", "PickPins"]
 

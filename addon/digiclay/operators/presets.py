@@ -4,14 +4,14 @@
 from dataclasses import replace
 from typing import Any
 
-from .. import own_presets, properties
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.scene_file import load
 from ..core.scene_table import PRESETS
-from ..devices import laid_out
-from ..panels.base import bed_of
-from ..settings_group import PRESET_WORDS
+from ..device.view import bed_of
+from ..settings import own_presets, properties
+from ..settings.devices import laid_out
+from ..settings.group import PRESET_WORDS
 
 __all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
 

@@ -5,10 +5,13 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from .. import aim, bridge, preferences, running, view
+from .. import bridge, preferences
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..gesture import DEEPEST, DONE, advanced, begun, deeper, dragged, lifted
+from ..device import view
+from ..live import running
+from ..press import aim
+from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged, lifted
 
 __all__ = ["Press"]
 

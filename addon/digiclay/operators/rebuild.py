@@ -3,11 +3,12 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import rebuild, running
-from ..bake import is_baked
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..panels.base import bed_of
+from ..device import rebuild
+from ..device.view import bed_of
+from ..live import running
+from ..recorded.bake import is_baked
 
 __all__ = ["Rebuild"]
 

@@ -4,11 +4,12 @@
 import time
 from typing import Any
 
-from .. import handlers, loop, overlay, running, tick
-from ..bake import is_baked
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..live import handlers, loop, running, tick
+from ..overlay import overlay
+from ..recorded.bake import is_baked
 
 __all__ = ["Session", "end_all"]
 

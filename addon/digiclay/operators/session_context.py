@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import running, waiting
-from ..panels.base import bed_of
-from ..running import Running
+from ..device.view import bed_of
+from ..live import running, waiting
+from ..live.running import Running
 
 __all__ = ["decline_while_waiting", "decline_without", "session_of"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from .. import loop, running
 from ..compat import bpy
+from ..live import loop, running
 from .session_context import decline_without, session_of
 
 __all__ = ["PauseSession"]

@@ -3,14 +3,17 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import bed_state, bridge, properties, sculpting, tick, view
+from .. import bridge
 from ..compat import bpy
 from ..core.assembly import assemble
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.simulation import begin
-from ..instant import CLEARANCE
-from ..panels.base import bed_of
+from ..device import view
+from ..device.instant import CLEARANCE
+from ..device.view import bed_of
+from ..live import bed_state, sculpting, tick
+from ..settings import properties
 from .session_context import decline_while_waiting, session_of
 
 __all__ = ["ResetSession"]

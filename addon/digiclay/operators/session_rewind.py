@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import sculpting, tick
 from ..compat import bpy
+from ..live import sculpting, tick
 from .session_context import decline_while_waiting, session_of
 
 __all__ = ["RewindSession"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import loop, running, sculpting
 from ..compat import bpy
+from ..live import loop, running, sculpting
 from .session_context import decline_without, session_of
 
 __all__ = ["StepSession"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import handlers, overlay, running, tick
 from ..compat import bpy
+from ..live import handlers, running, tick
+from ..overlay import overlay
 from .session_context import decline_without, session_of
 
 __all__ = ["StopSession"]

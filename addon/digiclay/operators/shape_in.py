@@ -4,15 +4,16 @@
 from pathlib import Path
 from typing import Any
 
-from .. import running, shape_show
-from ..bake import is_baked
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.shape import LENGTHS, UPWARDS, Shape
 from ..core.shape_file import KINDS, sample_shapes
-from ..panels.base import bed_of
-from ..property_groups import title
-from ..shown_units import SHOWN, si
+from ..device.view import bed_of
+from ..exchange import shape_show
+from ..live import running
+from ..recorded.bake import is_baked
+from ..settings.property_groups import title
+from ..settings.shown_units import SHOWN, si
 
 __all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
 

@@ -4,12 +4,14 @@
 from dataclasses import replace
 from typing import Any
 
-from .. import bridge, properties, running
+from .. import bridge
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.shape import Shape
 from ..core.shape_text import packed
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..live import running
+from ..settings import properties
 
 __all__ = ["KeepShape", "RemoveShape"]
 

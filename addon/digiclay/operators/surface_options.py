@@ -3,14 +3,14 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import formed_bed
 from ..compat import bpy
 from ..core.errors import OutputError
 from ..core.export_model import KINDS, Model
 from ..core.features import Finding
 from ..core.quantity import quantities
 from ..core.skins import SKINS
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..exchange import formed_bed
 
 __all__ = ["FindingOptions", "SurfaceOptions", "needs_surface"]
 

@@ -4,13 +4,13 @@
 from pathlib import Path
 from typing import Any
 
-from .. import takes
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..core.export import write_whole
 from ..core.scene_table import text
 from ..core.take import as_scene
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..recorded import takes
 
 __all__ = ["ExportTake", "RemoveTake", "needs_take"]
 

@@ -3,9 +3,10 @@
 # No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
-from .. import running, sculpting, takes
 from ..compat import bpy
-from ..panels.base import bed_of
+from ..device.view import bed_of
+from ..live import running, sculpting
+from ..recorded import takes
 
 __all__ = ["KeepTake", "RecordTake"]
 

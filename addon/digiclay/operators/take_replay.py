@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import bed_state, bridge, preferences, properties, sculpting, takes, view
+from .. import bridge, preferences
 from ..compat import bpy
 from ..core.assembly import assemble
 from ..core.errors import DigiclayError
@@ -14,8 +14,12 @@ from ..core.fingertip import Fingertip
 from ..core.keeping import packed, unpacked
 from ..core.live import Clock, due, lived
 from ..core.take import MOST_PARTS, Take, finer
-from ..panels.base import bed_of
-from ..running import Running
+from ..device import view
+from ..device.view import bed_of
+from ..live import bed_state, sculpting
+from ..live.running import Running
+from ..recorded import takes
+from ..settings import properties
 from .bake import needs_idle_bed
 from .take_export import needs_take
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import view
+from ..device.view import bed_of
 
 __all__ = ["CATEGORY", "Panel", "bed_of"]
 
@@ -26,11 +26,3 @@ class Panel:
     def poll(cls, context: Any) -> bool:
         """Show the panel when there is a bed it can be about."""
         return bed_of(context) is not None
-
-
-def bed_of(context: Any) -> Any | None:
-    """Return the bed the active object is or belongs to, be it fingertip, housing or a part of those."""
-    thing = getattr(context, "object", None)
-    while thing is not None and not view.is_bed(thing):
-        thing = thing.parent
-    return thing

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import own_presets, properties
 from ..compat import bpy
 from ..core.scene_table import PRESETS
-from ..property_groups import title
+from ..settings import own_presets, properties
+from ..settings.property_groups import title
 from .base import Panel, bed_of
 from .section import section_panel
 

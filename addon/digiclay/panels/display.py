@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import display, view
 from ..compat import bpy
+from ..device import display, view
 from .base import Panel, bed_of
 
 __all__ = ["CLASSES", "Display"]

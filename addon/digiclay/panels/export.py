@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import formed_bed
 from ..compat import bpy
+from ..exchange import formed_bed
 from .base import Panel, bed_of
 
 __all__ = ["CLASSES", "Export"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from .. import bed_state, running
 from ..compat import bpy
-from ..running import Running
+from ..live import bed_state, running
+from ..live.running import Running
 from .base import Panel, bed_of
 
 __all__ = ["CLASSES", "Session"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import bake, running, takes
 from ..compat import bpy
+from ..live import running
+from ..recorded import bake, takes
 from .base import Panel, bed_of
 
 __all__ = ["CLASSES", "TakesPanel"]

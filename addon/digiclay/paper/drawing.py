@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ..plots import INK, LINES, MM, SHADE, _draw_map, _draw_path, _draw_relief, _figure, _save
+from ..plots.plots import INK, LINES, MM, SHADE, _draw_map, _draw_path, _draw_relief, _figure, _save
 
 __all__ = [
     "INK", "LINES", "METHOD_COLOURS", "MM", "SHADE", "above", "canvas", "draw_map", "draw_path",

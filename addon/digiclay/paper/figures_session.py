@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.metrics import in_contact
-from ..plots import LETTERS, session_cells
+from ..plots.plots import LETTERS, session_cells
 from .drawing import INK, LINES, MM, SHADE, above, canvas, draw_map, draw_path, draw_relief
 from .scenes import METHODS, NAMES
 from .trials import Session

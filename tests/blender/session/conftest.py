@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 import digiclay
 import pytest
-from digiclay import handlers
 from digiclay.core import live
+from digiclay.live import handlers
 
 from tests.blender.session.live import (
     Clock,

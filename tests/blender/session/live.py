@@ -7,10 +7,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from digiclay import bed_state, bridge, handlers, properties, running, tick, view
+from digiclay import bridge
 from digiclay.core.assembly import assemble
 from digiclay.core.keeping import unpacked
 from digiclay.core.simulation import begin
+from digiclay.device import view
+from digiclay.live import bed_state, handlers, running, tick
+from digiclay.settings import properties
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23

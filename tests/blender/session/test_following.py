@@ -7,8 +7,9 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bed_state, running, sculpting, tick, view
 from digiclay.core.keeping import packed
+from digiclay.device import view
+from digiclay.live import bed_state, running, sculpting, tick
 
 from tests.blender.session.live import (
     FLOAT32,

@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bed_state, handlers, running, sculpting, tick
 from digiclay.core.keeping import packed
+from digiclay.live import bed_state, handlers, running, sculpting, tick
 
 from tests.blender.session.live import (
     FLOAT32,

@@ -7,8 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, running, tick, view
+from digiclay import bridge
 from digiclay.core.errors import DigiclayError
+from digiclay.device import view
+from digiclay.live import running, tick
 
 from tests.blender.session.live import (
     FLOAT32,

@@ -6,7 +6,8 @@ from typing import Any
 
 import bpy
 import digiclay
-from digiclay import bed_state, handlers, running, tick, view
+from digiclay.device import view
+from digiclay.live import bed_state, handlers, running, tick
 
 from tests.blender.session.live import (
     Clock,

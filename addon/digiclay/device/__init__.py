@@ -1,0 +1,1 @@
+"""The device as Blender shows it: bed, pins, fingertip, colours and arrows."""

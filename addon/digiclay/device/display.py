@@ -1,0 +1,193 @@
+"""What is shown of a bed, as properties of the bed: colours, arrows, overlay, picked pins.
+
+Colours and arrows are settings of the bed's geometry nodes; these properties read and write
+them there, so that there is one place they stand in.
+"""
+
+# No postponed annotations here: Blender reads a group's properties from them.
+from collections.abc import Iterable
+from typing import Any
+
+from ..compat import bpy
+from ..core.assembly import assemble
+from ..core.errors import DigiclayError
+from ..core.keeping import unpacked
+from ..core.trace import PICKED, SPAN
+from ..live import bed_state, running
+from ..overlay import overlay
+from ..settings import properties
+from . import heat, view
+from .node_arrows import LENGTH
+
+__all__ = ["Display", "pick", "picked", "register", "unregister"]
+
+COLOURINGS = (
+    ("mode", "Mode", "Colour the pins by what they do"),
+    ("force", "Force", "Colour the pins by the force on them"),
+)
+#: Marks a place no pin is picked for.
+NONE = -1
+
+
+def picked(bed: Any) -> tuple[int, ...]:
+    """Return the pins whose heights the overlay shows, in the order they were picked."""
+    display = getattr(bed, "digiclay_display", None)
+    return () if display is None else tuple(pin for pin in display.picked if pin != NONE)
+
+
+def pick(bed: Any, pins: Iterable[int]) -> None:
+    """Choose the pins whose heights the overlay shows.
+
+    Raises
+    ------
+    DigiclayError
+        On more than 6 pins, one twice, or one the bed does not have.
+    """
+    chosen, count = tuple(pins), len(bed.data.vertices)
+    if len(chosen) > PICKED or len(set(chosen)) != len(chosen):
+        raise DigiclayError(f"Display.picked must be at most {PICKED} different pins (got {list(chosen)}).")
+    unknown = [pin for pin in chosen if not 0 <= pin < count]
+    if unknown:
+        raise DigiclayError(f"Display.picked must be pins 0 to {count - 1} of {bed.name} (got {unknown[0]}).")
+    bed.digiclay_display.picked = (*chosen, *[NONE] * (PICKED - len(chosen)))
+    overlay.redraw()
+
+
+def _rewrite(bed: Any) -> None:
+    """Write the forces, which nothing wanted until now; those kept last where no session runs."""
+    session = running.of(bed)
+    if session is not None:
+        view.show_state(bed, session.system, session.state)
+        return
+    kept = bed_state.kept(bed)
+    if kept is not None:
+        try:
+            system = assemble(properties.scene_of(bed))
+            view.show_state(bed, system, unpacked(system, kept))
+        except DigiclayError:
+            # The settings have changed since the state was kept: what was last drawn stays.
+            return
+
+
+def _colour(display: Any) -> int:
+    bed = display.id_data
+    return 1 if view.is_drawn(bed) and view.coloured_by(bed) == "force" else 0
+
+
+def _set_colour(display: Any, code: int) -> None:
+    bed = display.id_data
+    if view.is_drawn(bed):
+        view.colour_by(bed, COLOURINGS[code][0])
+        _rewrite(bed)
+
+
+def _arrows(display: Any) -> bool:
+    bed = display.id_data
+    return view.is_drawn(bed) and view.arrows_shown(bed)
+
+
+def _set_arrows(display: Any, on: bool) -> None:
+    bed = display.id_data
+    if view.is_drawn(bed):
+        view.show_arrows(bed, on)
+        _rewrite(bed)
+
+
+def _top(display: Any) -> float:
+    bed = display.id_data
+    return view.top_colour(bed) if view.is_drawn(bed) else heat.TOP
+
+
+def _set_top(display: Any, top: float) -> None:
+    if view.is_drawn(display.id_data):
+        view.scale_colours(display.id_data, top)
+
+
+def _length(display: Any) -> float:
+    bed = display.id_data
+    return 1e3 * view.arrow_length(bed) if view.is_drawn(bed) else LENGTH
+
+
+def _set_length(display: Any, length: float) -> None:
+    if view.is_drawn(display.id_data):
+        view.scale_arrows(display.id_data, 1e-3 * length)
+
+
+def _take_overlay(display: Any, context: Any) -> None:
+    overlay.follow()
+
+
+class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
+    """What is shown of a bed."""
+
+    colour: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Colour",
+        description="What the colour of a pin tells",
+        items=COLOURINGS,
+        get=_colour,
+        set=_set_colour,
+    )
+    top_force: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Top Colour at (N)",
+        description="From this force on a pin has the last colour, in N",
+        min=1e-3,
+        max=1e3,
+        soft_max=2.0,
+        precision=3,
+        step=1,
+        get=_top,
+        set=_set_top,
+    )
+    arrows: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Force Arrows",
+        description="Draw the force on each pin as an arrow, and the fingertip clear; renders show it too",
+        get=_arrows,
+        set=_set_arrows,
+    )
+    arrow_length: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Arrow Length (mm/N)",
+        description="Length of the arrow of 1 N, in mm of the device",
+        min=0.1,
+        max=1e5,
+        soft_min=10.0,
+        soft_max=1000.0,
+        precision=1,
+        step=1000,
+        get=_length,
+        set=_set_length,
+    )
+    overlay: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Overlay",
+        description="While a session runs, show force, heights of picked pins, modes, speed and solver error",
+        default=True,
+        update=_take_overlay,
+    )
+    seconds: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Past (s)",
+        description="How much of the past the overlay's curves show, in s",
+        default=5.0,
+        min=0.5,
+        max=SPAN,
+        precision=1,
+        step=50,
+    )
+    picked: bpy.props.IntVectorProperty(  # type: ignore[valid-type]
+        name="Picked Pins",
+        description="Pins whose heights the overlay shows; -1 for none",
+        size=PICKED,
+        default=[NONE] * PICKED,
+        min=NONE,
+    )
+
+
+def register() -> None:
+    """Register the properties and hang them onto objects."""
+    bpy.utils.register_class(Display)
+    bpy.types.Object.digiclay_display = bpy.props.PointerProperty(type=Display, name="Digital Clay Display")
+
+
+def unregister() -> None:
+    """Undo `register`; the overlay's draw handler goes as well."""
+    overlay.stop()
+    del bpy.types.Object.digiclay_display
+    bpy.utils.unregister_class(Display)

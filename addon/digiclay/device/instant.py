@@ -1,0 +1,153 @@
+"""One recorded instant of a bed: what the view shows and the renderer draws. No Blender in here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..commands import finished
+from ..core.actuator import Actuator
+from ..core.errors import OutputError
+from ..core.fingertip import LEVEL, Fingertip
+from ..core.layout import Layout, grid
+from ..core.modes import Mode
+
+__all__ = ["Instant", "read"]
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+#: What an instant needs of a history.
+ARRAYS = ("position", "height", "mode", "force", "fingertip")
+#: How far above the bed a fingertip that has not touched yet is put, m.
+CLEARANCE = 6e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """The bed and the fingertip at one time, with the sizes needed to draw them.
+
+    Attributes
+    ----------
+    position : ndarray (n, 2)
+        Axes of the pins, m, the bed's centre at the origin.
+    height : ndarray (n,)
+        Pin tops above the bed's floor, m.
+    mode : ndarray of int (n,)
+        Codes of `core.modes.Mode`.
+    force : ndarray (n,)
+        Force on each pin, N, pressing down is positive.
+    fingertip : ndarray (7,)
+        Lowest point of the fingertip, m, and its orientation as a quaternion w, x, y, z.
+    pitch : float
+        Distance between neighbouring pins, m.
+    actuator : Actuator
+        Gives the pins' thickness (bore), stroke and rest height.
+    finger : Fingertip
+        Gives the fingertip's semi-axes.
+    """
+
+    position: Floats
+    height: Floats
+    mode: Codes
+    force: Floats
+    fingertip: Floats
+    pitch: float = Layout().pitch
+    actuator: Actuator = field(default_factory=Actuator)
+    finger: Fingertip = field(default_factory=Fingertip)
+
+    def __post_init__(self) -> None:
+        count = len(self.position)
+        shapes = {"position": (count, 2), "fingertip": (7,)}
+        for name in ARRAYS:
+            shape = shapes.get(name, (count,))
+            kind = np.int8 if name == "mode" else np.float64
+            array = np.array(getattr(self, name), kind)
+            if array.shape != shape or not count:
+                raise OutputError(f"{name} must be an array of the shape {shape} (got {array.shape}).")
+            if not np.isfinite(array).all():
+                raise OutputError(f"{name} must be finite numbers only.")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        unknown = self.mode[(self.mode < 0) | (self.mode >= len(Mode))]
+        if unknown.size:
+            raise OutputError(f"mode must be a code from 0 to {len(Mode) - 1} (got {unknown[0]}).")
+
+    @classmethod
+    def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:
+        """Take one row of a history.
+
+        Parameters
+        ----------
+        history : mapping of arrays
+            As in ``history.npz``.
+        index : int, optional
+            The row; negative rows count from the last one.
+        **sizes
+            `pitch`, `actuator` and `finger`, where they are not the defaults.
+        """
+        missing = [name for name in ARRAYS if name not in history]
+        if missing:
+            raise OutputError(f"The history has no {missing[0]}: it must be a history.npz of `digiclay run`.")
+        rows = len(history["height"])
+        if not -rows <= index < rows:
+            raise OutputError(f"The history has {rows} rows, 0 to {rows - 1} (got {index}).")
+        taken = {name: np.asarray(history[name])[index] for name in ARRAYS if name != "position"}
+        return cls(position=np.asarray(history["position"]), **taken, **sizes)
+
+    @classmethod
+    def at_rest(
+        cls, layout: Layout, actuator: Actuator | None = None, finger: Fingertip | None = None
+    ) -> Instant:
+        """Return a bed nobody has touched yet, the fingertip above its centre."""
+        actuator, finger = actuator or Actuator(), finger or Fingertip()
+        bed = grid(layout)
+        rest = actuator.rest_height
+        return cls(
+            position=bed.positions,
+            height=np.full(bed.count, rest),
+            mode=np.full(bed.count, Mode.REST, np.int8),
+            force=np.zeros(bed.count),
+            fingertip=np.array([0.0, 0.0, rest + CLEARANCE, *LEVEL]),
+            pitch=layout.pitch,
+            actuator=actuator,
+            finger=finger,
+        )
+
+    @property
+    def modes(self) -> list[Mode]:
+        """The modes present, in the order of their codes."""
+        return [Mode(int(code)) for code in np.unique(self.mode)]
+
+
+def read(path: Path, index: int = -1) -> Instant:
+    """Read an instant of a finished run.
+
+    Parameters
+    ----------
+    path : Path
+        The ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it.
+    index : int, optional
+        The row; negative rows count from the last one.
+
+    Raises
+    ------
+    OutputError
+        When there is no readable run.
+    """
+    if path.name != "history.npz":
+        raise OutputError(f"{path} is not the history.npz of a run's folder.")
+    run = finished.read(path.parent, *ARRAYS)
+    scene = run.scene
+    return Instant.of(
+        run.history,
+        index,
+        pitch=scene.layout.pitch,
+        actuator=scene.actuator,
+        finger=scene.fingertip or Fingertip(),
+    )

@@ -1,0 +1,60 @@
+"""Colours of the control modes, told apart by people with any colour vision: three sets to choose from."""
+
+from __future__ import annotations
+
+from ..bridge import linear
+from ..compat import bpy, shader_nodes
+from ..core.modes import COLOURS, Mode
+from .parts import ROLE
+
+__all__ = ["DEFAULT", "PALETTES", "WORDS", "wear", "worn"]
+
+Colour = tuple[float, float, float]
+
+
+def _hex(code: str) -> Colour:
+    """Return the sRGB of a colour code."""
+    red, green, blue = (int(code[at : at + 2], 16) / 255 for at in (0, 2, 4))
+    return red, green, blue
+
+
+def _palette(*codes: str) -> dict[Mode, Colour]:
+    """Return colour codes in the order of the modes."""
+    return {mode: _hex(code) for mode, code in zip(Mode, codes, strict=True)}
+
+
+DEFAULT = "okabe_ito"
+#: sRGB of each mode.
+PALETTES: dict[str, dict[Mode, Colour]] = {
+    "okabe_ito": COLOURS,
+    "tol_muted": _palette("dddddd", "332288", "ddcc77", "88ccee", "cc6677", "882255", "aa4499", "117733"),
+    "brightness": _palette("ffffff", "252525", "d7d7d7", "aeaeae", "888888", "000000", "656565", "454545"),
+}
+WORDS = {
+    "okabe_ito": ("Okabe and Ito", "Eight clear colours, told apart with any kind of colour vision"),
+    "tol_muted": ("Tol, muted", "Paul Tol's quieter set, told apart with any kind of colour vision"),
+    "brightness": ("Brightness", "Shades of grey, for vision or print without colours"),
+}
+
+
+def worn() -> bool:
+    """Tell whether the open file has materials of the modes already, which may be the user's own by now."""
+    return any(_material(mode) is not None for mode in Mode)
+
+
+def wear(name: str) -> None:
+    """Give the materials of the modes in the open file the colours of a palette."""
+    for mode, colour in PALETTES[name].items():
+        material = _material(mode)
+        if material is None:
+            continue
+        material.diffuse_color = linear(colour)
+        for node in shader_nodes(material).nodes:
+            if node.type == "BSDF_PRINCIPLED":
+                node.inputs["Base Color"].default_value = linear(colour)
+
+
+def _material(mode: Mode) -> bpy.types.Material | None:
+    """Return the material of a mode, when the file has one of its own."""
+    role = mode.name.lower()
+    return next((item for item in bpy.data.materials if item.get(ROLE) == role and not item.library), None)

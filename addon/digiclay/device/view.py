@@ -1,0 +1,219 @@
+"""The device in Blender: a bed of instanced pins, its housing and the fingertip.
+
+A bed is one mesh with a vertex a pin. Geometry nodes put a pin on every vertex and pick,
+by the integer attribute ``mode`` or by the force, the one that wears the right material:
+this shows in Solid view too, and redraws 10 000 pins in a millisecond.
+
+What is asked to be shown stands in the settings of the bed's modifier, an object's own:
+copies of a bed keep theirs, undo and files carry them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..bridge import SCALE
+from ..compat import node_setting, set_node_setting
+from ..core.errors import DigiclayError
+from ..core.state import State
+from ..core.system import System
+from . import parts
+from .instant import Instant
+from .node_arrows import ARROW_LENGTH, ARROWS
+from .node_heat import COLOUR_BY_FORCE, TOP_FORCE
+from .node_tree import bed_nodes
+from .parts import BED, ELLIPSOID, FINGERTIP, HOUSING, ROLE, material
+
+__all__ = [
+    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
+    "arrow_length", "arrows_shown", "bed_of", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed",
+    "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state",
+    "shows_force", "top_colour", "underside", "wants_force",
+]  # fmt: skip
+
+#: What the colour of a pin can tell.
+COLOURINGS = ("mode", "force")
+#: Name of the bed's modifier.
+MODIFIER = "Pins"
+
+
+def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
+    """Add a bed, its housing and its fingertip to a collection.
+
+    Parameters
+    ----------
+    instant : Instant
+        What to show at first.
+    collection : bpy.types.Collection
+        Where the objects go.
+    lowest : float, optional
+        Lowest pin top the housing must have room for, m; the instant's own when left out, so
+        that a still shows the formed surface and not the rods under it.
+
+    Returns
+    -------
+    bpy.types.Object
+        The bed; housing and fingertip are its children. Its origin is the centre of the
+        bed's floor.
+    """
+    lowest = float(instant.height.min()) if lowest is None else lowest
+    # The rim stays below most tops, so that the surface and little of the rods is seen over it.
+    rim = float(np.median(instant.height)) - 1.2 * instant.pitch
+    # The deck is so deep that no pin is stretched much more than another: it shows on their caps.
+    deck = min(lowest, rim) - 2.5 * instant.pitch
+    cells = bridge.points("Digital Clay", len(instant.height))
+    bed = parts.marked(cells, cells.name, BED, collection)
+    modifier = bed.modifiers.new(MODIFIER, "NODES")
+    length = float(np.median(instant.height)) - deck
+    modifier.node_group = bed_nodes(
+        *parts.pins(instant, length), parts.arrow(instant.pitch), deck * SCALE, length * SCALE, SCALE * 1e-3
+    )
+    case = parts.housing(instant, deck, rim)
+    parts.marked(case, case.name, HOUSING, collection, parent=bed).hide_select = True
+    parts.fingertip(collection, bed)
+    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    _place_fingertip(bed, instant)
+    return bed
+
+
+def show(bed: Any, instant: Instant) -> None:
+    """Show another instant of the same bed, its fingertip's pose included."""
+    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    _place_fingertip(bed, instant)
+
+
+def show_state(bed: Any, system: System, state: State) -> None:
+    """Show the pins of a running session; the fingertip is the user's and stays where it is.
+
+    Forces are gathered and written only while something drawn tells them.
+    """
+    shown = {"mode": state.mode()}
+    if wants_force(bed):
+        shown["force"] = state.row(system.rows.force)
+    bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
+
+
+def colour_by(bed: Any, what: str) -> None:
+    """Colour the pins by what they do ("mode") or by the force on them ("force").
+
+    Raises
+    ------
+    DigiclayError
+        On another word, or when the bed's modifier is gone.
+    """
+    if what not in COLOURINGS:
+        raise DigiclayError(f"view.colour_by must be one of {', '.join(COLOURINGS)} (got {what!r}).")
+    set_node_setting(_modifier(bed), COLOUR_BY_FORCE, what == "force")
+
+
+def coloured_by(bed: Any) -> str:
+    """Return what the colour of the pins tells: "mode" or "force"."""
+    return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
+
+
+def top_colour(bed: Any) -> float:
+    """Return the force from which on a pin has the last colour, N."""
+    return float(node_setting(_modifier(bed), TOP_FORCE))
+
+
+def shows_force(bed: Any) -> bool:
+    """Tell whether the colours of the pins tell the force on them."""
+    return is_drawn(bed) and coloured_by(bed) == "force"
+
+
+def scale_colours(bed: Any, top: float) -> None:
+    """Set the force from which on a pin has the last colour, N."""
+    set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
+
+
+def show_arrows(bed: Any, on: bool) -> None:
+    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
+    set_node_setting(_modifier(bed), ARROWS, bool(on))
+    tip = fingertip_of(bed)
+    ball = parts.ellipsoid(tip) if tip is not None else None
+    if ball is not None:
+        ball.material_slots[0].material = parts.skin(clear=bool(on))
+
+
+def arrows_shown(bed: Any) -> bool:
+    """Tell whether the bed's forces are drawn as arrows."""
+    return bool(node_setting(_modifier(bed), ARROWS))
+
+
+def arrow_length(bed: Any) -> float:
+    """Return the length of the arrow of 1 N, m of the device."""
+    return float(node_setting(_modifier(bed), ARROW_LENGTH)) * 1e-3
+
+
+def scale_arrows(bed: Any, length: float) -> None:
+    """Set the length of the arrow of 1 N, m of the device."""
+    set_node_setting(_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
+
+
+def wants_force(bed: Any) -> bool:
+    """Tell whether anything drawn needs the force on each pin."""
+    return shows_force(bed) or (is_drawn(bed) and arrows_shown(bed))
+
+
+def is_drawn(bed: Any) -> bool:
+    """Tell whether the bed still has the modifier that draws its pins."""
+    return _modifier_of(bed) is not None
+
+
+def is_bed(thing: Any) -> bool:
+    """Tell whether an object is a bed of this extension."""
+    return thing is not None and thing.get(ROLE) == BED
+
+
+def bed_of(context: Any) -> Any | None:
+    """Return the bed the active object is or belongs to, be it fingertip, housing or a part of those."""
+    thing = getattr(context, "object", None)
+    while thing is not None and not is_bed(thing):
+        thing = thing.parent
+    return thing
+
+
+def fingertip_of(bed: Any) -> Any | None:
+    """Return the fingertip that belongs to a bed, or None when the user has deleted it."""
+    return next((child for child in bed.children if child.get(ROLE) == FINGERTIP), None)
+
+
+def underside(bed: Any) -> float:
+    """Return the height of the housing's underside in the space of its bed, Blender units."""
+    case = next(child for child in bed.children if child.get(ROLE) == HOUSING)
+    return min(float(vertex.co.z) for vertex in case.data.vertices)
+
+
+def _place_fingertip(bed: Any, instant: Instant) -> None:
+    """Put the fingertip, where there is one, to its pose in an instant."""
+    tip = fingertip_of(bed)
+    if tip is not None:
+        bridge.place_fingertip(tip, instant.fingertip, instant.finger)
+
+
+def _modifier_of(bed: Any) -> Any | None:
+    """Return the modifier that draws the pins, or None when the user has removed or changed it."""
+    for modifier in bed.modifiers:
+        tree = modifier.node_group if modifier.type == "NODES" else None
+        if tree is not None and COLOUR_BY_FORCE in tree.interface.items_tree:
+            return modifier
+    return None
+
+
+def _modifier(bed: Any) -> Any:
+    """Return the modifier that draws the pins, or refuse a bed without."""
+    found = _modifier_of(bed)
+    if found is None:
+        rule = "must have the geometry nodes modifier that draws its pins (got none)"
+        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
+    return found
+
+
+def _positive(name: str, value: float, unit: str) -> float:
+    """Return a finite number above 0, or refuse it."""
+    if not (np.isfinite(value) and value > 0.0):
+        raise DigiclayError(f"Display.{name} must be above 0 {unit} (got {value:g} {unit}).")
+    return float(value)

@@ -1,0 +1,1 @@
+"""Shapes into the bed, and meshes out of it."""

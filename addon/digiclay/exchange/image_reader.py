@@ -1,0 +1,76 @@
+"""Pictures read by Blender itself, EXR and HDR among them: it has no Pillow."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compat import bpy
+from ..core.errors import ParameterError
+from ..core.heightmap_picture import READERS, refuse_too_many
+
+__all__ = ["pixels", "register", "unregister"]
+
+#: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled down by it.
+MOST = 4_000_000
+#: How bright red, green and blue are, as Pillow and the television standard BT.601 have it.
+BRIGHTNESS = np.array([0.299, 0.587, 0.114])
+
+
+def pixels(path: Path) -> NDArray[np.float64]:
+    """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
+
+    Raises
+    ------
+    ParameterError
+        When Blender cannot read it, or it is too large.
+    """
+    try:
+        image = bpy.data.images.load(str(path.resolve()), check_existing=False)
+    except RuntimeError:
+        raise _unreadable(path) from None
+    try:
+        # Numbers as they are in the file: no curve, no multiplying by the alpha.
+        image.colorspace_settings.is_data = True
+        image.alpha_mode = "CHANNEL_PACKED"
+        width, height = image.size
+        if not width or not height:
+            raise _unreadable(path)
+        refuse_too_many(path, width, height)
+        if width * height > MOST:
+            share = math.sqrt(MOST / (width * height))
+            image.scale(max(2, int(width * share)), max(2, int(height * share)))
+        return _brightness(image, path)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _brightness(image: Any, path: Path) -> NDArray[np.float64]:
+    """Return the brightness of an image's pixels."""
+    width, height = image.size
+    table = np.empty(width * height * image.channels, np.float32)
+    if len(image.pixels) != table.size:
+        raise _unreadable(path)
+    image.pixels.foreach_get(table)
+    table = table.reshape(height, width, image.channels)
+    bright: NDArray[np.float64] = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
+    return np.asarray(bright, np.float64)
+
+
+def _unreadable(path: Path) -> ParameterError:
+    """Return what is said of a file Blender cannot read."""
+    return ParameterError("shape", "file", "must be a picture Blender can read", str(path))
+
+
+def register() -> None:
+    """Let Blender read the pictures."""
+    READERS.append(pixels)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    READERS.remove(pixels)

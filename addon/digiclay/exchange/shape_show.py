@@ -1,0 +1,130 @@
+"""A shape onto a bed in Blender: from an object or a file, displayed by driving its pins there."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..core.assembly import assemble
+from ..core.errors import DigiclayError, ParameterError
+from ..core.fingertip import LEVEL, Fingertip
+from ..core.form import display_of, display_time, touch_height
+from ..core.keeping import packed as kept_bytes
+from ..core.layout import grid
+from ..core.relief import Relief
+from ..core.scene import Scene
+from ..core.shape import Shape
+from ..core.shape_file import Fitted, fitted, fitted_to
+from ..core.shape_mesh import ShapeMesh, shape_mesh
+from ..core.shape_text import packed
+from ..core.simulation import begin, periods
+from ..core.trajectory import level
+from ..device import view
+from ..device.instant import CLEARANCE
+from ..live import bed_state, sculpting
+from ..settings import properties
+
+__all__ = ["embedded", "relief_of", "show_file", "show_relief", "surfaced"]
+
+#: Kinds of objects that have a surface.
+SURFACED = ("MESH", "CURVE", "SURFACE", "FONT", "META")
+#: Simulated time after which a shape that does not stand is shown as far as it has come, s.
+LONGEST = 60.0
+#: The finger waits so far above the bed while the shape comes up, m.
+AWAY = 50.0
+
+
+def surfaced(thing: Any) -> bool:
+    """Tell whether an object has a surface that can be displayed."""
+    return thing is not None and thing.type in SURFACED and view.ROLE not in thing
+
+
+def relief_of(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
+    """Return the surface of an object, all modifiers included, in the space of a bed, m.
+
+    Parameters
+    ----------
+    thing : bpy.types.Object
+    bed : bpy.types.Object
+    depsgraph : bpy.types.Depsgraph
+
+    Raises
+    ------
+    DigiclayError
+        When it has no face, a vertex is not finite, or the bed is not uniformly scaled.
+    """
+    bridge.uniform(bed)
+    evaluated = thing.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    if mesh is None:
+        raise ParameterError("shape", "file", "must be an object with a surface", thing.name)
+    try:
+        mesh.calc_loop_triangles()
+        places = np.empty(3 * len(mesh.vertices), np.float32)
+        faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.vertices.foreach_get("co", places)
+        mesh.loop_triangles.foreach_get("vertices", faces)
+    finally:
+        evaluated.to_mesh_clear()
+    way = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
+    vertices = places.reshape(-1, 3) @ way[:3, :3].T + way[:3, 3]
+    return shape_mesh(thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3), "z", 1.0)
+
+
+def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
+    """Display a shape on a bed; return how it was fitted, and what the display is off by, m."""
+    scene = properties.scene_of(bed)
+    return _show(bed, scene, shape, fitted(shape, relief, grid(scene.layout), scene.actuator))
+
+
+def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
+    """Display the shape a file or sample holds on a bed; see `show_relief`."""
+    scene = properties.scene_of(bed)
+    return _show(bed, scene, shape, fitted_to(shape, grid(scene.layout), scene.actuator))
+
+
+def embedded(scene: Scene) -> Scene:
+    """Return a scene that has the heights of its shape in it, so that a .blend needs no other file."""
+    if scene.shape is None or scene.shape.heights:
+        return scene
+    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
+
+
+def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
+    """Drive the pins of a bed to a shape, and keep shape and state in the bed."""
+    scene = replace(scene, shape=replace(shape, heights=packed(laid.heights)))
+    system = assemble(scene)
+    display = display_of(system)
+    assert display is not None
+    finger = level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))
+    count = min(display_time(display), LONGEST) / system.period
+    (state,) = deque(periods(system, finger, begin(system), max(1, round(count))), maxlen=1)
+    off = float(np.abs(state.row(0) - display.heights).max())
+    pose = _lifted(bed, scene, state.row(0))
+    # All that can fail is done: from here on the bed changes.
+    properties.adopt(bed, scene)
+    began, said = sculpting.begun(
+        bed.session_uid, bed.name, scene, pose, kept_bytes(system, state), bed_state.moment(bed)
+    )
+    if said:
+        raise DigiclayError(f"{bed.name}: {said}")
+    bed_state.write(bed, began)
+    view.show_state(bed, system, began.state)
+    tip = view.fingertip_of(bed)
+    if tip is not None:
+        bridge.place_fingertip(tip, pose, scene.fingertip or Fingertip())
+    return laid, off
+
+
+def _lifted(bed: Any, scene: Scene, heights: Any) -> Any:
+    """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
+    tip, finger = view.fingertip_of(bed), scene.fingertip or Fingertip()
+    pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
+    touch = touch_height(grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
+    pose[2] = max(pose[2], touch + CLEARANCE)
+    return pose

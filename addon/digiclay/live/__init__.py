@@ -1,0 +1,1 @@
+"""Sessions that run: the loop, its ticks, and what the .blend keeps of them."""

@@ -1,0 +1,192 @@
+"""Which beds have a session running, and what such a session is at one moment. No Blender in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.live import Clock
+from ..core.scene import Scene
+from ..core.shadow import LiveErrors, Shadow
+from ..core.state import State
+from ..core.system import System
+from ..core.trace import Trace
+
+__all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put", "said", "say"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Gesture:
+    """Where a gesture began: period, kept state (`core.keeping`), and pose of the finger (7,)."""
+
+    period: int
+    kept: bytes
+    pose: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The finger's path since recording began.
+
+    Attributes
+    ----------
+    start : bytes
+        The state recording began with, kept by `core.keeping`.
+    first : int
+        Its period.
+    rows : ndarray (capacity, 8)
+        Pose at the end of each period and the moment it was simulated in; row 0: the start.
+    count : int
+        How many of the rows are in use. Those behind belong to nobody.
+    """
+
+    start: bytes
+    first: int
+    rows: Floats
+    count: int
+
+    @classmethod
+    def begun(cls, kept: bytes, period: int, pose: Floats, moment: int) -> Recording:
+        """Return a recording that has nothing but its start."""
+        rows = np.empty((256, 8))
+        rows[0] = *pose, moment
+        return cls(kept, period, rows, 1)
+
+    @property
+    def path(self) -> Floats:
+        """Poses, shape (t + 1, 7): `core.live.lived` simulates them again bit for bit."""
+        return self.rows[: self.count, :7]
+
+    def extended(self, path: Floats, moment: int) -> Recording:
+        """Return the recording with the poses of some more periods, shape (k, 7)."""
+        end = self.count + len(path)
+        rows = self.rows
+        if end > len(rows):
+            rows = np.empty((2 * end, 8))
+            rows[: self.count] = self.rows[: self.count]
+        rows[self.count : end, :7] = path
+        rows[self.count : end, 7] = moment
+        return replace(self, rows=rows, count=end)
+
+    def at(self, moment: int, period: int) -> Recording | None:
+        """Return the recording as it was at a moment undo came back to; None when it did not lead there."""
+        count = int(np.searchsorted(self.rows[: self.count, 7], moment, side="right"))
+        return replace(self, count=count) if count and count - 1 == period - self.first else None
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """A bed's session at one moment; replaced by another value each tick.
+
+    Attributes
+    ----------
+    uid : int
+        `session_uid` of the bed.
+    name : str
+        Of the bed, for messages.
+    scene : Scene
+    system : System
+    state : State
+        Used up by the next tick: read what you need, keep nothing of it.
+    kept : bytes
+        The state by `core.keeping`; also in the bed's property.
+    pose : ndarray (7,)
+        The fingertip's, up to which the session has followed it.
+    moment : int
+        Counts ticks and never goes back, not even by undo.
+    paused : bool
+        By the user.
+    waits : str
+        Why the session stands still although it is not paused; empty: it does not.
+    stale : int
+        Ticks until the state undo or redo has put into the bed is taken up; 0: there is none.
+    steps : int
+        Single control periods asked for while paused.
+    clock : Clock
+    trace : Trace
+        Total force, set point and heights of picked pins in the last seconds.
+    shadow : Shadow or None
+    errors : LiveErrors or None
+        Latest estimate: height, m, and force, N.
+    gestures : tuple of Gesture
+        The last ones, oldest first.
+    coming : Gesture or None
+        The gesture that begins if the finger touches.
+    rested : float
+        How long the finger has not moved, s of simulated time.
+    recording : Recording or None
+    """
+
+    uid: int
+    name: str
+    scene: Scene
+    system: System
+    state: State
+    kept: bytes
+    pose: Floats
+    moment: int
+    clock: Clock
+    trace: Trace
+    shadow: Shadow | None
+    errors: LiveErrors | None = None
+    paused: bool = False
+    waits: str = ""
+    stale: int = 0
+    steps: int = 0
+    gestures: tuple[Gesture, ...] = ()
+    coming: Gesture | None = None
+    rested: float = 0.0
+    recording: Recording | None = None
+
+    @property
+    def factor(self) -> float:
+        """Real-time factor of the last second: 1 keeps up; 0 while it stands still."""
+        return self.clock.factor
+
+    @property
+    def path(self) -> Floats | None:
+        """Recorded poses (t + 1, 7), row 0 the start; None when nothing is recorded."""
+        return self.recording.path if self.recording else None
+
+
+#: The sessions by the uid of their bed: what this Blender is doing, not what a file holds.
+_SESSIONS: dict[int, Running] = {}
+
+
+def of(bed: Any) -> Running | None:
+    """Return the session of a bed's object, or None."""
+    return _SESSIONS.get(bed.session_uid) if bed is not None else None
+
+
+def all() -> tuple[Running, ...]:
+    """Return all sessions, in the order they were started."""
+    return tuple(_SESSIONS.values())
+
+
+def put(running: Running) -> None:
+    """Make a value the present one of its bed's session."""
+    _SESSIONS[running.uid] = running
+
+
+def drop(uid: int) -> Running | None:
+    """Forget a session; return what it was."""
+    return _SESSIONS.pop(uid, None)
+
+
+#: What was told last: some of it cannot be reported where it happens, such as while a file is loaded.
+_SAID = [""]
+
+
+def say(words: str) -> None:
+    """Keep what was told last, for the Session panel."""
+    _SAID[0] = words
+
+
+def said() -> str:
+    """Return what was told last."""
+    return _SAID[0]

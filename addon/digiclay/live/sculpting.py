@@ -1,0 +1,231 @@
+"""What happens to a running session: it begins, follows the finger, goes back. No Blender in here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.assembly import assemble
+from ..core.errors import DigiclayError, StateError
+from ..core.keeping import carried, packed, unpacked
+from ..core.live import Clock, due, lived, reachable, spent, way
+from ..core.scene import Scene
+from ..core.shadow import LiveErrors, Shadow, cast, cast_from, compared, lifted
+from ..core.simulation import begin
+from ..core.state import State
+from ..core.system import System
+from ..core.trace import begun as trace_begun
+from ..core.trace import extended, felt, picked, row
+from ..device.instant import CLEARANCE
+from .running import Gesture, Recording, Running
+
+__all__ = ["adapted", "advanced", "begun", "recording", "reset", "restored", "rewound", "stepped"]
+
+Floats = NDArray[np.float64]
+
+#: How many gestures can be taken back, and the most memory their states may take, bytes.
+GESTURES, GESTURE_BYTES = 20, 200_000_000
+#: What is told when the state of other parts is taken up.
+CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
+#: A finger that moves on after resting so long makes another gesture, s.
+REST = 0.5
+
+
+def begun(
+    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, moment: int = 0
+) -> tuple[Running, str]:
+    """Begin a session, from a kept state if there is one.
+
+    Returns
+    -------
+    running : Running
+    said : str
+        What of the kept state could not be taken up, and why; empty when all could.
+
+    Raises
+    ------
+    DigiclayError
+        When the scene's parts do not go together.
+    """
+    system = assemble(scene)
+    state, said = _taken_up(system, kept)
+    pose = reachable(pose, system.cell.actuator.stroke)
+    now = packed(system, state)
+    running = Running(
+        uid, name, scene, system, state, now, pose, moment + 1, Clock(),
+        trace_begun(system.period), cast(scene), coming=Gesture(state.period, now, pose),
+    )  # fmt: skip
+    return running, said
+
+
+def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
+    """Return the state to go on from, and what could not be taken up."""
+    if kept is None:
+        return begin(system), ""
+    # The state of other parts has heights at least; what has none is of no use.
+    refused = ""
+    for read, said in ((unpacked, ""), (carried, CHANGED)):
+        try:
+            return read(system, kept), said
+        except StateError as error:
+            refused = f"The bed begins at rest. {error}"
+    return begin(system), refused
+
+
+def advanced(
+    running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None
+) -> Running:
+    """Let a session follow the finger up to now; nothing is simulated while it is paused.
+
+    Parameters
+    ----------
+    running : Running
+        Used up.
+    pose : ndarray (7,)
+        Where the finger is, finite.
+    now : float
+        The wall's time by a clock that never goes back, s.
+    most : int
+        Most control periods to simulate.
+    pins : sequence of int, optional
+        The picked ones; those picked before when left out.
+
+    Raises
+    ------
+    DivergenceError
+        The session is used up then: `restored` takes it up again.
+    """
+    if pins is not None:
+        running = replace(running, trace=picked(running.trace, pins, running.system.grid.count))
+    if running.paused:
+        count, clock = running.steps, running.clock.stopped()
+    else:
+        count, clock = due(running.clock, now, running.system.period, most)
+    running = replace(running, clock=clock, steps=0, moment=running.moment + 1)
+    return followed(running, pose, count) if count else running
+
+
+def stepped(running: Running) -> Running:
+    """Ask a paused session for one more control period; pause one that is not."""
+    return replace(running, paused=True, steps=running.steps + 1)
+
+
+def followed(running: Running, pose: Floats, count: int) -> Running:
+    """Simulate control periods while the finger goes to a pose; the session is used up."""
+    system, state, shadow = running.system, running.state, running.shadow
+    pose = reachable(pose, system.cell.actuator.stroke)
+    running = _about_to_touch(running, pose, count)
+    path = way(running.pose, pose, count)
+    rows, errors = [], running.errors
+    started = time.perf_counter()
+    # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
+    with np.errstate(over="ignore", invalid="ignore"):
+        shadow = shadow and cast_from(shadow, state)
+        for index, state in enumerate(lived(system, running.state, path)):
+            if shadow:
+                shadow, found = _compared(shadow, state, path[index : index + 2])
+                errors, shadow = found or errors, cast_from(shadow, state)
+            if state.period % running.trace.every == 0:
+                rows.append(row(system, state, running.scene.set_point, running.trace.pins))
+    clock = spent(running.clock, count, time.perf_counter() - started)
+    gone = replace(
+        running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, shadow=shadow,
+        errors=errors, trace=extended(running.trace, rows),
+        recording=running.recording and running.recording.extended(path[1:], running.moment),
+    )  # fmt: skip
+    return _touched(gone)
+
+
+def _compared(shadow: Shadow, state: State, part: Floats) -> tuple[Shadow, LiveErrors | None]:
+    """Compare with the shadow; one that diverges tells nothing and begins anew."""
+    try:
+        return compared(shadow, state, part)
+    except DigiclayError:
+        return lifted(shadow), None
+
+
+def _about_to_touch(running: Running, pose: Floats, count: int) -> Running:
+    """Keep where a gesture begins: at a finger that moves after a rest, or that does not touch."""
+    moved = not np.array_equal(pose, running.pose)
+    rested = 0.0 if moved else running.rested + count * running.system.period
+    coming = running.coming
+    free = coming is None and felt(running.system, running.state) == 0.0
+    if free or (moved and running.rested >= REST):
+        coming = Gesture(running.state.period, running.kept, running.pose)
+    return replace(running, rested=rested, coming=coming)
+
+
+def _touched(running: Running) -> Running:
+    """Count a gesture that has touched among the last ones."""
+    if running.coming is None or felt(running.system, running.state) == 0.0:
+        return running
+    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.kept)))
+    return replace(running, gestures=(*running.gestures, running.coming)[-room:], coming=None)
+
+
+def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | None = None) -> Running:
+    """Return the session with another state of its bed: after undo or redo, or when it diverged.
+
+    Parameters
+    ----------
+    running : Running
+    kept : bytes or None
+        None: the bed was at rest.
+    pose : ndarray (7,)
+        The finger's at that state.
+    moment : int, optional
+        When it was that state; a recording goes back to it, or ends if it did not lead there.
+    """
+    state, _ = _taken_up(running.system, kept)
+    now = packed(running.system, state)
+    keep = running.recording
+    if keep is not None:
+        keep = keep.at(running.moment if moment is None else moment, state.period)
+    gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
+    free = felt(running.system, state) == 0.0
+    return replace(
+        running, state=state, kept=now, pose=reachable(pose, running.system.cell.actuator.stroke),
+        clock=running.clock.stopped(), shadow=running.shadow and lifted(running.shadow), stale=0,
+        recording=keep, gestures=gestures, moment=running.moment + 1, rested=0.0,
+        coming=Gesture(state.period, now, pose) if free else None,
+    )  # fmt: skip
+
+
+def rewound(running: Running) -> Running:
+    """Take back the last gesture: state and finger are where it began; nothing changes if there is none."""
+    if not running.gestures:
+        return running
+    *earlier, last = running.gestures
+    back = restored(replace(running, gestures=tuple(earlier)), last.kept, last.pose, moment=-1)
+    return replace(back, coming=last)
+
+
+def reset(running: Running) -> Running:
+    """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
+    before = Gesture(0, running.kept, running.pose)
+    pose = running.pose.copy()
+    pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
+    back = restored(replace(running, gestures=()), None, pose, moment=-1)
+    return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
+
+
+def adapted(running: Running, scene: Scene) -> tuple[Running, str]:
+    """Let the session go on with other parameters; see `begun` for what is returned and raised."""
+    if scene == running.scene:
+        return running, ""
+    other, said = begun(running.uid, running.name, scene, running.pose, running.kept, running.moment)
+    kept_on = {} if said else {"recording": None, "gestures": running.gestures}
+    trace = picked(other.trace, running.trace.pins, other.system.grid.count)
+    return replace(other, paused=running.paused, waits=running.waits, trace=trace, **kept_on), said
+
+
+def recording(running: Running, on: bool) -> Running:
+    """Begin to record the finger's path, or stop recording it."""
+    if not on:
+        return replace(running, recording=None)
+    begin_at = Recording.begun(running.kept, running.state.period, running.pose, running.moment)
+    return replace(running, recording=begin_at)

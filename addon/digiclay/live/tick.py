@@ -1,0 +1,170 @@
+"""A tick of the running sessions: Blender's objects are read, the sessions go on, the beds are written.
+
+No reference to Blender's data outlives a tick: undo and loading invalidate them all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import bridge, preferences
+from ..core.errors import DigiclayError, DivergenceError
+from ..core.fingertip import Fingertip
+from ..device import display, parts, view
+from ..device.instant import Instant
+from ..recorded import takes
+from ..recorded.bake import is_baked
+from ..settings import properties
+from . import bed_state, running, sculpting
+from .running import Floats, Running
+from .waiting import found, obstacle
+
+__all__ = ["Note", "place", "show", "start", "stop", "tick"]
+
+#: Ticks from one look at the bed's settings to the next.
+LOOK = 8
+
+
+class Note(NamedTuple):
+    """Something to tell the user: level as Blender's operators report it, and words."""
+
+    level: str
+    words: str
+
+
+def start(context: Any, bed: Any) -> list[Note]:
+    """Begin a session of a bed, from what the bed keeps; what was missing for it is made.
+
+    Raises
+    ------
+    DigiclayError
+        When the bed's settings, its scale or a bake do not allow it.
+    """
+    if is_baked(bed):
+        raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
+    scene, notes = properties.scene_of(bed), []
+    if bed.data.users > 1:
+        bed.data = bed.data.copy()
+        notes.append(Note("INFO", f"{bed.name} got pins of its own: it shared them with another bed"))
+    if view.fingertip_of(bed) is None:
+        tip = parts.fingertip(bed.users_collection[0], bed)
+        rest = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip)
+        bridge.place_fingertip(tip, rest.fingertip, rest.finger)
+        notes.append(Note("INFO", f"{bed.name} got a new fingertip"))
+    context.view_layer.update()
+    why = obstacle(context, bed, scene.cells)
+    if why:
+        raise DigiclayError(f"The session of {bed.name} cannot start: {why}.")
+    begun, said = sculpting.begun(
+        bed.session_uid, bed.name, scene, bridge.pose(view.fingertip_of(bed)),
+        bed_state.kept(bed), bed_state.moment(bed),
+    )  # fmt: skip
+    show(bed, begun)
+    return [*notes, Note("WARNING", f"{bed.name}: {said}")] if said else notes
+
+
+def stop(uid: int) -> Any | None:
+    """End a session; return its bed, which keeps the state and a take, or None when that was deleted."""
+    ended = running.drop(uid)
+    bed = found(uid, ended.name) if ended else None
+    take = takes.recorded(ended) if ended else None
+    if bed is not None and take is not None:
+        takes.keep(bed, take)
+    return bed
+
+
+def show(bed: Any, session: Running) -> None:
+    """Make a value the present one of a session, kept and shown by its bed."""
+    running.put(session)
+    bed_state.write(bed, session)
+    view.show_state(bed, session.system, session.state)
+
+
+def place(context: Any, bed: Any, session: Running) -> None:
+    """Put the fingertip where a session has it; one that is animated or constrained goes its own way."""
+    tip = view.fingertip_of(bed)
+    if tip is not None:
+        bridge.place_fingertip(tip, session.pose, session.scene.fingertip or Fingertip())
+        context.view_layer.update()
+
+
+def tick(context: Any, now: float) -> list[Note]:
+    """Let every session go on up to now, by a clock that never goes back, s; return what there is to tell."""
+    notes: list[Note] = []
+    most = preferences.of(context).most_periods
+    for session in running.all():
+        bed = found(session.uid, session.name)
+        if bed is None:
+            running.drop(session.uid)
+            notes.append(Note("WARNING", f"The session of {session.name} ended: its bed was deleted"))
+            continue
+        notes += _ticked(context, bed, session, now, most)
+    return notes
+
+
+def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> list[Note]:
+    """Let one session go on."""
+    if session.stale > 1:
+        # What undo has put back has no place in the world until Blender has evaluated it, which it
+        # does before the next tick.
+        running.put(replace(session, stale=session.stale - 1))
+        return []
+    before = session
+    why, session, said = _looked(context, bed, session)
+    notes = [Note("WARNING", f"{bed.name}: {said}")] if said else []
+    if why:
+        waiting = replace(session, waits=why, clock=session.clock.stopped(), name=bed.name)
+        running.put(replace(waiting, moment=waiting.moment + 1))
+        bed_state.write(bed, running.of(bed) or waiting, session)
+        told = why == before.waits
+        return notes if told else [*notes, Note("WARNING", f"The session of {bed.name} waits: {why}")]
+    if before.waits:
+        notes.append(Note("INFO", f"The session of {bed.name} goes on"))
+    session = replace(session, waits="", name=bed.name)
+    seen = _seen(session)
+    try:
+        later = sculpting.advanced(
+            session, bridge.pose(view.fingertip_of(bed)), now, most, display.picked(bed)
+        )
+    except DivergenceError as error:
+        back = sculpting.restored(session, session.kept, session.pose)
+        later = replace(back, paused=True)
+        notes.append(Note("ERROR", f"The session of {bed.name} is paused: {error}"))
+    running.put(later)
+    bed_state.write(bed, later, before)
+    # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
+    if before.stale or said or not np.array_equal(seen, _seen(later)):
+        view.show_state(bed, later.system, later.state)
+    return notes
+
+
+def _seen(session: Running) -> Floats:
+    """Return all that can be seen of a session's cells, shape (3, n)."""
+    state = session.state
+    return np.array([state.row(0), state.row(session.system.rows.force), state.mode()])
+
+
+def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
+    """Look at what the user may have changed; return why to wait, the session, and what to tell."""
+    why, said = obstacle(context, bed, session.system.grid.count), ""
+    if why:
+        return why, session, said
+    try:
+        if session.stale or session.waits or session.moment % LOOK == 0:
+            scene = properties.scene_of(bed)
+            if scene != session.scene:
+                session, said = sculpting.adapted(session, scene)
+                bridge.resize_fingertip(view.fingertip_of(bed), scene.fingertip or Fingertip())
+        if session.stale:
+            at, moment = bed_state.pose(bed), bed_state.moment(bed)
+            at = session.pose if at is None else at
+            recorded = session.recording is not None
+            session = sculpting.restored(session, bed_state.kept(bed), at, moment)
+            if recorded and session.recording is None:
+                said = "The recording ended: undo went back to before it, or redo to what it did not lead to"
+    except DigiclayError as error:
+        return str(error), session, said
+    return "", session, said

@@ -1,0 +1,76 @@
+"""Why a session has to stand still: what is missing or in the way, in words that say what to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..device import view
+
+__all__ = ["found", "obstacle"]
+
+
+def found(uid: int, name: str) -> Any | None:
+    """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.
+
+    Parameters
+    ----------
+    uid : int
+    name : str
+        Its name when last seen: looked up first.
+    """
+    bed = bpy.data.objects.get(name)
+    if bed is None or bed.session_uid != uid:
+        bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
+    if bed is None or not view.is_bed(bed):
+        return None
+    # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
+    return bed if _shown(bpy.context, bed) or bed.users_scene else None
+
+
+def _shown(context: Any, thing: Any) -> bool:
+    """Tell whether some window shows a scene the object stands in."""
+    layers = (window.view_layer for window in context.window_manager.windows)
+    return any(layer.objects.get(thing.name) == thing for layer in layers)
+
+
+def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
+    """Return why the session of a bed cannot go on now, or an empty text.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    pins : int, optional
+        How many the session simulates; as many as there are when left out.
+    """
+    if bpy.app.is_job_running("RENDER"):
+        return "a render is under way"
+    if not _shown(context, bed):
+        return "no window shows its scene, or its collection is left out: show it to go on"
+    # A mesh can also be edited through another object that shares it.
+    if bed.mode != "OBJECT" or (bed.type == "MESH" and bed.data.is_editmode):
+        return "the bed is being edited: go back to Object Mode to go on"
+    if bed.type != "MESH" or not bridge.ATTRIBUTES.keys() <= set(bed.data.attributes.keys()):
+        return "the bed's mesh is no longer that of its pins: undo that to go on"
+    if pins is not None and len(bed.data.vertices) != pins:
+        return f"the bed has {len(bed.data.vertices)} pins now instead of {pins}: undo that to go on"
+    tip = view.fingertip_of(bed)
+    if tip is None:
+        return (
+            "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
+        )
+    if not _shown(context, tip):
+        return "its fingertip stands in no scene shown: link it to a collection to go on"
+    try:
+        bridge.uniform(bed)
+    except DigiclayError as error:
+        return str(error)
+    matrix = np.array(tip.matrix_world)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        return "its fingertip is scaled to nothing: clear its scale to go on"
+    return ""

@@ -1,0 +1,70 @@
+"""Where the overlay stands in a view, and which of its sections there is room for. No Blender in here."""
+
+from __future__ import annotations
+
+from .look import Look
+from .picture import Box, Picture
+from .sections import SECTIONS, Pen, Told
+
+__all__ = ["free", "laid_out"]
+
+#: Sizes at a UI scale of 1, pixels.
+WIDTH, MARGIN, PADDING = 290.0, 12.0, 10.0
+#: Opacity of the box behind it all: the bed shines through a little.
+BACK_ALPHA = 0.95
+#: Most of the room's height that is taken: the bed is what one looks at.
+SHARE = 0.75
+
+#: Left, bottom, right and top of a part of the view, pixels.
+Room = tuple[float, float, float, float]
+
+
+def free(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
+    """Return the part of a view that no panel covers.
+
+    Parameters
+    ----------
+    width, height : float
+        Of the view, pixels.
+    covered : list of tuple
+        Side on which a panel lies over the view (LEFT, RIGHT, TOP or BOTTOM), and how deep it is.
+    """
+    deep = {"LEFT": 0.0, "RIGHT": 0.0, "TOP": 0.0, "BOTTOM": 0.0}
+    for side, depth in covered:
+        deep[side] += depth
+    return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
+
+
+def laid_out(told: Told, look: Look, room: Room, scale: float) -> Picture:
+    """Lay the overlay out in the lower right corner of the room there is.
+
+    Where the view is low, sections there is no room for are left away; where it is narrow, all.
+
+    Parameters
+    ----------
+    told : Told
+    look : Look
+    room : Room
+    scale : float
+        The UI scale: pixels for each of the sizes.
+    """
+    left, bottom, right, top = room
+    width, margin, padding = WIDTH * scale, MARGIN * scale, PADDING * scale
+    space, sections = SHARE * (top - bottom) - 2 * padding, []
+    for height_of, draw in SECTIONS:
+        height = height_of(told) * scale
+        if 0.0 < height <= space:
+            sections.append((height, draw))
+            space -= height
+    picture = Picture()
+    if not sections or right - left < width + 2 * margin:
+        return picture
+    tall = sum(height for height, _ in sections) + 2 * padding
+    x, y = right - margin - width, bottom + margin
+    picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
+    pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
+    y += tall - padding
+    for height, draw in sections:
+        draw(told, pen, y)
+        y -= height
+    return picture

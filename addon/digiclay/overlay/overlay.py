@@ -1,0 +1,163 @@
+"""The overlay in the 3D views: what the paper's tool shows of a running session, drawn while one runs.
+
+The draw handler is there only while a session runs whose bed wants it: an overlay that is off
+costs nothing. Whoever starts or ends a session calls `follow`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .. import preferences
+from ..compat import bpy
+from ..core.modes import Mode
+from ..device import palettes, view
+from ..live import running
+from ..press.aim import on_screen
+from .layout import Room, free, laid_out
+from .look import Look, look
+from .picture import Dot, Picture
+from .sections import Told
+
+__all__ = ["follow", "redraw", "shown", "stop", "told"]
+
+#: How often the views are drawn anew while nothing moves in them, s: the curves go on all the same.
+QUIET = 0.25
+#: The draw handler, while there is one.
+_HANDLES: list[Any] = []
+
+
+def follow() -> None:
+    """Have the overlay drawn if a running session wants it, and else not."""
+    if any(_wanted(bed) for bed in _beds()):
+        if not _HANDLES:
+            _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+            bpy.app.timers.register(_again, first_interval=QUIET)
+    else:
+        stop()
+    redraw()
+
+
+def stop() -> None:
+    """Draw the overlay no more."""
+    if bpy.app.timers.is_registered(_again):
+        bpy.app.timers.unregister(_again)
+    while _HANDLES:
+        bpy.types.SpaceView3D.draw_handler_remove(_HANDLES.pop(), "WINDOW")
+
+
+def shown() -> bool:
+    """Tell whether the draw handler is there."""
+    return bool(_HANDLES)
+
+
+def redraw() -> None:
+    """Ask every 3D view to draw itself again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def _again() -> float:
+    """Have the views drawn anew now and then: a timer, so that an overlay that is off costs nothing."""
+    redraw()
+    return QUIET
+
+
+def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:
+    """Return what the overlay tells of a bed and its session."""
+    trace, scene = session.trace, session.scene
+    asked = float(trace.set_point[-1]) if len(trace.rows) else math.nan
+    errors = session.errors
+    return Told(
+        name=bed.name,
+        method=scene.method if scene.control else "",
+        paused=session.paused,
+        factor=session.factor or None,
+        errors=None if errors is None else (errors.height, errors.force),
+        set_point=asked if math.isfinite(asked) else scene.set_point,
+        time=trace.time,
+        force=trace.force,
+        pins=trace.pins,
+        heights=trace.heights,
+        modes=np.bincount(session.state.mode(), minlength=len(Mode)),
+        colours=tuple(colours[mode] for mode in Mode),
+        seconds=bed.digiclay_display.seconds,
+        top=view.top_colour(bed) if view.shows_force(bed) else None,
+    )
+
+
+def _beds() -> list[Any]:
+    """Return the beds with a running session; fetched anew each time, since undo invalidates them."""
+    uids = {session.uid for session in running.all()}
+    return [thing for thing in bpy.data.objects if thing.session_uid in uids] if uids else []
+
+
+def _wanted(bed: Any) -> bool:
+    """Tell whether the overlay is wanted for a bed."""
+    display = getattr(bed, "digiclay_display", None)
+    return display is not None and bool(display.overlay)
+
+
+def _chosen(context: Any) -> Any | None:
+    """Return the bed to tell of in a view: the active one, or the first one in the view's scene."""
+    beds = [bed for bed in _beds() if _wanted(bed) and bed.name in context.scene.objects]
+    active = context.object
+    while active is not None and active not in beds:
+        active = active.parent
+    return active or (beds[0] if beds else None)
+
+
+def _room(area: Any, region: Any) -> Room:
+    """Return the part of a view that toolbar, sidebar and headers leave free."""
+    sides = {"TOOLS": "LEFT", "UI": "RIGHT", "HEADER": "TOP", "TOOL_HEADER": "TOP", "ASSET_SHELF": "BOTTOM"}
+    covered = []
+    for other in area.regions:
+        lies_over = other.x < region.x + region.width and other.x + other.width > region.x
+        lies_over &= other.y < region.y + region.height and other.y + other.height > region.y
+        if other.type in sides and lies_over and min(other.width, other.height) > 1:
+            side = (
+                other.alignment
+                if other.alignment in ("LEFT", "RIGHT", "TOP", "BOTTOM")
+                else sides[other.type]
+            )
+            covered.append((side, other.width if side in ("LEFT", "RIGHT") else other.height))
+    return free(region.width, region.height, covered)
+
+
+def _draw() -> None:
+    """Draw the overlay into the region Blender is drawing."""
+    from . import overlay_draw  # needs a graphics card: not there in the background
+
+    context = bpy.context
+    bed = _chosen(context) if context.space_data.overlay.show_overlays else None
+    session = running.of(bed)
+    if session is None:
+        return
+    settings = context.preferences
+    theme = settings.themes[0].user_interface.wcol_menu_back
+    colours = palettes.PALETTES[preferences.of(context).palette]
+    chosen = look(tuple(theme.inner[:3]), tuple(theme.text))
+    scale = settings.system.ui_scale
+    picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
+    picture.dots += _marks(context, bed, session, chosen, picture, scale)
+    overlay_draw.draw(picture, context.region.width, context.region.height)
+
+
+def _marks(
+    context: Any, bed: Any, session: running.Running, colours: Look, picture: Picture, scale: float
+) -> list[Dot]:
+    """Return a dot on every picked pin that the picture does not cover, in the colour of its curve."""
+    pins = session.trace.pins
+    cells = session.system.grid.positions[list(pins)]
+    places = on_screen(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
+    marks = []
+    for (x, y), colour in zip(places, colours.pins, strict=False):
+        hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in picture.boxes)
+        if math.isfinite(x) and not hidden:
+            marks += [Dot(x, y, 5.5 * scale, colours.back), Dot(x, y, 4.0 * scale, colour)]
+    return marks

@@ -1,0 +1,101 @@
+"""The overlay's marks, and the patch under the Press tool's cursor, drawn by Blender's gpu module."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import blf
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from .look import Colour
+from .picture import Box, Dot, Floats, Line, Picture, Words
+
+__all__ = ["cursor", "draw"]
+
+#: Corners of a dot.
+CORNERS = 20
+#: Length of a dash and of the space after it, in widths of the line.
+DASH = 4.0
+FONT = 0
+
+
+def draw(picture: Picture, width: float, height: float) -> None:
+    """Draw a picture into a region of a size in pixels."""
+    gpu.state.blend_set("ALPHA")
+    try:
+        for box in picture.boxes:
+            _fill(_corners(box), [(0, 1, 2), (0, 2, 3)], box.colour, box.alpha)
+        for line in picture.lines:
+            _stroke(line, (width, height))
+        for dot in picture.dots:
+            _dot(dot)
+        for words in picture.words:
+            _write(words)
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def cursor(lines: list[Line]) -> None:
+    """Draw lines about the mouse, in pixels of the window."""
+    _, _, width, height = gpu.state.viewport_get()
+    gpu.state.blend_set("ALPHA")
+    try:
+        for line in lines:
+            _stroke(line, (width, height))
+    finally:
+        gpu.state.blend_set("NONE")
+
+
+def _stroke(line: Line, size: tuple[float, float]) -> None:
+    """Draw a line into a region of a size in pixels, with smooth edges."""
+    kind, points = ("LINES", _dashes(line)) if line.dashed else ("LINE_STRIP", line.points)
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    flat = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
+    batch = batch_for_shader(shader, kind, {"pos": flat})
+    shader.bind()
+    shader.uniform_float("viewportSize", size)
+    shader.uniform_float("lineWidth", line.width)
+    shader.uniform_float("color", (*line.colour, 1.0))
+    batch.draw(shader)
+
+
+def _corners(box: Box) -> Floats:
+    """Return the corners of a box, (4, 2)."""
+    right, top = box.x + box.width, box.y + box.height
+    return np.array([[box.x, box.y], [right, box.y], [right, top], [box.x, top]])
+
+
+def _dashes(line: Line) -> Floats:
+    """Return ends of dashes (2 k, 2) along a straight line from its first to its last point."""
+    start, end = line.points[0], line.points[-1]
+    count = max(1, int(np.linalg.norm(end - start) / (2.0 * DASH * line.width)))
+    share = (np.arange(count)[:, None] + [0.0, 0.5]).ravel() / count
+    return np.asarray(start + (end - start) * share[:, None])
+
+
+def _dot(dot: Dot) -> None:
+    """Draw a filled circle."""
+    turn = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
+    rim = np.column_stack([dot.x + dot.radius * np.cos(turn), dot.y + dot.radius * np.sin(turn)])
+    _fill(rim, [(0, i, i + 1) for i in range(1, CORNERS - 1)], dot.colour, 1.0)
+
+
+def _fill(points: Floats, triangles: list[tuple[int, int, int]], colour: Colour, alpha: float) -> None:
+    """Fill a convex shape."""
+    shader: Any = gpu.shader.from_builtin("UNIFORM_COLOR")
+    batch = batch_for_shader(shader, "TRIS", {"pos": points.astype(np.float32)}, indices=triangles)
+    shader.bind()
+    shader.uniform_float("color", (*colour, alpha))
+    batch.draw(shader)
+
+
+def _write(words: Words) -> None:
+    """Write a line of text."""
+    blf.size(FONT, words.size)
+    blf.color(FONT, *words.colour, 1.0)
+    x = words.x - blf.dimensions(FONT, words.text)[0] if words.to_the_right_end else words.x
+    blf.position(FONT, round(x), round(words.y), 0.0)
+    blf.draw(FONT, words.text)

@@ -1,0 +1,102 @@
+"""What the overlay draws, as plain marks in pixels: boxes, lines, dots and words. No Blender in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .look import Colour
+
+__all__ = ["Box", "Dot", "Line", "Picture", "Words", "axis", "scaled"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A filled rectangle: left, bottom, width, height; pixels."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    colour: Colour
+    alpha: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line through points (k, 2), pixels; joined, or every other stretch left out."""
+
+    points: Floats
+    colour: Colour
+    width: float
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A filled circle about a point."""
+
+    x: float
+    y: float
+    radius: float
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class Words:
+    """A line of text on a base line, from its left end or to its right end."""
+
+    x: float
+    y: float
+    size: float
+    colour: Colour
+    text: str
+    to_the_right_end: bool = False
+
+
+@dataclass
+class Picture:
+    """All marks, in the order they are drawn: boxes, lines, dots, words."""
+
+    boxes: list[Box] = field(default_factory=list)
+    lines: list[Line] = field(default_factory=list)
+    dots: list[Dot] = field(default_factory=list)
+    words: list[Words] = field(default_factory=list)
+
+
+def axis(low: float, high: float) -> tuple[float, float]:
+    """Return round ends of an axis that holds two values, the first below the second.
+
+    Steps are 1, 2 or 5 times a power of ten, and at most ten of them make the axis, so that
+    the ends do not jump about with every value.
+    """
+    span = high - low
+    step = 10.0 ** np.floor(np.log10(span))
+    step *= next(factor for factor in (0.1, 0.2, 0.5, 1.0) if span <= 10.0 * factor * step)
+    return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
+
+
+def scaled(
+    time: Floats, value: Floats, window: tuple[float, float], ends: tuple[float, float], box: Box
+) -> Floats:
+    """Return the points (k, 2) of a curve inside a box, what lies outside the window left away.
+
+    Parameters
+    ----------
+    time, value : ndarray (t,)
+        The curve; times increase, s.
+    window : tuple of float
+        First and last time shown, s.
+    ends : tuple of float
+        Ends of the axis, in the unit of the values; values beyond are drawn at the end.
+    box : Box
+        Where the curve goes.
+    """
+    shown = (time >= window[0]) & (time <= window[1]) & np.isfinite(value)
+    x = (time[shown] - window[0]) / (window[1] - window[0])
+    y = np.clip((value[shown] - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    return np.column_stack([box.x + x * box.width, box.y + y * box.height])

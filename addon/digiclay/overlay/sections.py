@@ -1,0 +1,243 @@
+"""The sections of the overlay: head, force against set point, colours, heights of picked pins, modes.
+
+Each says how tall it is and draws itself. No Blender in here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.modes import Mode
+from ..device import heat
+from .look import Colour, Look
+from .picture import Box, Dot, Floats, Line, Picture, Words, axis, scaled
+
+__all__ = ["SECTIONS", "Pen", "Told"]
+
+#: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
+LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
+#: Space below a section.
+GAP = 6.0
+#: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no further.
+MOST = 5.0
+#: Shortest axes, N and mm: a quiet force is not drawn as a wild one.
+LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What the overlay tells of a session.
+
+    Attributes
+    ----------
+    name, method : str
+        Of the bed and of its control method; an empty method means no control.
+    paused : bool
+    factor : float or None
+        Simulated over real time of the last second; None before there is one.
+    errors : tuple of float or None
+        Estimated errors of the heights, m, and of a cell's force, N; None before there is an estimate.
+    set_point : float or None
+        Total force asked for, N.
+    time, force : ndarray (t,)
+        The last seconds: simulated time, s, and total force, N.
+    pins : tuple of int
+        The picked pins, k of them.
+    heights : ndarray (t, k)
+        Their heights, m; NaN where they were not followed yet.
+    modes : ndarray of int (8,)
+        Number of pins in each mode.
+    colours : tuple of Colour
+        Of the modes, as the pins wear them.
+    seconds : float
+        How much of the past is shown, s.
+    top : float or None
+        Force from which on a pin has the last colour, N; None while the colours tell the modes.
+    """
+
+    name: str
+    method: str
+    paused: bool
+    factor: float | None
+    errors: tuple[float, float] | None
+    set_point: float | None
+    time: Floats
+    force: Floats
+    pins: tuple[int, ...]
+    heights: Floats
+    modes: NDArray[np.int64]
+    colours: tuple[Colour, ...]
+    seconds: float
+    top: float | None = None
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """First and last time shown, s."""
+        end = float(self.time[-1]) if self.time.size else 0.0
+        return end - self.seconds, end
+
+
+@dataclass(frozen=True)
+class Pen:
+    """Where a section draws: into which picture, in which colours, from where and how wide, at what scale."""
+
+    picture: Picture
+    look: Look
+    x: float
+    width: float
+    scale: float
+
+    def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
+        """Write a row, one text to the left and one to the right; return where the next one begins."""
+        size = (SMALL if small else LETTERS) * self.scale
+        colour = self.look.faint if small else self.look.ink
+        y = top - 0.75 * ROW * self.scale
+        for x, text, at_right in ((self.x, left, False), (self.x + self.width, right, True)):
+            if text:
+                self.picture.words.append(Words(x, y, size, colour, text, at_right))
+        return top - ROW * self.scale
+
+    def frame(self, top: float, low: str, high: str) -> Box:
+        """Draw the frame of a plot with the ends of its axis; return the box the curves go into."""
+        box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
+        step, size = 3.0 * self.scale, SMALL * self.scale
+        for y, label, lift in ((box.y, low, step), (top, high, -size)):
+            edge = np.array([[box.x, y], [box.x + box.width, y]])
+            self.picture.lines.append(Line(edge, self.look.frame, self.scale))
+            self.picture.words.append(Words(box.x + step, y + lift, size, self.look.faint, label))
+        return box
+
+    def curve(self, told: Told, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1) -> None:
+        """Draw a curve into the frame of a plot: that of a pin, or the force."""
+        colour = self.look.force if pin < 0 else self.look.pins[pin]
+        points = scaled(told.time, value, told.window, ends, box)
+        if len(points) > 1:
+            self.picture.lines.append(Line(points, colour, 1.5 * self.scale))
+
+
+def head_height(told: Told) -> float:
+    """Return the height of the head, pixels at a UI scale of 1."""
+    return 3 * ROW + GAP
+
+
+def head(told: Told, pen: Pen, top: float) -> None:
+    """Name the bed, the method and how well the simulation keeps up."""
+    speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
+    top = pen.row(top, told.name, "paused" if told.paused else speed)
+    top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
+    if told.errors is None:
+        pen.row(top, "Solver error: not estimated yet", small=True)
+    else:
+        height, force = _size(told.errors[0] * 1e6), _size(told.errors[1] * 1e3)
+        pen.row(top, f"Solver error (estimate): {height} µm, {force} mN", small=True)
+
+
+def force_height(told: Told) -> float:
+    """Return the height of the section of the force, pixels at a UI scale of 1."""
+    return 2 * ROW + PLOT + GAP
+
+
+def force(told: Told, pen: Pen, top: float) -> None:
+    """Draw the total force over the last seconds, its set point dashed."""
+    now = f"{told.force[-1]:.2f} N" if told.force.size else ""
+    asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
+    top = pen.row(top, f"Total force  {now}", asked)
+    recent = told.force[told.time >= told.window[0]]
+    asked_for = told.set_point or 0.0
+    largest = float(recent.max(initial=0.0))
+    if asked_for:
+        largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
+    largest = max(largest, LEAST_FORCE)
+    ends = (0.0, axis(0.0, largest)[1])
+    box = pen.frame(top, "0 N", f"{ends[1]:g} N")
+    if told.set_point is not None:
+        y = box.y + told.set_point / ends[1] * box.height
+        line = np.array([[box.x, y], [box.x + box.width, y]])
+        pen.picture.lines.append(Line(line, pen.look.set_point, 1.5 * pen.scale, dashed=True))
+    pen.curve(told, told.force, ends, box)
+    pen.row(box.y, "", f"last {told.seconds:g} s", small=True)
+
+
+def heights_height(told: Told) -> float:
+    """Return the height of the section of the heights, pixels at a UI scale of 1."""
+    return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
+
+
+def heights(told: Told, pen: Pen, top: float) -> None:
+    """Draw the heights of the picked pins over the last seconds."""
+    if not told.pins:
+        pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
+        return
+    top = pen.row(top, "Heights of picked pins")
+    values = told.heights * 1e3
+    recent = values[told.time >= told.window[0]]
+    known = recent[np.isfinite(recent)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    spare = max(0.0, LEAST_SPAN - (high - low)) / 2
+    ends = axis(low - spare, high + spare)
+    box = pen.frame(top, f"{ends[0]:g} mm", f"{ends[1]:g} mm")
+    for place in range(len(told.pins)):
+        pen.curve(told, values[:, place], ends, box, pin=place)
+    top, column = pen.row(box.y, "", f"last {told.seconds:g} s", small=True), pen.width / 3
+    for place, pin in enumerate(told.pins):
+        x, y = pen.x + place % 3 * column, top - (place // 3 + 0.75) * ROW * pen.scale
+        now = f" {values[-1, place]:.1f} mm" if len(values) and np.isfinite(values[-1, place]) else ""
+        _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
+
+
+def scale_height(told: Told) -> float:
+    """Return the height of the scale of colours, pixels at a UI scale of 1; 0 while none is needed."""
+    return 0.0 if told.top is None else 2.6 * ROW
+
+
+def scale(told: Told, pen: Pen, top: float) -> None:
+    """Draw the colours of the force on a pin."""
+    if told.top is None:
+        return
+    top = pen.row(top, "Force on a pin")
+    width, height = pen.width / len(heat.COLOURS), 0.5 * ROW * pen.scale
+    for place, colour in enumerate(heat.COLOURS):
+        pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, colour))
+    pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
+
+
+def modes_height(told: Told) -> float:
+    """Return the height of the section of the modes, pixels at a UI scale of 1."""
+    return ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2))
+
+
+def modes(told: Told, pen: Pen, top: float) -> None:
+    """List how many pins are in each mode that occurs, with its colour."""
+    top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
+    for place, code in enumerate(np.flatnonzero(told.modes)):
+        x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
+        mode = Mode(int(code))
+        _entry(pen, x, y, told.colours[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
+
+
+def _size(error: float) -> str:
+    """Say how large an error is."""
+    return f"{error:.2g}" if error >= 0.01 else "< 0.01"
+
+
+def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], text: str) -> None:
+    """Draw a dot and what it stands for."""
+    radius, size = 4.0 * pen.scale, (SMALL + 1.0) * pen.scale
+    middle = y + 0.36 * size
+    pen.picture.dots.append(Dot(x + radius, middle, radius + pen.scale, pen.look.frame))
+    pen.picture.dots.append(Dot(x + radius, middle, radius, colour))
+    pen.picture.words.append(Words(x + 3.5 * radius, y, size, pen.look.ink, text))
+
+
+#: From the top down: how tall each section is, and how it is drawn.
+SECTIONS = (
+    (head_height, head),
+    (force_height, force),
+    (scale_height, scale),
+    (heights_height, heights),
+    (modes_height, modes),
+)

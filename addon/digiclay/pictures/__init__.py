@@ -1,0 +1,1 @@
+"""Stills, turntables and films, drawn from recorded states."""

@@ -1,0 +1,69 @@
+"""A film's file: the frames it is made of, and the MP4 that Blender's sequencer makes of them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..compat import bpy, quiet, strips, to_video
+from ..core.errors import OutputError
+from ..core.shots import Moving
+from .render import why_not
+
+__all__ = ["encoded", "frames_beside", "whole_film"]
+
+
+@contextmanager
+def frames_beside(out: Path) -> Iterator[Path]:
+    """Give a folder for the frames beside the film, and take it away again."""
+    folder = out.with_name(f".{out.name}.{os.getpid()}.frames")
+    try:
+        folder.mkdir(parents=True)
+        yield folder
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
+    """Make a film of pictures that lie in one folder."""
+    scene = bpy.data.scenes.new("Digital Clay Frames")
+    scene.view_settings.view_transform = "Standard"
+    scene.frame_start, scene.frame_end = 1, len(frames)
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = looks.width, looks.height, 100
+    render.fps, render.fps_base = looks.rate, 1.0
+    to_video(render)
+    partial = frames[0].with_name("film.mp4")
+    render.filepath = str(partial)
+    pictures = strips(scene).new_image("frames", str(frames[0]), channel=1, frame_start=1)
+    for path in frames[1:]:
+        pictures.elements.append(path.name)
+    try:
+        with quiet():
+            bpy.ops.render.render(animation=True, scene=scene.name)
+        if not partial.is_file() or not whole_film(partial.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {why_not(partial)}.")
+        os.replace(partial, out)
+    except RuntimeError as error:
+        raise OutputError(f"{out} cannot be written: {' '.join(str(error).split())}") from None
+    return out
+
+
+def whole_film(data: bytes) -> bool:
+    """Tell whether an MP4 file has all its parts, the last of which says where the frames are."""
+    at, kinds = 0, []
+    while at + 8 <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        if size == 1 and at + 16 <= len(data):  # larger than 4 GB: the length follows
+            (size,) = struct.unpack_from(">Q", data, at + 8)
+        if size < 8:
+            return False
+        kinds.append(kind)
+        at += size
+    return at == len(data) and b"moov" in kinds

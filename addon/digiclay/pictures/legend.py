@@ -1,0 +1,142 @@
+"""What is written in a picture before the device: the plane for it, and the legend of the colours."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..bridge import linear
+from ..compat import bpy, shader_nodes
+from ..core.modes import COLOURS, MEANINGS, Mode
+from ..device import device_shapes, heat
+
+__all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]
+
+Colour = tuple[float, float, float]
+
+#: sRGB of letters, and of what is less important.
+INK, FADED = (0.10, 0.12, 0.15), (0.30, 0.33, 0.37)
+#: Where the left edge of what is written is, in half widths.
+LEFT = -0.94
+#: What Workbench's studio light leaves of a colour that looks straight at the camera, measured.
+STUDIO = 0.48
+#: How much farther away the next layer behind is, as a part of the distance.
+LAYER = 1e-3
+
+
+@dataclass(frozen=True)
+class Front:
+    """The plane before the camera; nothing on it casts or takes any light.
+
+    Attributes
+    ----------
+    scene, camera
+        Blender's.
+    depth : float
+        Distance from the camera, Blender units.
+    width, height : float
+        Half the picture's size there, Blender units.
+    """
+
+    scene: Any
+    camera: Any
+    depth: float
+    width: float
+    height: float
+
+    @classmethod
+    def before(cls, scene: Any, camera: Any, half: tuple[float, float]) -> Front:
+        """Return the plane of a camera; `half` of the frame's width and height at depth 1."""
+        depth = camera.data.clip_start * 20.0
+        return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
+
+    @property
+    def letter(self) -> float:
+        """Size of ordinary letters."""
+        return min(0.056 * self.height, 0.040 * self.width)
+
+    def put(self, part: Any, x: float, y: float, colour: Colour, layer: int = 0) -> Any:
+        """Hang an object at a place of the plane; layers with a higher number lie behind."""
+        behind = 1.0 + LAYER * layer
+        part.parent = self.camera
+        part.location = (x * behind, y * behind, -self.depth * behind)
+        part.scale = tuple(side * behind for side in part.scale)
+        part.data.materials.append(flat(part.name, colour))
+        part.visible_shadow = part.visible_diffuse = part.visible_glossy = False
+        part.display.show_shadows = False
+        self.scene.collection.objects.link(part)
+        return part
+
+    def write(self, body: str, size: float, x: float, y: float, colour: Colour, align: str = "LEFT") -> Any:
+        """Write a text; return the object, whose `data.body` may be changed."""
+        text = bpy.data.curves.new(body, "FONT")
+        text.body, text.size, text.align_x = body, size, align
+        return self.put(bpy.data.objects.new(body, text), x, y, colour)
+
+    def box(
+        self, name: str, low: tuple[float, float], high: tuple[float, float], colour: Colour, layer: int
+    ) -> Any:
+        """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left."""
+        width, height = high[0] - low[0], high[1] - low[1]
+        corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
+        part = bpy.data.objects.new(name, bridge.mesh(name, (corners, [(0, 1, 2, 3)])))
+        return self.put(part, *low, colour, layer)
+
+
+def of_modes(front: Front, modes: Sequence[Mode]) -> None:
+    """List modes down the picture's left side, each with a dot of its colour."""
+    size = front.letter
+    turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
+    disc = device_shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
+    left, y = LEFT * front.width, 0.86 * front.height
+    for mode in modes:
+        name, lines = mode.name.lower().replace("_", " "), textwrap.wrap(MEANINGS[mode], 26)
+        for radius, colour, layer in ((0.42, COLOURS[mode], 0), (0.47, FADED, 1)):
+            dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
+            dot.scale = (radius * size,) * 3
+            front.put(dot, left, y + 0.33 * size, colour, layer)
+        x, small = left + 0.95 * size, 0.70 * size
+        front.write(name, size, x, y, INK)
+        front.write("\n".join(lines), small, x, y - 1.25 * small, FADED)
+        y -= (1.25 + len(lines)) * small + 1.25 * size
+
+
+def of_forces(front: Front) -> None:
+    """Draw the levels of force as a bar of colours down the picture's left side, their forces beside it."""
+    size, count = front.letter, 1 + len(heat.COLOURS)
+    left, top, step = LEFT * front.width, 0.78 * front.height, 0.95 * size
+    front.write("force on a pin", size, left - 0.4 * size, top + 0.7 * size, INK)
+    low = top - step * count
+    edge = 0.05 * size
+    front.box("edge", (left - edge, low - edge), (left + size + edge, top + edge), FADED, 1)
+    for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS)):
+        y = low + step * level
+        front.box(f"level {level}", (left, y), (left + size, y + step), colour, 0)
+    x, small = left + 1.5 * size, 0.70 * size
+    for level in range(0, count, 3):
+        force = 1e3 * heat.TOP * level / len(heat.COLOURS)
+        said = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
+        # Level 0 is no force at all; every other ends at its force.
+        front.write(said, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
+
+
+def flat(name: str, colour: Colour) -> Any:
+    """Make a material of one colour that no light changes."""
+    material = bpy.data.materials.new(name)
+    *light, alpha = linear(colour)
+    # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue allows.
+    brighter = min(1.0 / STUDIO, 1.0 / max(light))
+    material.diffuse_color = (*(part * brighter for part in light), alpha)
+    material.roughness = 1.0
+    tree = shader_nodes(material)
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value = linear(colour)
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    return material

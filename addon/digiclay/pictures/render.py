@@ -1,0 +1,188 @@
+"""A still of one instant, drawn in the background without touching the user's scene."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from ..compat import bpy, has_denoiser, quiet, scratch
+from ..core.errors import OutputError
+from ..core.shots import Picture, Still
+from ..device import view
+from ..device.instant import Instant
+from . import stage
+
+__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "still", "whole_picture", "why_not"]
+
+#: Our names of the engines, and Blender's.
+ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
+#: With less than this on a disk, bytes, a picture does not fit.
+SPACE = 2**20
+
+
+def still(
+    instant: Instant,
+    out: Path,
+    *,
+    width: int = 1600,
+    height: int = 1000,
+    engine: str = "cycles",
+    samples: int = 6,
+    denoise: bool = True,
+    colour: str = "mode",
+    arrows: bool = False,
+) -> Path:
+    """Draw an instant into a PNG file.
+
+    Parameters
+    ----------
+    instant : Instant
+        What to draw.
+    out : Path
+        The file; it is written under a temporary name and renamed.
+    width, height : int, optional
+        Size of the picture, pixels.
+    engine : {"cycles", "workbench"}, optional
+        Cycles gives soft shadows and runs anywhere; Workbench is quicker and plainer, and
+        wants OpenGL.
+    samples : int, optional
+        Samples per pixel of Cycles; more is smoother and slower in proportion.
+    denoise : bool, optional
+        Smooth what few samples leave, where Blender was built with Cycles' denoiser.
+    colour : {"mode", "force"}, optional
+        What the colour of a pin tells.
+    arrows : bool, optional
+        Draw the force on each pin as an arrow.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    ParameterError
+        On an unknown engine, or a size that makes no picture.
+    OutputError
+        When the file cannot be written.
+    """
+    looks = Still(width=width, height=height, engine=engine, samples=samples, colour=colour, arrows=arrows)
+    partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with scratch():
+            scene = picture_scene("Digital Clay Still", looks, denoise=denoise)
+            bed = view.build(instant, scene.collection)
+            dress(bed, looks)
+            stage.set_up(scene, bed, instant)
+            draw(scene, partial, out)
+        os.replace(partial, out)
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
+    finally:
+        partial.unlink(missing_ok=True)
+    return out
+
+
+def dress(bed: Any, looks: Picture) -> None:
+    """Colour the pins as asked, and show arrows or not."""
+    view.colour_by(bed, looks.colour)
+    view.show_arrows(bed, looks.arrows)
+
+
+def draw(scene: Any, path: Path, out: Path) -> None:
+    """Draw a scene into a PNG file.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    path : Path
+        The file.
+    out : Path
+        What the user knows of it; messages name this.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    scene.render.filepath = str(path)
+    try:
+        path.touch()
+        with quiet():
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        if not whole_picture(path.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {why_not(path)}.")
+    except OSError as error:
+        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
+    except RuntimeError as error:
+        raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
+
+
+def whole_picture(data: bytes) -> bool:
+    """Tell whether a PNG file has its end; Blender does not always tell when a disk is full."""
+    return data[-8:-4] == b"IEND"
+
+
+def why_not(path: Path) -> str:
+    """Return why Blender may not have written a file."""
+    full = shutil.disk_usage(path.parent).free < SPACE
+    return "no space is left on the disk" if full else "Blender wrote no whole file"
+
+
+def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
+    """Add a scene with all that decides a picture besides the scene's contents."""
+    scene = bpy.data.scenes.new(name)
+    render, engine = scene.render, looks.engine
+    render.engine = ENGINES[engine]
+    render.resolution_x, render.resolution_y = looks.width, looks.height
+    render.resolution_percentage = 100
+    render.use_file_extension = False
+    render.image_settings.file_format = "PNG"
+    render.image_settings.color_mode = "RGB"
+    if engine == "cycles":
+        _cycles(scene.cycles, looks.samples, denoise)
+    else:
+        _workbench(scene.display)
+    return scene
+
+
+def hasten(scene: Any) -> None:
+    """Leave out of a film's frames what costs Workbench most on a machine without a graphics card.
+
+    Shadows are two thirds of a frame, and the second half of the samples can hardly be seen.
+    """
+    scene.display.shading.show_shadows = False
+    scene.display.render_aa = "8"
+
+
+def _cycles(cycles: Any, samples: int, denoise: bool) -> None:
+    """Few samples, no surprises: the same picture each time, on any machine."""
+    cycles.device = "CPU"
+    cycles.samples = samples
+    cycles.seed = 0
+    cycles.use_adaptive_sampling = False
+    cycles.max_bounces = 2
+    cycles.use_denoising = denoise and has_denoiser()
+    if cycles.use_denoising:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+        if hasattr(cycles, "denoising_quality"):
+            cycles.denoising_quality = "FAST"
+        cycles.denoising_prefilter = "NONE"
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+
+
+def _workbench(display: Any) -> None:
+    """Plain colours, with shadows and edges that show slopes."""
+    shading = display.shading
+    display.render_aa = "16"
+    display.light_direction = (0.45, 0.35, 0.82)
+    shading.light = "STUDIO"
+    shading.color_type = "MATERIAL"
+    shading.show_shadows = True
+    shading.shadow_intensity = 0.45
+    shading.background_type = "WORLD"
+    shading.show_cavity = True
+    shading.cavity_type = "BOTH"

@@ -1,0 +1,178 @@
+"""Everything about a picture but the device: camera, lights, floor; and the legend before it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import bridge
+from ..compat import bpy, shader_nodes
+from ..core.modes import Mode
+from ..device import view
+from ..device.instant import Instant
+from .legend import Front, of_forces, of_modes
+
+__all__ = ["MARGINS", "camera_place", "half_frame", "outline", "set_up"]
+
+Floats = NDArray[np.float64]
+
+#: Where the camera stands, seen from the bed: angle from x and above the floor, rad.
+AZIMUTH, ELEVATION = math.radians(-62.0), math.radians(43.0)
+LENS, SENSOR = 62.0, 36.0
+Margins = tuple[float, float, float, float]
+#: Parts of the picture's width or height kept free: left, right, below, above.
+MARGINS = (0.25, 0.03, 0.05, 0.05)
+#: sRGB of the floor.
+FLOOR = (0.80, 0.81, 0.82)
+
+
+def set_up(
+    scene: Any,
+    bed: Any,
+    instant: Instant,
+    *,
+    points: Floats | None = None,
+    modes: Sequence[Mode] | None = None,
+    margins: Margins = MARGINS,
+) -> Front:
+    """Put camera, lights, floor and legend about a bed that stands at the origin of `scene`.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Engine and size of the picture are set.
+    bed : bpy.types.Object
+    instant : Instant
+        What the bed shows.
+    points : ndarray (k, 3), optional
+        What must be seen, Blender units; the bed's outline as it stands when left out.
+    modes : sequence of Mode, optional
+        What the legend explains; the modes present when left out.
+    margins : tuple of float, optional
+        As `MARGINS`.
+
+    Returns
+    -------
+    Front
+        The plane before the camera, for whatever else is to be written there.
+    """
+    points = outline(bed) if points is None else points
+    floor = float(points[:, 2].min())
+    span = float(np.ptp(points, axis=0).max())
+    camera = _camera(scene, points, margins)
+    if scene.render.engine == "CYCLES":
+        _floor(scene, floor, 60.0 * span)
+    _lights(scene)
+    front = Front.before(scene, camera, half_frame(scene))
+    if view.coloured_by(bed) == "force":
+        of_forces(front)
+    else:
+        of_modes(front, instant.modes if modes is None else modes)
+    return front
+
+
+def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the nearest place from which all points fall inside the frame.
+
+    Parameters
+    ----------
+    points : ndarray (k, 3)
+        What must be seen.
+    axes : ndarray (3, 3)
+        The camera's right, up and backward directions as rows.
+    low, high : ndarray (2,)
+        Slopes (sideways and upwards, over depth) of the frame's edges, low < high.
+
+    Notes
+    -----
+    A point at camera coordinates (u, v, -d) is inside when low d <= (u, v) <= high d. In
+    each direction the two extreme points give a depth and an offset in closed form; the
+    larger depth counts, and the other direction is centred in what is then free.
+    """
+    seen = points @ axes.T
+    across, back = seen[:, :2], seen[:, 2:]
+    top = (across + high * back).max(axis=0)
+    bottom = (across + low * back).min(axis=0)
+    depth = float(((top - bottom) / (high - low)).max())
+    offset = ((top - high * depth) + (bottom - low * depth)) / 2
+    return np.array([*offset, depth]) @ axes
+
+
+def outline(bed: Any) -> Floats:
+    """Return the points of housing and fingertip and the pin tops, (k, 3) in Blender units.
+
+    The bed stands at the origin; `matrix_basis` is right without an update of the scene.
+    """
+    clouds = []
+    for part in (bed, *bed.children_recursive):
+        if part.type != "MESH":
+            continue
+        flat = np.empty(3 * len(part.data.vertices), np.float32)
+        part.data.vertices.foreach_get("co", flat)
+        cloud = flat.reshape(-1, 3)
+        while part is not None:
+            matrix = np.array(part.matrix_basis)
+            cloud, part = cloud @ matrix[:3, :3].T + matrix[:3, 3], part.parent
+        clouds.append(cloud)
+    return np.concatenate(clouds)
+
+
+def _camera(scene: Any, points: Floats, margins: Margins) -> Any:
+    """Add the camera that frames the points."""
+    data = bpy.data.cameras.new("Digital Clay Camera")
+    data.lens, data.sensor_width, data.sensor_fit = LENS, SENSOR, "HORIZONTAL"
+    camera = bpy.data.objects.new(data.name, data)
+    scene.collection.objects.link(camera)
+    level = math.cos(ELEVATION)
+    backward = np.array([math.cos(AZIMUTH) * level, math.sin(AZIMUTH) * level, math.sin(ELEVATION)])
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(backward, right), backward])
+    width, height = half_frame(scene)
+    left, right_, below, above = margins
+    low = np.array([-width * (1 - 2 * left), -height * (1 - 2 * below)])
+    high = np.array([width * (1 - 2 * right_), height * (1 - 2 * above)])
+    place = camera_place(points, axes, low, high)
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = axes.T, place
+    camera.matrix_world = matrix.T.tolist()
+    distance = float(np.linalg.norm(points - place, axis=1).max())
+    data.clip_start, data.clip_end = distance * 1e-3, distance * 200.0
+    scene.camera = camera
+    return camera
+
+
+def half_frame(scene: Any) -> tuple[float, float]:
+    """Return half the frame's width and height at depth 1."""
+    width = SENSOR / 2 / LENS
+    return width, width * scene.render.resolution_y / scene.render.resolution_x
+
+
+def _floor(scene: Any, height: float, size: float) -> None:
+    """Add the plane the housing stands on."""
+    square = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
+    square = np.column_stack([square, np.full(4, height)])
+    mesh = bridge.mesh("Digital Clay Floor", (square, [(0, 1, 2, 3)]))
+    mesh.materials.append(view.material("floor", FLOOR, roughness=0.9))
+    scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
+
+
+def _lights(scene: Any) -> None:
+    """Light from the left and behind, low enough that slopes show; the sky fills the shadows."""
+    data = bpy.data.lights.new("Digital Clay Sun", "SUN")
+    data.energy, data.angle = 2.6, math.radians(5.0)
+    sun = bpy.data.objects.new(data.name, data)
+    sun.rotation_euler = (math.radians(48.0), 0.0, AZIMUTH + math.radians(90.0 - 118.0))
+    scene.collection.objects.link(sun)
+    world = bpy.data.worlds.new("Digital Clay Sky")
+    tree = shader_nodes(world)
+    sky = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    sky.inputs["Color"].default_value = bridge.linear((0.90, 0.94, 1.0))
+    sky.inputs["Strength"].default_value = 0.5
+    world.color = bridge.linear(FLOOR)[:3]  # what Workbench shows behind everything
+    scene.world = world
+    scene.view_settings.view_transform = "Standard"

@@ -1,0 +1,1 @@
+"""Plots of runs, sweeps and benchmarks, with matplotlib."""

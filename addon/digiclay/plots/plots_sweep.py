@@ -1,0 +1,146 @@
+"""Pictures of a sweep: a line with markers over one axis, a heat map over two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.sweep import FIGURES
+from ..core.sweep_folder import Column
+from .plots import INK, LINES, _figure, _save
+
+if TYPE_CHECKING:  # only named in annotations
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["picture", "sweep_figure"]
+
+Floats = NDArray[np.float64]
+
+#: Units people read: factor and name.
+READ: dict[str, tuple[float, str]] = {
+    "m": (1e3, "mm"), "m3": (1e9, "mm³"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm²/s"),
+    "kg/m3": (1.0, "kg/m³"), "m/s": (1e3, "mm/s"), "1": (1.0, ""),
+}  # fmt: skip
+#: Cells of a heat map along a side whose values are still written into it.
+WRITTEN = 10
+#: Most labels on an axis.
+LABELS = 12
+
+
+def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Path) -> Path:
+    """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    return _save(sweep_figure(columns, name, values), out)
+
+
+def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure:
+    """Draw a figure over the one or two axes of a sweep.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        One or two.
+    name : str
+        A key of `sweep.FIGURES`.
+    values : ndarray
+        One dimension a column; NaN where a point failed or has no such figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its axes, by label: ``sweep``; with two columns also ``scale``.
+    """
+    unit, meaning = FIGURES[name]
+    factor, read = _read(unit, values)
+    label = f"{name} ({read})" if read else name
+    with _figure(9.0, 5.2 if len(columns) == 1 else 6.0) as (figure, place):
+        # The meaning is a sentence: it goes above the axes, and the key beside them.
+        figure.text(0.75 / 9.0, 0.955, meaning[0].upper() + meaning[1:], va="top", fontsize=11)
+        if len(columns) == 1:
+            _draw_line(place("sweep", 0.95, 0.8, 7.6, 3.75), columns[0], values * factor, label)
+        else:
+            axes, scale = place("sweep", 1.45, 0.85, 5.9, 4.5), place("scale", 7.55, 0.85, 0.2, 4.5)
+            _draw_map(axes, scale, columns, values * factor, label)
+    return figure
+
+
+def _read(unit: str, values: Any) -> tuple[float, str]:
+    """Return factor and name of the unit people read; times below half a second are read in ms."""
+    if unit == "s":
+        known = [abs(value) for value in np.ravel(values) if np.isfinite(value)]
+        return (1e3, "ms") if known and max(known) < 0.5 else (1.0, "s")
+    return READ.get(unit, (1.0, unit))
+
+
+def _draw_line(axes: Axes, column: Column, values: Floats, label: str) -> None:
+    """Draw a line with a marker for each point."""
+    shown, along = _shown(column)
+    if column.numeric:
+        order = np.argsort(shown)
+        axes.plot(shown[order], values[order], "o-", color=LINES[0], markersize=6)
+        axes.set_xscale("log" if column.logarithmic else "linear")
+        missing = shown[np.isnan(values)]
+    else:
+        place = np.arange(len(values))
+        axes.plot(place, values, "o", color=LINES[0], markersize=8)
+        axes.set_xticks(place, [str(value) for value in column.values])
+        axes.set_xlim(-0.5, len(values) - 0.5)
+        missing = place[np.isnan(values)]
+    if missing.size:
+        across = axes.get_xaxis_transform()
+        axes.plot(
+            missing, np.full(missing.size, 0.03), "x", color=LINES[1], transform=across, label="no result"
+        )
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    axes.set(xlabel=along, ylabel=label)
+
+
+def _draw_map(axes: Axes, scale: Axes, columns: Sequence[Column], values: Floats, label: str) -> None:
+    """Draw a heat map: every point one cell of equal size, the first axis to the right."""
+    shown = np.ma.masked_invalid(values.T)
+    axes.set_facecolor("#DDDDDD")
+    field = axes.pcolormesh(shown, cmap="cividis", edgecolors="white", linewidth=0.6)
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    for column, ticks, name in zip(
+        columns, (axes.set_xticks, axes.set_yticks), (axes.set_xlabel, axes.set_ylabel), strict=True
+    ):
+        read, along = _shown(column)
+        words = [f"{value:.4g}" if column.numeric else str(value) for value in read]
+        every = -(-len(words) // LABELS)
+        ticks(np.arange(len(words))[::every] + 0.5, words[::every])
+        name(along)
+    axes.tick_params(length=0)
+    if max(values.shape) <= WRITTEN:
+        _write_values(axes, shown)
+    elif np.isnan(values).any():
+        axes.text(1.0, 1.015, "grey: no result", transform=axes.transAxes, ha="right")
+    figure: Any = axes.figure
+    figure.colorbar(field, cax=scale, label=label).outline.set_visible(False)
+    scale.grid(False)
+
+
+def _write_values(axes: Axes, shown: Any) -> None:
+    """Write each value into its cell, light on dark and dark on light."""
+    low, high = shown.min(), shown.max()
+    for (row, column), value in np.ndenumerate(shown.filled(np.nan)):
+        known = np.isfinite(value)
+        bright = not known or high == low or (value - low) / (high - low) > 0.5
+        axes.text(
+            column + 0.5, row + 0.5, f"{value:.3g}" if known else "×", ha="center", va="center",
+            fontsize=9.5, color=INK if bright else "white",
+        )  # fmt: skip
+
+
+def _shown(column: Column) -> tuple[Any, str]:
+    """Return an axis's values in the unit people read, and its label."""
+    if not column.numeric:
+        return list(column.values), column.key
+    values = np.array(column.values, dtype=np.float64)
+    factor, unit = _read(column.unit, values)
+    return values * factor, f"{column.key} ({unit})" if unit else column.key

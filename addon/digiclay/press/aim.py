@@ -1,0 +1,118 @@
+"""What the mouse points at: which bed of a view, and where on its pins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import bridge
+from ..bridge import SCALE
+from ..core.errors import DigiclayError
+from ..core.layout import Grid, grid
+from ..core.pointing import meeting, ray
+from ..device import view
+from ..live import running
+from ..settings import properties
+
+__all__ = ["Target", "meets", "on_screen", "surface", "target"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A place on the pins of a bed.
+
+    Attributes
+    ----------
+    bed : bpy.types.Object
+        Not to be kept: undo invalidates it.
+    grid : Grid
+    height : ndarray (n,)
+        Heights of the pin tops, m.
+    point : ndarray (3,)
+        Where the ray met them, in the bed's space, m.
+    """
+
+    bed: Any
+    grid: Grid
+    height: Floats
+    point: Floats
+
+    @property
+    def pin(self) -> int:
+        """The pin at that place."""
+        return int(self.grid.at(self.point[:1], self.point[1:2])[0])
+
+
+def target(context: Any, xy: tuple[float, float]) -> Target | None:
+    """Return the nearest place on a visible bed under a pixel of the context's region.
+
+    A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
+    through; pressing on it says why.
+    """
+    found, nearest = None, np.inf
+    for bed in context.visible_objects:
+        if not view.is_bed(bed):
+            continue
+        try:
+            cells, height = surface(bed)
+            point = meets(context, bed, cells, height, xy)
+        except DigiclayError:
+            continue
+        if point is None:
+            continue
+        origin, direction = _ray(context, bed, xy)
+        distance = bridge.uniform(bed) * float((point - origin) @ direction)
+        if distance < nearest:
+            found, nearest = Target(bed, cells, height, point), distance
+    return found
+
+
+def surface(bed: Any) -> tuple[Grid, Floats]:
+    """Return where a bed's pins stand and how high: from its session, or as they are drawn.
+
+    Raises
+    ------
+    DigiclayError
+        When the bed's settings do not describe it.
+    """
+    session = running.of(bed)
+    if session is not None:
+        return session.system.grid, session.state.row(0)
+    return grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
+
+
+def meets(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
+    """Return where the ray through a pixel meets a bed's pins (3,), m; None when it passes by.
+
+    Raises
+    ------
+    DigiclayError
+        When the bed is not uniformly scaled.
+    """
+    origin, direction = _ray(context, bed, xy)
+    return meeting(cells, height, origin, direction)
+
+
+def on_screen(context: Any, bed: Any, points: Floats) -> Floats:
+    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
+    to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
+    clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
+    depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
+    size = np.array([context.region.width, context.region.height])
+    return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
+
+
+def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Floats]:
+    """Return the ray through a pixel in the bed's space: origin, m, and direction of length 1."""
+    bridge.uniform(bed)
+    looking, region = context.region_data, context.region
+    lens = np.array(looking.window_matrix, np.float64)
+    seen = np.array(looking.view_matrix, np.float64) @ np.array(bed.matrix_world, np.float64)
+    screen = 2.0 * np.array(xy) / [region.width, region.height] - 1.0
+    origin, way = ray(lens, seen, screen)
+    return origin / SCALE, way

@@ -1,0 +1,98 @@
+"""The Press tool in the 3D view's toolbar, and the patch it shows under the mouse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import bridge
+from ..compat import bpy
+from ..core.layout import Grid
+from ..core.pointing import patch
+from ..device import view
+from ..overlay.picture import Line
+from . import aim
+
+__all__ = ["PressTool", "outline", "register", "unregister"]
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: Colours of the patch: a light line on a dark one is seen on everything.
+DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
+
+
+def outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
+    """Return the rim of what a bed's finger would touch at a place, lying on the pins, (k, 3), m.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+        With a fingertip.
+    cells : Grid
+    height : ndarray (n,)
+        Heights of the pins, m.
+    place : ndarray (3,)
+        Where the mouse points, m.
+    depth : float
+        How deep it would be pressed, m.
+    """
+    tip = view.fingertip_of(bed)
+    rim = place[:2] + patch(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
+    return np.column_stack([rim, height[cells.at(rim[:, 0], rim[:, 1])]])
+
+
+def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
+    """Draw the patch under the mouse; Blender hands the place over in pixels of the window."""
+    from ..overlay import overlay_draw  # needs a graphics card: not there in the background
+
+    region = context.region
+    if region is None or region.type != "WINDOW" or context.mode != "OBJECT":
+        return
+    found = aim.target(context, (xy[0] - region.x, xy[1] - region.y))
+    if found is None or view.fingertip_of(found.bed) is None:
+        return
+    depth = 1e-3 * tool.operator_properties("digiclay.press").depth
+    rim = outline(found.bed, found.grid, found.height, found.point, depth)
+    points = aim.on_screen(context, found.bed, np.concatenate([rim, rim[:1]]))
+    points += (region.x, region.y)
+    if not np.isfinite(points).all():
+        return
+    width = context.preferences.system.pixel_size
+    overlay_draw.cursor([Line(points, DARK, 4.0 * width), Line(points, LIGHT, 2.0 * width)])
+
+
+class PressTool(bpy.types.WorkSpaceTool):  # type: ignore[misc]
+    """Sculpt with the fingertip under the mouse."""
+
+    bl_space_type = "VIEW_3D"
+    bl_context_mode = "OBJECT"
+    bl_idname = "digiclay.press_tool"
+    bl_label = "Press"
+    bl_description = (
+        "Press the fingertip into a bed of Digital Clay.\n"
+        "Drag to sculpt; the wheel, or Ctrl and drag, sets how deep; a pen presses by itself"
+    )
+    bl_icon = "ops.transform.push_pull"
+    bl_keymap = (
+        ("digiclay.press", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        ("digiclay.press", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
+    )
+    draw_cursor = staticmethod(_draw_cursor)
+
+    @staticmethod
+    def draw_settings(context: Any, layout: Any, tool: Any) -> None:
+        """Draw the tool's settings into the header."""
+        settings = tool.operator_properties("digiclay.press")
+        layout.prop(settings, "depth")
+        layout.prop(settings, "use_pressure")
+
+
+def register() -> None:
+    """Add the tool at the end of the toolbar."""
+    bpy.utils.register_tool(PressTool, separator=True)
+
+
+def unregister() -> None:
+    """Take the tool away; whoever has it in hand gets the first one."""
+    bpy.utils.unregister_tool(PressTool)

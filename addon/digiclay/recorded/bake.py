@@ -1,0 +1,233 @@
+"""Baking a session into the bed: ordinary animation that plays and renders without the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import bridge
+from ..compat import bpy, curves, keyframe_node_setting, set_node_setting
+from ..core.assembly import assemble
+from ..core.errors import DigiclayError
+from ..core.fingertip import Fingertip
+from ..core.keeping import unpacked
+from ..core.live import lived
+from ..core.take import Take
+from ..device import view
+from .bake_tree import MOMENT, pins_at_moment
+
+__all__ = ["Moments", "apply", "frames_in", "free", "is_baked", "moments_of", "sampled"]
+
+Floats = NDArray[np.float64]
+#: Name of the modifier.
+MODIFIER = "Baked session"
+#: Role of the object that holds the baked pins; it stands in no scene.
+BAKE = "bake"
+#: Frame ranges longer than this are a slip of the hand: an hour at 60 frames a second.
+MOST_FRAMES = 216_000
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What a bake shows, a row a frame.
+
+    Attributes
+    ----------
+    position : ndarray (n, 2)
+        Axes of the pins, m.
+    height : ndarray (t, n)
+        m.
+    mode : ndarray (t, n) of int8
+    force : ndarray (t, n)
+        N.
+    pose : ndarray (t, 7)
+        Of the fingertip.
+    """
+
+    position: Floats
+    height: NDArray[np.float32]
+    mode: NDArray[np.int8]
+    force: NDArray[np.float32]
+    pose: Floats
+
+
+def frames_in(take: Take, rate: float) -> NDArray[np.intp]:
+    """Return the control period, 0 to t, that each frame of a take shows: the nearest one."""
+    period = take.scene.simulation.control_period
+    count = int(np.floor(take.duration * rate + 1e-6)) + 1
+    return np.minimum(np.rint(np.arange(count) / (rate * period)).astype(np.intp), take.periods)
+
+
+def moments_of(take: Take, rate: float) -> Iterator[float | Moments]:
+    """Simulate a take and keep what each frame shows.
+
+    Parameters
+    ----------
+    take : Take
+    rate : float
+        Frames a second.
+
+    Yields
+    ------
+    float
+        The share that is done, after each control period; last of all the `Moments`.
+    """
+    wanted = frames_in(take, rate)
+    system = assemble(take.scene)
+    count = system.grid.count
+    height = np.empty((wanted.size, count), np.float32)
+    force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
+    frame, start = 0, unpacked(system, take.start)
+    for period, state in enumerate(chain([start], lived(system, start, take.poses))):
+        while frame < wanted.size and wanted[frame] == period:
+            height[frame], force[frame] = state.row(0), state.row(system.rows.force)
+            mode[frame] = state.mode()
+            frame += 1
+        yield period / take.periods
+    yield Moments(system.grid.positions, height, mode, force, take.poses[wanted])
+
+
+def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
+    """Give a bed a bake, in place of an older one.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    moments : Moments
+    first : int
+        Frame of the first moment.
+    finger : Fingertip
+    keyframe_finger : bool
+        Whether the fingertip gets keyframes as well, in place of those it has.
+    """
+    free(bed)
+    count = len(moments.height)
+    modifier = bed.modifiers.new(MODIFIER, "NODES")
+    modifier.node_group = pins_at_moment(_held(moments), count)
+    bed.modifiers.move(len(bed.modifiers) - 1, 0)
+    modifier = bed.modifiers[0]
+    for row in (0, count - 1):
+        set_node_setting(modifier, MOMENT, float(row))
+        keyframe_node_setting(modifier, MOMENT, first + row)
+    for _, curve in _curves(bed):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    tip = view.fingertip_of(bed)
+    if keyframe_finger and tip is not None:
+        tip.animation_data_clear()
+        for row, pose in enumerate(moments.pose):
+            bridge.place_fingertip(tip, pose, finger)
+            tip.keyframe_insert("location", frame=first + row)
+            tip.keyframe_insert("rotation_quaternion", frame=first + row)
+
+
+def is_baked(bed: Any) -> bool:
+    """Tell whether a bed plays a bake."""
+    return _modifier(bed) is not None
+
+
+def free(bed: Any) -> bool:
+    """Take a bed's bake away; tell whether it had one. Keyframes of the fingertip stay."""
+    modifier = _modifier(bed)
+    if modifier is None:
+        return False
+    for owner, curve in list(_curves(bed)):
+        owner.remove(curve)
+    tree = modifier.node_group
+    bed.modifiers.remove(modifier)
+    if not tree.users:
+        held = _source(tree)
+        bpy.data.node_groups.remove(tree)
+        if held is not None and not held.users:
+            bpy.data.meshes.remove(held.data)  # takes the object along
+    return True
+
+
+def sampled(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
+    """Read the path of an animated fingertip, frame by frame and in between.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Its current frame is put back in the end.
+    bed : bpy.types.Object
+    first, last : int
+        Frames.
+    period : float
+        Control period, s: a pose is read at the end of each.
+
+    Yields
+    ------
+    float
+        The share that is done, after each pose; last of all the poses (t + 1, 7).
+
+    Raises
+    ------
+    DigiclayError
+        When the range has no frame, or more than an hour of them, or the bed has no fingertip.
+    """
+    if not 0 < last - first <= MOST_FRAMES:
+        rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
+        raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
+    rate = scene.render.fps / scene.render.fps_base
+    count = int(np.floor((last - first) / rate / period + 1e-6))
+    kept = scene.frame_current, scene.frame_subframe
+    poses = np.empty((count + 1, 7))
+    try:
+        for row in range(count + 1):
+            whole, part = divmod(first + row * period * rate, 1.0)
+            scene.frame_set(int(whole), subframe=part)
+            tip = view.fingertip_of(bed)
+            if tip is None:
+                raise DigiclayError(f"{bed.name} has no fingertip: undo its removal.")
+            poses[row] = bridge.pose(tip)
+            yield row / count
+    finally:
+        scene.frame_set(kept[0], subframe=kept[1])
+    yield poses
+
+
+def _modifier(bed: Any) -> Any | None:
+    """Return the modifier that plays a bake, whatever its name is now, or None."""
+    for modifier in bed.modifiers:
+        if modifier.type == "NODES" and modifier.node_group and _source(modifier.node_group) is not None:
+            return modifier
+    return None
+
+
+def _source(tree: Any) -> Any | None:
+    """Return the object that holds the baked pins a tree plays, or None when it plays none."""
+    for node in tree.nodes:
+        held = node.inputs["Object"].default_value if node.bl_idname == "GeometryNodeObjectInfo" else None
+        if held is not None and held.get(view.ROLE) == BAKE:
+            return held
+    return None
+
+
+def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:
+    """Give the curves that drive a bed's bake, each with what it can be removed from."""
+    modifier = _modifier(bed)
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]' if modifier else None
+    for group in curves(bed):
+        yield from ((group, curve) for curve in group if start and curve.data_path.startswith(start))
+
+
+def _held(moments: Moments) -> Any:
+    """Make the object that holds the pins moment after moment; it stands in no scene."""
+    count, pins = moments.height.shape
+    mesh = bridge.points("Digital Clay Bake", count * pins)
+    bridge.write_cells(
+        mesh,
+        np.tile(moments.position, (count, 1)),
+        moments.height.ravel(),
+        mode=moments.mode.ravel(),
+        force=moments.force.ravel(),
+    )
+    made = bpy.data.objects.new(mesh.name, mesh)
+    made[view.ROLE] = BAKE
+    return made

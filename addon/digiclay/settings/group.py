@@ -1,0 +1,149 @@
+"""The property groups of a bed's settings, and what choosing a preset, a method or a layout sets along."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from .. import bridge
+from ..compat import bpy
+from ..core.methods import METHODS
+from ..core.quantity import quantities
+from ..core.scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
+from ..core.scene_table import HEXAGONAL_SHARE, PRESETS
+from ..device import view
+from .property_groups import Update, group, title
+from .settings_table import assign, read, reset
+
+__all__ = ["CLASSES", "PLAIN", "PRESET_WORDS", "SETTINGS", "method_items"]
+
+#: Sections whose parameters are the same whatever the method.
+PLAIN = tuple(section for section in SECTIONS if section != "control")
+
+PRESET_WORDS = {
+    "paper": "The device of the paper",
+    "fast": "A wider orifice: pins move faster",
+    "viscous": "A wider orifice and a silicone oil twice as viscous",
+}
+
+
+def take_preset(settings: Any, context: Any) -> None:
+    """Set what the chosen preset, or another one, changes of the defaults."""
+    changed = {
+        (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
+    }
+    for section, name in sorted(changed):
+        own, kind = getattr(settings, section), parameters(section, settings.method)
+        values = PRESETS[settings.preset].get(section, {})
+        if name in values:
+            assign(own, kind, name, values[name])
+        else:
+            reset(own, kind, name)
+
+
+def take_method(settings: Any, context: Any) -> None:
+    """Set the blister the chosen method is made for."""
+    values = METHODS[settings.method].blister
+    if values is None:
+        return
+    kind = parameters("blister", settings.method)
+    for name in quantities(kind):
+        if name in values:
+            assign(settings.blister, kind, name, values[name])
+        else:
+            reset(settings.blister, kind, name)
+
+
+def take_arrangement(layout: Any, context: Any) -> None:
+    """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
+    settings = layout.id_data.digiclay
+    kind = parameters("contact", settings.method)
+    if layout.arrangement == "hexagonal":
+        assign(settings.contact, kind, "share", HEXAGONAL_SHARE)
+    else:
+        reset(settings.contact, kind, "share")
+
+
+def take_size(fingertip: Any, context: Any) -> None:
+    """Show the fingertip in its new size."""
+    bed = fingertip.id_data
+    tip = view.fingertip_of(bed)
+    kind = parameters("fingertip", bed.digiclay.method)
+    if tip is not None:
+        bridge.resize_fingertip(tip, kind(**read(fingertip, kind, {}, "fingertip")))
+
+
+#: What happens after a change, by section and field.
+UPDATES: dict[str, dict[str, Update]] = {
+    "layout": {"arrangement": take_arrangement},
+    "fingertip": dict.fromkeys(("length", "width", "height"), take_size),
+}
+
+
+def method_items() -> list[tuple[str, str, str]]:
+    """Return the methods with what their modules say of themselves."""
+    words = {
+        name: importlib.import_module(f"..core.{method.module}", __package__).__doc__ or ""
+        for name, method in METHODS.items()
+    }
+    return [(name, title(name), said.partition("\n")[0].removesuffix(".")) for name, said in words.items()]
+
+
+def use_properties() -> dict[str, Any]:
+    """Return a switch for every part a scene may leave out."""
+    switches = {}
+    for section in OPTIONAL:
+        along = [other for other, needed in NEEDS.items() if needed == section and other not in OPTIONAL]
+        words = " and ".join([title(section).lower(), *(title(other).lower() for other in along)])
+        switches[f"use_{section}"] = bpy.props.BoolProperty(
+            name=title(section),
+            description=f"Simulate the {words}; left out, it costs nothing",
+            default=section not in UNASKED,
+        )
+    return switches
+
+
+def made(name: str, words: str, properties: dict[str, Any]) -> type:
+    """Make a property group of properties."""
+    content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
+    return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
+
+
+def pointers(groups: dict[str, type]) -> dict[str, Any]:
+    """Return a pointer to each group."""
+    return {name: bpy.props.PointerProperty(type=kind, name=title(name)) for name, kind in groups.items()}
+
+
+METHOD_GROUPS = {name: group(name, parameters("control", name), {}) for name in METHODS}
+CONTROL = made("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
+GROUPS = {
+    section: group(section, parameters(section, "virtual_master"), UPDATES.get(section, {}))
+    for section in PLAIN
+}
+SETTINGS = made(
+    "settings",
+    "Every parameter of a bed's scene.",
+    {
+        "preset": bpy.props.EnumProperty(
+            name="Preset",
+            description="Fluid and valves; choosing one sets their parameters",
+            items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
+            update=take_preset,
+        ),
+        "method": bpy.props.EnumProperty(
+            name="Method",
+            description="How the cells are controlled; choosing one sets the blister it is made for",
+            items=method_items(),
+            default="virtual_master",
+            update=take_method,
+        ),
+        "own_preset": bpy.props.StringProperty(
+            name="Own Preset", description="The preset of your own that was applied last", options={"HIDDEN"}
+        ),
+        "notes": bpy.props.StringProperty(options={"HIDDEN"}),
+        **use_properties(),
+        **pointers({**GROUPS, "control": CONTROL}),
+    },
+)
+#: In the order they are registered: a group comes after those it points to.
+CLASSES = (*METHOD_GROUPS.values(), *GROUPS.values(), CONTROL, SETTINGS)

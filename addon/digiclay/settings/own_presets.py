@@ -1,0 +1,85 @@
+"""The presets a user has saved: scene files in the extension's own folder, which hold data and no code."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..compat import PACKAGE, bpy
+from ..core.errors import OutputError
+from ..core.scene import Scene
+from ..core.scene_table import PRESETS, text
+
+__all__ = ["folder", "names", "path", "remove", "save"]
+
+#: Longest name, so that the file's stays within what file systems take.
+LONGEST = 60
+#: What no file's name can have on one system or another.
+FORBIDDEN = frozenset('<>:"/\\|?*')
+
+
+def folder() -> Path:
+    """Return the folder of the presets, which need not be there yet."""
+    if PACKAGE.startswith("bl_ext."):
+        return Path(bpy.utils.extension_path_user(PACKAGE, path="presets"))
+    # Run from its source it is no extension, and has no folder of its own.
+    return Path(bpy.utils.user_resource("SCRIPTS", path=str(Path("presets", "digiclay"))))
+
+
+def names() -> list[str]:
+    """Return the names of the user's own presets in the order of the alphabet."""
+    return sorted((file.stem for file in folder().glob("*.toml")), key=str.casefold)
+
+
+def path(name: str) -> Path:
+    """Return the file of a preset.
+
+    Raises
+    ------
+    OutputError
+        When a preset cannot have that name.
+    """
+    plain = name.strip()
+    if not plain or len(plain) > LONGEST or plain.startswith("."):
+        rule = f"must be a name of 1 to {LONGEST} letters that does not start with a dot"
+        raise OutputError(f"The preset's name {rule} (got {name!r}).")
+    if not plain.isprintable() or set(plain) & FORBIDDEN or plain.endswith("."):
+        rule = "must be of letters that a file's name can have on every system"
+        raise OutputError(f"The preset's name {rule} (got {name!r}).")
+    if plain.casefold() in PRESETS:
+        raise OutputError(f"The preset's name must not be {', '.join(PRESETS)} (got {name!r}).")
+    return folder() / f"{plain}.toml"
+
+
+def save(name: str, scene: Scene) -> Path:
+    """Save a scene as a preset, in place of one of the same name.
+
+    Raises
+    ------
+    OutputError
+        When a preset cannot have that name, or its file cannot be written.
+    """
+    file = path(name)
+    partial = file.with_suffix(".partial")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(text(scene), encoding="utf-8")
+        os.replace(partial, file)
+    except OSError as error:
+        raise OutputError(f"Cannot write {file}: {error.strerror or error}.") from None
+    return file
+
+
+def remove(name: str) -> None:
+    """Remove a preset.
+
+    Raises
+    ------
+    OutputError
+        When there is none, or its file cannot be removed.
+    """
+    file = path(name)
+    try:
+        file.unlink()
+    except OSError as error:
+        raise OutputError(f"Cannot remove {file}: {error.strerror or error}.") from None

@@ -1,0 +1,150 @@
+"""The settings of a bed: every parameter of its scene, kept in the .blend as `Object.digiclay`.
+
+A scene is made of them and of nothing else, so what the panels show is what is simulated.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ..compat import bpy
+from ..core.errors import ParameterError
+from ..core.methods import METHODS
+from ..core.quantity import Parameters
+from ..core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
+from ..core.scene_table import ABSENT, resolve
+from ..device.pins_drawn import differs
+from . import settings_table
+from .group import CLASSES, SETTINGS
+from .words import named
+
+__all__ = ["adopt", "described", "part_group", "register", "scene_of", "stale", "table_of", "unregister"]
+
+
+def scene_of(bed: Any) -> Scene:
+    """Return the scene a bed's settings describe; the finger's path is one press in the middle.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+
+    Raises
+    ------
+    ParameterError
+        Its owner and field are those of the panels.
+    """
+    scene = described(bed)
+    reason = differs(bed, scene.layout)
+    if reason:
+        plan = scene.layout
+        rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in the Device panel."
+        raise ParameterError("Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy)
+    return scene
+
+
+def described(bed: Any) -> Scene:
+    """Return the scene a bed's settings describe, whatever the bed looks like by now; as `scene_of`."""
+    try:
+        return resolve(table_of(bed))
+    except ParameterError as error:
+        raise named(error) from None
+
+
+def table_of(bed: Any) -> dict[str, Any]:
+    """Return a bed's settings as the tables of a scene file.
+
+    Raises
+    ------
+    ParameterError
+        On a list that cannot be read; its owner is the section.
+    """
+    settings = bed.digiclay
+    method, notes = settings.method, _notes(settings)
+    table: dict[str, Any] = {"name": _printable(bed.name), "preset": settings.preset}
+    for section in SECTIONS:
+        if section in OPTIONAL and not getattr(settings, f"use_{section}"):
+            table[section] = ABSENT
+        elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
+            continue
+        elif section != "blister" or METHODS[method].blister is not None:
+            own = part_group(settings, section)
+            kind = parameters(section, method)
+            values = settings_table.read(own, kind, notes.get(_key(section, method), {}), section)
+            table[section] = {key: _path(value) for key, value in values.items()}
+    if settings.use_control:
+        table["control"]["method"] = method
+    return table
+
+
+def adopt(bed: Any, scene: Scene) -> None:
+    """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    scene : Scene
+        Its name, description and path are not settings of a bed.
+    """
+    settings = bed.digiclay
+    # These two first: choosing them by hand sets others along with them.
+    settings.preset, settings.method = scene.preset, scene.method
+    notes = _notes(settings)
+    for section in SECTIONS:
+        part: Parameters | None = getattr(scene, section)
+        if section in OPTIONAL:
+            setattr(settings, f"use_{section}", part is not None)
+        if part is not None:
+            own = part_group(settings, section)
+            notes[_key(section, scene.method)] = settings_table.write(own, part)
+    settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
+
+
+def stale(bed: Any) -> str:
+    """Return why a bed no longer shows the pins its settings describe, or an empty text."""
+    settings = bed.digiclay
+    notes = _notes(settings).get("layout", {})
+    kind = parameters("layout", settings.method)
+    return differs(bed, kind(**settings_table.read(settings.layout, kind, notes, "layout")))
+
+
+def part_group(settings: Any, section: str) -> Any:
+    """Return the property group of a section; that of the control is its method's."""
+    if section == "control":
+        return getattr(settings.control, settings.method)
+    return getattr(settings, section)
+
+
+def register() -> None:
+    """Register the groups and hang them onto objects."""
+    for kind in CLASSES:
+        bpy.utils.register_class(kind)
+    bpy.types.Object.digiclay = bpy.props.PointerProperty(type=SETTINGS, name="Digital Clay")
+
+
+def unregister() -> None:
+    """Undo `register` in the opposite order."""
+    del bpy.types.Object.digiclay
+    for kind in reversed(CLASSES):
+        bpy.utils.unregister_class(kind)
+
+
+def _notes(settings: Any) -> dict[str, settings_table.Notes]:
+    """Return what was noted of values the properties cannot hold, by part."""
+    return json.loads(settings.notes) if settings.notes else {}
+
+
+def _key(section: str, method: str) -> str:
+    """Return what a part's notes are kept under; every method has parameters of its own."""
+    return f"control.{method}" if section == "control" else section
+
+
+def _path(value: Any) -> Any:
+    """Return a value; a path that starts at the .blend's folder is one for the core as well."""
+    relative = isinstance(value, str) and value.startswith("//")
+    return bpy.path.abspath(value) if relative else value
+
+
+def _printable(name: str) -> str:
+    """Return an object's name as a scene may have it."""
+    return "".join(letter if letter.isprintable() else " " for letter in name)

@@ -1,0 +1,139 @@
+"""Blender's properties, made from the one declaration each parameter of the core has.
+
+A property shows its parameter in the unit a person reads, with the unit in its label, the bounds
+as its range, and meaning, symbol, bounds and default in its tooltip.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from ..compat import bpy
+from ..core.control.shapes import SHAPES
+from ..core.quantity import Parameters, Quantity
+from .shown_units import shown, unit_of
+
+__all__ = ["group", "title"]
+
+#: What Blender's whole numbers hold at most.
+INT_MAX = 2**31 - 1
+#: How far inside a bound that is not allowed itself a property ends, as a share of the default.
+INSIDE = 1e-6
+#: How many times the default dragging the mouse reaches; typing reaches all of the range.
+REACH = 10.0
+#: Fields that take a shape's name or file.
+SHAPED = ("shape", "field", "file")
+
+Update = Callable[[Any, Any], None]
+
+
+def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
+    """Make the property group of a part.
+
+    Parameters
+    ----------
+    name : str
+        The part's own, unique among groups.
+    kind : type
+        The part's parameters.
+    updates : dict
+        For some fields, what happens after a change: a function of the group and the context.
+    """
+    properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}
+    content = {"__annotations__": properties, "__module__": __name__, "__doc__": kind.__doc__}
+    return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
+
+
+def title(name: str) -> str:
+    """Return a name of the core as a label: ``valve_lag`` is Valve Lag."""
+    return name.replace("_", " ").title()
+
+
+def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
+    """Make the property of one parameter."""
+    known: Quantity = field.metadata["quantity"]
+    default = field.default
+    unit, power = unit_of(known.unit, default)
+    said = {
+        "name": f"{title(field.name)} ({unit})" if unit else title(field.name),
+        "description": _tooltip(known, default, unit, power),
+        "update": update,
+    }
+    if known.choices:
+        items = [(choice, title(choice), "") for choice in known.choices]
+        return bpy.props.EnumProperty(items=items, default=default, **said)
+    if isinstance(default, bool):
+        return bpy.props.BoolProperty(default=default, **said)
+    if isinstance(default, int):
+        low, high = known.at_least or 0, min(known.at_most or INT_MAX, INT_MAX)
+        return bpy.props.IntProperty(default=default, min=int(low), max=int(high), **said)
+    if isinstance(default, float):
+        return bpy.props.FloatProperty(**_numbers(known, default, power), **said)
+    if isinstance(default, tuple):
+        return bpy.props.StringProperty(default=listed(default, power), **said)
+    if field.name in SHAPED:
+        said |= {"search": _shapes, "search_options": {"SUGGESTION"}}
+    return bpy.props.StringProperty(default=default, **said)
+
+
+def listed(values: tuple[float, ...], power: int) -> str:
+    """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``."""
+    return ", ".join(repr(shown(value, power)).removesuffix(".0") for value in values)
+
+
+def _numbers(known: Quantity, default: float, power: int) -> dict[str, Any]:
+    """Return default, range, and how a number is shown and dragged."""
+    start = shown(default, power)
+    inside = INSIDE * (abs(start) or 1.0)
+    reach = REACH * (abs(start) or 0.1)
+    low, high = (
+        _bound(known.at_least, known.above, power, inside),
+        _bound(known.at_most, known.below, power, -inside),
+    )
+    decimals = len(f"{start:.6f}".rstrip("0").partition(".")[2])
+    return {
+        "default": start,
+        **({} if low is None else {"min": low}),
+        **({} if high is None else {"max": high}),
+        "soft_min": -reach if low is None else low,
+        "soft_max": reach if high is None else min(high, max(reach, start)),
+        "precision": min(6, max(2, decimals + 1)),
+        "step": int(min(100, max(1, round(5.0 * abs(start))))),
+    }
+
+
+def _bound(closed: float | None, opened: float | None, power: int, inside: float) -> float | None:
+    """Return an end of a range in the unit shown; an end that is not allowed itself is moved inside."""
+    if closed is not None:
+        return shown(float(closed), power)
+    return None if opened is None else shown(float(opened), power) + inside
+
+
+def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
+    """Say what a parameter means, its symbol, its bounds and its default; Blender adds the full stop."""
+
+    def value(number: float) -> str:
+        plain = isinstance(default, int)
+        return f"{number if plain else shown(float(number), power):.6g} {unit}".rstrip()
+
+    bounds = (
+        ("above", known.above),
+        ("at least", known.at_least),
+        ("below", known.below),
+        ("at most", known.at_most),
+    )
+    parts = [known.doc[0].upper() + known.doc[1:]]
+    parts += [f"symbol {known.symbol}"] if known.symbol else []
+    parts += [f"{word} {value(number)}" for word, number in bounds if number is not None]
+    if isinstance(default, tuple):
+        parts.append(f"separated by commas, by default {listed(default, power)} {unit}".rstrip())
+    elif isinstance(default, (int, float)):
+        parts.append(f"by default {value(default)}")
+    return "; ".join(parts)
+
+
+def _shapes(group: Any, context: Any, text: str) -> list[str]:
+    """Suggest the shapes that have a name; a file's path may be typed as well."""
+    return [name for name in SHAPES if text.lower() in name]

@@ -1,0 +1,40 @@
+"""A parameter's error, in the words of the panels: labels for names, and the units a person reads."""
+
+from __future__ import annotations
+
+import re
+
+from ..core.errors import ParameterError
+from ..core.methods import METHODS
+from ..core.quantity import quantities
+from ..core.scene import SECTIONS, parameters
+from .property_groups import title
+from .shown_units import in_words
+
+__all__ = ["named"]
+
+_NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
+
+
+def named(error: ParameterError) -> ParameterError:
+    """Return an error of the core with its owner, field, rule and value as the panels show them.
+
+    ``layout.pitch must be at least actuator.bore, 0.002 m (got 0.001 m)`` becomes
+    ``Layout: Pitch must be at least Actuator: Bore, 2 mm (got 1 mm)``.
+    """
+
+    def labelled(found: re.Match[str]) -> str:
+        return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
+
+    owner, field = error.owner, title(error.field)
+    if owner in SECTIONS:
+        owner = f"{title(owner)}: {field}" if field else title(owner)
+        field = ""
+    rule = in_words(_NAME.sub(labelled, error.rule))
+    return ParameterError(owner, field, rule, in_words(error.value), error.hint)
+
+
+def _known(section: str) -> set[str]:
+    """Return the names of a section's parameters."""
+    methods = METHODS if section == "control" else ("virtual_master",)
+    return {name for method in methods for name in quantities(parameters(section, method))}
