@@ -12,7 +12,7 @@ import pytest
 from digiclay.core.errors import OutputError, ParameterError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
-from digiclay.plots import plots
+from digiclay.plots import run as plots
 
 
 def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
@@ -201,9 +201,9 @@ def test_matplotlib_is_not_imported_before_it_is_needed():
 def test_without_matplotlib_it_says_what_to_install():
     script = (
         "import sys; sys.modules['matplotlib'] = None\n"
-        "from digiclay.plots import plots\nfrom digiclay.core.errors import OutputError\n"
+        "from digiclay.plots import run\nfrom digiclay.core.errors import OutputError\n"
         "case = {'position': [[0, 0]], 'time': [0], 'total_force': [0], 'height': [[0]]}\n"
-        "try:\n    plots.session(case, 'session.png', 0.4)\n"
+        "try:\n    run.session(case, 'session.png', 0.4)\n"
         "except OutputError as error:\n    print(error)\n"
     )
     assert python(script) == "Plots need matplotlib: run 'pip install digiclay[plots]'.\n"

@@ -22,7 +22,7 @@ from digiclay.core.sweep import Point, Record, evaluate, finish, points
 from digiclay.core.sweep_axis import axis
 from digiclay.core.sweep_bundles import evaluate_all
 from digiclay.core.sweep_folder import Column, columns
-from digiclay.plots.plots_sweep import sweep_figure
+from digiclay.plots.sweep import sweep_figure
 
 #: A tenth of a second of a scene is enough for most of this.
 SHORT = [Setting("simulation.duration", "0.1")]

@@ -84,7 +84,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     may_be_written(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
     from ..paper.figures_compare import comparison
-    from ..plots.plots import _save
+    from ..plots.figure import save
 
     scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
     found: dict[str, Metrics] = {}
@@ -98,7 +98,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         known = {"scene": scene.name, "methods": found, "units": units}
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
-        _save(comparison(found, forces, scene.name), folder / "compare.png")
+        save(comparison(found, forces, scene.name), folder / "compare.png")
     if not arguments.quiet:
         print("\n".join(table(found)))
         if arguments.speed:

@@ -148,9 +148,9 @@ def _extras(arguments: argparse.Namespace, result: Result, folder: Path) -> Iter
     if arguments.export:
         yield lambda: exported(scene, history, -1, arguments.export, folder)
     if arguments.plots:
-        from ..plots import plots
+        from ..plots.run import session, surface
 
-        yield lambda: plots.session(history, folder / "session.png", scene.set_point or 0.0)
-        yield lambda: plots.surface(history, folder / "surface.png")
+        yield lambda: session(history, folder / "session.png", scene.set_point or 0.0)
+        yield lambda: surface(history, folder / "surface.png")
     if arguments.render:
         yield lambda: picture(scene, history, last_touch(history), folder / "pins.png")

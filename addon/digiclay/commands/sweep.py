@@ -149,12 +149,12 @@ def _pictures(
     """Draw the figures over one or two axes; return what there is to be said of it."""
     if len(axes) > 2:
         return [f"{len(axes)} axes: a table only, no pictures"]
-    from ..plots import plots_sweep
+    from ..plots.sweep import picture
 
     known = columns(every, axes)
     try:
         for name in names:
-            plots_sweep.picture(known, name, grid(done, axes, name), out / f"{name}.png")
+            picture(known, name, grid(done, axes, name), out / f"{name}.png")
     except OutputError as error:  # the table is there, and pictures can be had later
         return [str(error)]
     return []

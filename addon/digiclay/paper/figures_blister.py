@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.metrics_trial import Trial
 from ..core.modes import Mode
-from .drawing import INK, LINES, MM, above, canvas
+from ..plots.figure import INK, LINES, MM, canvas, legend_above
 from .scenes import METHODS, NAMES
 from .trials import Results
 
@@ -92,6 +92,6 @@ def freezing(results: Results) -> Any:
             if panel == 0:
                 axes.plot([], [], "s", color=INK, label="frozen cell")
                 axes.plot([], [], "v", color=INK, label="finger")
-                above(axes, 8)
+                legend_above(axes, 8)
         axes.set_xlabel("along the drag (mm)")
     return figure

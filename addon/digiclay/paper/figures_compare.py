@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .drawing import INK, LINES, MM, above, canvas
+from ..plots.figure import INK, LINES, MM, canvas, legend_above
 
 __all__ = ["comparison"]
 
@@ -52,7 +52,7 @@ def comparison(
             force.axhline(set_point, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
-        above(force)
+        legend_above(force)
         for number, (key, title, factor) in enumerate(PANELS):
             row, column = divmod(number, 4)
             bottom = 0.3 + (1 - row) * (high + 0.85)

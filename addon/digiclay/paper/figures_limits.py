@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from .drawing import INK, LINES, METHOD_COLOURS, MM, above, canvas
+from ..plots.figure import INK, LINES, MM, canvas, legend_above
 from .scenes import METHODS, NAMES, PRESSED
 from .trials import PAPER_SPEED, SUSTAINED, Results
 
 __all__ = ["oscillation", "tracking"]
 
+#: Told apart with any colour vision; markers say the same once more.
+METHOD_COLOURS = {"virtual_master": LINES[0], "cell_states": LINES[1]}
 MARKERS = "os^D"
 
 
@@ -27,7 +29,7 @@ def oscillation(results: Results) -> Any:
         detail.set(xlabel="time after the press (s)", ylabel="total force (N)", xlim=(-0.2, 2.4))
         detail.set_ylim(0.0, 2.5 * set_point)
         detail.set_title(f"$K_p$ = {middle:g} 1/m (beyond the frame: the press itself)")
-        above(detail)
+        legend_above(detail)
         swing = place("amplitude", 0.85, 0.75, 5.4, 2.6)
         settle = place("settling", 7.15, 0.75, 5.4, 2.6)
         rows = {f"$K_p$ = {gain:g} 1/m": gain for gain in position_gains}

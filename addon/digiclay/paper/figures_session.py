@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core.metrics import in_contact
-from ..plots.plots import LETTERS, session_cells
-from .drawing import INK, LINES, MM, SHADE, above, canvas, draw_map, draw_path, draw_relief
+from ..plots.bed import draw_map, draw_path, draw_relief
+from ..plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
+from ..plots.run import LETTERS, session_cells
 from .scenes import METHODS, NAMES
 from .trials import Session
 
@@ -43,7 +44,7 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             force.axhline(scene.set_point, color=LINES[1], linestyle=(0, (5, 3)), label="set point")
             force.fill_between([], [], color=SHADE, label="in contact")
             force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force")
-            above(force)
+            legend_above(force)
             if column == 0:
                 heights.set_ylabel("height (mm)")
                 force.set_ylabel("force (N)")

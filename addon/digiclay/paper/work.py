@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..plots.figure import save
 from . import figures_blister, figures_limits, figures_session
 from .claims import claims
-from .drawing import save
 from .page import page
 from .scenes import METHODS
 from .trials import Extent, Results, Told, simulate

@@ -5,12 +5,10 @@ Colours are Okabe and Ito's palette; markers and line styles say the same once m
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import OutputError
-from ..core.export import write_whole
+from .figure import empty, save
 
 if TYPE_CHECKING:  # only named in annotations
     from ..commands.benchmark_problems import Work
@@ -38,7 +36,7 @@ def precision(work: list[Work], out: Path) -> Path:
     names = list(dict.fromkeys(one.problem for one in work))
     columns = min(3, len(names))
     rows = -(-(len(names) + 1) // columns)
-    with _Canvas(4.4 * columns, 3.7 * rows) as figure:
+    with empty(4.4 * columns, 3.7 * rows, STYLE, layout="constrained") as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, name in zip(panels, names, strict=False):
             _panel(panel, [one for one in work if one.problem == name])
@@ -73,7 +71,7 @@ def _panel(panel: Any, work: list[Work]) -> None:
 
 def scale(sizes: list[Size], out: Path) -> Path:
     """Draw a control period's cost over the number of pins, and return the path."""
-    with _Canvas(6.0, 3.6) as figure:
+    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
         pins = [one.pins for one in sizes]
         for values, label, colour, marker in (
@@ -91,7 +89,7 @@ def scale(sizes: list[Size], out: Path) -> Path:
 
 def stack(sizes: list[StackSize], out: Path) -> Path:
     """Draw how many times the runs a second a stack comes to, over its runs, and return the path."""
-    with _Canvas(6.0, 3.6) as figure:
+    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
         for study, colour, marker in (("control", "#0072B2", "o"), ("device", "#D55E00", "s")):
             own = [one for one in sizes if one.study == study]
@@ -115,33 +113,7 @@ def stack(sizes: list[StackSize], out: Path) -> Path:
         return _written(figure, out)
 
 
-class _Canvas:
-    """An empty figure in `STYLE`, drawn without a window."""
-
-    def __init__(self, width: float, height: float) -> None:
-        try:
-            from matplotlib import rc_context
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-            from matplotlib.figure import Figure
-        except ImportError:
-            raise OutputError("Plots need matplotlib: run 'pip install digiclay[plots]'.") from None
-        self._context = rc_context(STYLE)
-        with rc_context(STYLE):
-            self._figure = Figure(figsize=(width, height), layout="constrained")
-        FigureCanvasAgg(self._figure)
-
-    def __enter__(self) -> Any:
-        self._context.__enter__()
-        return self._figure
-
-    def __exit__(self, *raised: Any) -> None:
-        self._context.__exit__(*raised)
-
-
 def _written(figure: Any, out: Path) -> Path:
-    """Write a figure as a PNG, whole or not at all."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", metadata={"Software": "digiclay"})
+    """Write a figure into a folder that may have to be made, and return its path."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(out, content.getvalue())
-    return out
+    return save(figure, out)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..core.sweep import FIGURES
 from ..core.sweep_folder import Column
-from .plots import INK, LINES, _figure, _save
+from .figure import INK, LINES, canvas, save
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ LABELS = 12
 
 def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Path) -> Path:
     """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written."""
-    return _save(sweep_figure(columns, name, values), out)
+    return save(sweep_figure(columns, name, values), out)
 
 
 def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure:
@@ -57,7 +57,7 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
     unit, meaning = FIGURES[name]
     factor, read = _read(unit, values)
     label = f"{name} ({read})" if read else name
-    with _figure(9.0, 5.2 if len(columns) == 1 else 6.0) as (figure, place):
+    with canvas(9.0, 5.2 if len(columns) == 1 else 6.0) as (figure, place):
         # The meaning is a sentence: it goes above the axes, and the key beside them.
         figure.text(0.75 / 9.0, 0.955, meaning[0].upper() + meaning[1:], va="top", fontsize=11)
         if len(columns) == 1:

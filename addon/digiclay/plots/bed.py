@@ -1,0 +1,131 @@
+"""The bed in a plot: its final heights from above and in relief, and the finger's path over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.metrics import in_contact
+from ..core.surface import grid_shape, skin, solid
+from .figure import INK, LINES, MM, legend_above
+
+if TYPE_CHECKING:  # only named in annotations
+    from matplotlib.axes import Axes
+
+__all__ = ["History", "array", "draw_map", "draw_path", "draw_relief", "ends"]
+
+History = Mapping[str, ArrayLike]
+Floats = NDArray[np.float64]
+
+#: The side walls of the relief.
+CUT = "#CFCAC0"
+#: Where the light of the relief comes from, a unit vector.
+SUN = np.array([-0.48, -0.36, 0.80])
+#: Pins along a side that a picture still resolves; larger beds are thinned before they are drawn.
+RESOLVED = 100
+
+
+def draw_map(axes: Any, history: History, title: str) -> None:
+    """Draw the final heights from above, with a colour bar."""
+    from mpl_toolkits.axes_grid1 import make_axes_locatable
+
+    pins, top, rows, columns = _thinned(history)
+    low, high = ends(top * MM, 1.0)
+    scale: dict[str, Any] = {"cmap": "cividis", "vmin": low, "vmax": high}
+    if min(rows, columns) < 2:
+        picture: Any = axes.scatter(*pins.T * MM, c=top * MM, marker="s", **scale)
+    else:
+        faces = skin(pins, top, rows, columns)
+        picture = axes.tripcolor(*pins.T * MM, faces, top * MM, shading="gouraud", **scale)
+    size, middle = np.ptp(pins, axis=0) * MM, 0.5 * (pins.min(axis=0) + pins.max(axis=0)) * MM
+    half = 0.5 * np.maximum(size, max(0.75 * size.max(), 1.0))  # a narrow bed gets room for its labels
+    (left, bottom), (right, upper) = middle - half, middle + half
+    axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=title)
+    axes.grid(False)
+    divider = make_axes_locatable(axes)
+    divider.set_anchor("NW")
+    beside = divider.append_axes("right", size=0.16, pad=0.14, label="scale")
+    axes.figure.colorbar(picture, cax=beside, label="height (mm)").outline.set_visible(False)
+    beside.grid(False)
+
+
+def draw_path(axes: Axes, history: History) -> None:
+    """Draw where the fingertip went: a line in contact, dots while lifted."""
+    from matplotlib.patheffects import withStroke
+
+    touching = in_contact(array(history, "total_force"))[:, None]
+    finger, frame = array(history, "fingertip")[:, :2] * MM, axes.axis()
+    lifted, pressed = np.where(touching, np.nan, finger).T, np.where(touching, finger, np.nan).T
+    dots: dict[str, Any] = {"color": "white", "linestyle": (0, (0.1, 2.2)), "dash_capstyle": "round"}
+    dark, pale = withStroke(linewidth=3.6, foreground=INK), withStroke(linewidth=4.2, foreground="white")
+    axes.plot(*lifted, label="lifted", path_effects=[dark], **dots)
+    axes.plot(*pressed, label="in contact", path_effects=[pale], color=LINES[1], linewidth=2.4)
+    axes.axis(frame)
+    legend_above(axes)
+
+
+def draw_relief(axes: Any, history: History) -> None:
+    """Draw the final surface in three dimensions, lit from the left, equal scale on all axes."""
+    from matplotlib import colormaps
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    pins, top, rows, columns = _thinned(history)
+    vertices, faces = solid(pins * MM, top * MM, rows, columns, base_thickness=3.0)
+    count = 2 * (rows - 1) * (columns - 1)
+    over, walls = faces[:count], faces[2 * count :]
+    bright = np.column_stack([vertices, _light(vertices, over)])[over]
+    while len(bright) < 8000:  # finer triangles of the same surface: they only smooth the light
+        bright = _quartered(bright)
+    low, high = ends(top * MM, 1.0)
+    level, light = bright[:, :, 2].mean(axis=1), bright[:, :, 3].mean(axis=1)
+    colour = colormaps["cividis"]((level - low) / (high - low))[:, :3] * light[:, None]
+    for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], colour)):
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
+    limits = [(side.min(), side.max()) for side in vertices.T]
+    axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)), zlabel="height (mm)")
+    axes.set_xlabel("x (mm)", labelpad=12)
+    axes.set_ylabel("y (mm)", labelpad=12)
+    axes.locator_params(nbins=5)
+    axes.set_box_aspect(np.ptp(vertices, axis=0), zoom=0.84)
+    axes.view_init(elev=34, azim=-62)
+
+
+def _light(vertices: Floats, over: NDArray[np.int64]) -> Floats:
+    """Return how brightly each vertex of the skin is lit, in (0, 1], by normals averaged over its faces."""
+    a, b, c = (vertices[over[:, corner]] for corner in range(3))
+    normal = np.zeros_like(vertices)
+    np.add.at(normal, over, np.cross(b - a, c - a)[:, None])
+    facing = normal @ SUN / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
+    return np.asarray(0.45 + 0.55 * np.clip(facing, 0.0, 1.0))
+
+
+def _quartered(corners: Floats) -> Floats:
+    """Cut each triangle in four at the middles of its sides; corners are (f, 3, k) and linear in between."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    parts = (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+def _thinned(history: History) -> tuple[Floats, Floats, int, int]:
+    """Return positions, final heights, rows and columns, of at most `RESOLVED` pins a side."""
+    pins, top = array(history, "position"), array(history, "height")[-1]
+    rows, columns = grid_shape(pins)
+    index = np.arange(rows * columns).reshape(rows, columns)
+    index = index[:: -(-rows // RESOLVED), :: -(-columns // RESOLVED)]
+    return pins[index.ravel()], top[index.ravel()], index.shape[0], index.shape[1]
+
+
+def ends(values: Floats, least: float) -> tuple[float, float]:
+    """Return the ends of a scale, `least` apart at least: what does not vary still gets one."""
+    spare = max(0.0, 0.5 * (least - float(np.ptp(values))))
+    return float(values.min()) - spare, float(values.max()) + spare
+
+
+def array(history: History, name: str) -> Floats:
+    """Return one array of the history as float64."""
+    return np.asarray(history[name], dtype=np.float64)

@@ -1,0 +1,132 @@
+"""Plots of a run: heights and force over time, and the final surface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core.metrics import in_contact, summary
+from .bed import History, array, draw_map, draw_path, draw_relief, ends
+from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
+
+if TYPE_CHECKING:  # only named in annotations
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["LETTERS", "session", "session_cells", "session_figure", "surface", "surface_figure"]
+
+#: Letter of each chosen cell, in the order in which the finger passes them.
+LETTERS = "ABCDEF"
+#: What the session's picture says in words: label, metric, factor, format.
+FIGURES = (
+    ("RFD in contact", "rfd", 1.0, "{:.3f} N"),
+    ("RFD while shaping", "rfd_shaping", 1.0, "{:.3f} N"),
+    ("largest force", "max_total_force", 1.0, "{:.3f} N"),
+    ("no contact in between", "contact_loss_share", 1e2, "{:.1f} %"),
+    ("mean lag of the force", "lag_mean", MM, "{:.2f} mm"),
+    ("relief formed", "height_range", MM, "{:.1f} mm"),
+)
+
+
+def session(history: History, out: str | Path, set_point: float) -> Path:
+    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    return save(session_figure(history, set_point), out)
+
+
+def surface(history: History, out: str | Path) -> Path:
+    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    return save(surface_figure(history), out)
+
+
+def session_cells(history: History) -> list[int]:
+    """Choose up to six cells that tell the session: along the finger's path in contact, evenly spaced.
+
+    They are different, in the order in which the finger passes them, the first and the last
+    contact among them. Without any contact they are those that moved most.
+    """
+    count = len(LETTERS)
+    position, height = array(history, "position"), array(history, "height")
+    touching = np.flatnonzero(in_contact(array(history, "total_force")))
+    if not len(touching):
+        return sorted(np.argsort(-np.ptp(height, axis=0), kind="stable")[:count].tolist())
+    finger = array(history, "fingertip")[touching, :2]
+    stretch, pressed = np.hypot(*np.diff(finger, axis=0).T), np.diff(touching) == 1
+    # The way through the air to the next place is one step at most: its ends are worth a cell, no more.
+    stretch[~pressed] = np.minimum(stretch[~pressed], stretch[pressed].sum() / (count - 2))
+    travelled = np.concatenate([[0.0], np.cumsum(stretch)])
+    steps = np.linspace(0.0, travelled[-1], count)
+    evenly = finger[np.argmin(np.abs(travelled - steps[:, None]), axis=1)]
+    nearest = np.argmin(np.sum((evenly[:, None] - position[None]) ** 2, axis=2), axis=1)
+    return list(dict.fromkeys(nearest.tolist()))
+
+
+def session_figure(history: History, set_point: float) -> Figure:
+    """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
+
+    Parameters
+    ----------
+    history : mapping
+        The arrays of ``history.npz``.
+    set_point : float
+        Force the finger should feel, N.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its axes, by label: ``heights``, ``force``, ``map`` with its ``scale``, and ``figures``.
+    """
+    time, total, height = (array(history, name) for name in ("time", "total_force", "height"))
+    with canvas(12.5, 6.3) as (figure, place):
+        heights, plan = place("heights", 0.8, 2.95, 6.95, 3.0), place("map", 8.62, 3.1, 3.12, 2.85)
+        force, figures = place("force", 0.8, 0.65, 6.95, 1.7), place("figures", 8.62, 0.65, 3.78, 1.7)
+        for axes in (heights, force):
+            across = axes.get_xaxis_transform()
+            axes.fill_between(time, 0, 1, where=in_contact(total), transform=across, color=SHADE, linewidth=0)
+        draw_map(plan, history, "Where the cells are")
+        for name, colour, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
+            heights.plot(time, height[:, cell] * MM, color=colour, label=name)
+            spot = array(history, "position")[cell] * MM
+            disc = {"markersize": 16, "markeredgecolor": colour, "markeredgewidth": 2.6, "clip_on": False}
+            plan.plot(*spot, "o", color="white", **disc)
+            plan.annotate(name, spot, fontsize=10, fontweight="bold", ha="center", va="center_baseline")
+        heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))
+        heights.set(ylabel="height (mm)", title="Heights of cells", xlim=ends(time, 0.1))
+        heights.tick_params(labelbottom=False)
+        force.plot(time, total, color=INK, linewidth=1.3, label="total force")
+        force.axhline(set_point, color=LINES[1], linestyle=(0, (5, 3)), label=f"set point {set_point:g} N")
+        force.fill_between([], [], color=SHADE, label="in contact")
+        force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
+        force.set_title("Total force on the finger")
+        for axes in (heights, force):
+            legend_above(axes)
+            axes.yaxis.set_label_coords(-0.075, 0.5)
+        _write_figures(figures, summary(history, set_point))
+    return figure
+
+
+def surface_figure(history: History) -> Figure:
+    """Draw the final surface in relief and from above, as the paper's Fig. 10 does.
+
+    The axes are, by label: ``relief`` (3-D, to scale) and ``map``, with the finger's path,
+    with its ``scale``. Raises ParameterError when the bed is a single row or column.
+    """
+    with canvas(12.5, 5.5) as (figure, place):
+        # The relief is cut off at the edge of its axes, so they reach under the title and the margins.
+        draw_relief(place("relief", -0.6, -0.75, 8.1, 6.7, projection="3d", computed_zorder=False), history)
+        figure.text(0.3 / 12.5, 5.14 / 5.5, "Final surface, to scale")
+        plan = place("map", 7.5, 0.65, 4.3, 4.4)
+        draw_map(plan, history, "From above")
+        draw_path(plan, history)
+    return figure
+
+
+def _write_figures(axes: Axes, found: dict[str, float | None]) -> None:
+    """Write the figures a session is judged by."""
+    axes.set_axis_off()
+    axes.set_title("In figures")
+    for line, (label, name, factor, form) in enumerate(FIGURES):
+        value, y = found[name], 0.92 - 0.158 * line
+        axes.text(0.0, y, label, va="top")
+        axes.text(1.0, y, "–" if value is None else form.format(value * factor), va="top", ha="right")
