@@ -40,9 +40,9 @@ LEVELS = (
     "export_model simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
     "jobs accuracy keeping live shadow stack.assembly",
-    "session metrics_trial take",
-    "metrics_speed sweep budget stack.session",
-    "sweep_folder sweep_bundles",
+    "session take",
+    "metrics_trial sweep budget stack.session",
+    "metrics_speed sweep_folder sweep_bundles",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import assemble
 from .metrics import METRICS, summary
-from .recorder import Recorder, Recording, available_memory, refuse_what_cannot_fit
+from .recorder import Recorder
 from .scene import Scene
-from .simulation import begin, periods
+from .session import FORCE_DEVIATIONS, run
+from .state import State
 
 __all__ = ["TRIAL_METRICS", "Trial", "trial"]
 
@@ -57,7 +56,7 @@ class Trial:
         """The keys of `TRIAL_METRICS`; SI. None where there is nothing to compute from."""
         judged = summary(self.history, self.scene.set_point or 0.0)
         if self.scene.set_point is None:
-            judged |= dict.fromkeys(("set_point", "rfd", "rfd_shaping", "rfd_session"))
+            judged |= dict.fromkeys(FORCE_DEVIATIONS)
         simulated = float(self.history["time"][-1])
         return {
             **judged,
@@ -97,32 +96,16 @@ def trial(
     DivergenceError
         When the integration leaves the finite numbers.
     """
-    system, way, recorder = assemble(scene), scene.trajectory.trajectory(), Recorder()
-    refuse_what_cannot_fit(recorder, system.rows, scene.cells, scene.periods, available_memory())
-    start = begin(system)
-    recording = Recording(recorder, system.rows, start, scene.periods)
-    counts = hasattr(start.memory, "losses")
-    lost, losses = [], 0
-    started = time.perf_counter()
-    state = start
-    for state in periods(system, way, start, scene.periods):
-        recording.observe(state)
-        if counts and state.memory.losses > losses:
-            lost += [state.period * system.period] * (state.memory.losses - losses)
-            losses = state.memory.losses
-        if progress:
-            progress(state.period, scene.periods)
-        if stopped and stopped():
-            raise KeyboardInterrupt
-    took = time.perf_counter() - started
-    recording.finish(state)
-    rows = recording.arrays()
-    moments = rows.pop("period") * system.period
-    history = {
-        "time": moments,
-        **rows,
-        "fingertip": way.poses(moments),
-        "total_force": rows["force"].sum(axis=1),
-        "position": system.grid.positions,
-    }
-    return Trial(scene, history, np.array(lost) if counts else None, took)
+    lost: list[float] = []
+    period = scene.simulation.control_period
+
+    def listen(state: State) -> None:
+        more = getattr(state.memory, "losses", 0) - len(lost)
+        lost.extend([state.period * period] * more)
+
+    done = run(replace(scene, recorder=Recorder()), progress=progress, stopped=stopped, watched=listen)
+    if done.incomplete:
+        raise KeyboardInterrupt
+    assert done.history is not None  # there is a recorder
+    counts = done.metrics["losses"] is not None
+    return Trial(scene, done.history, np.array(lost) if counts else None, done.run_time)

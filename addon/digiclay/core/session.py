@@ -21,10 +21,11 @@ from .recorder import Recording, available_memory, refuse_what_cannot_fit, write
 from .scene import Scene
 from .scene_table import ABSENT, text
 from .simulation import begin, periods
+from .state import State
 from .system import System
 from .trajectory import Trajectory
 
-__all__ = ["Ended", "Result", "fits", "judged", "run", "save"]
+__all__ = ["FORCE_DEVIATIONS", "Ended", "Result", "fits", "judged", "run", "save"]
 
 History = dict[str, NDArray[Any]]
 
@@ -90,6 +91,7 @@ def run(
     *,
     progress: Callable[[int, int], None] | None = None,
     stopped: Callable[[], bool] | None = None,
+    watched: Callable[[State], None] | None = None,
     versions: Mapping[str, str] | None = None,
 ) -> Result:
     """Run a scene from rest to its end.
@@ -101,6 +103,8 @@ def run(
         Told after each control period how many are done, and of how many.
     stopped : callable, optional
         Asked after each control period; when it says True, the result is what there is so far.
+    watched : callable, optional
+        Shown the state after each control period; the next period uses its arrays up.
     versions : mapping, optional
         What else to note as versions the run was made with.
 
@@ -120,6 +124,8 @@ def run(
     for state in periods(system, trajectory, start, scene.periods):
         if recording:
             recording.observe(state)
+        if watched:
+            watched(state)
         if progress:
             progress(state.period, scene.periods)
         if stopped and stopped():
