@@ -12,36 +12,15 @@ from digiclay import __version__
 from digiclay.cli import main
 from digiclay.commands.benchmark import PARTS
 
-SCENE = """\
-[layout]
-rows = 3
-columns = 4
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
 
-[blister]
-radius = 0.005
-edge_radius = 0.008
-flat_radius = 0.002
-
-[trajectory]
-waypoints = [
-  { time = 0.0, position = [0, 0, 0.041] },
-  { time = 0.05, position = [0, 0, 0.038] },
-  { time = 0.1, position = [0, 0, 0.05] },
-]
-"""
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in an empty folder with one scene, my.toml."""
-    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def left(folder: Path) -> list[str]:
-    """Return what lies in the folder besides the scene, hidden things too."""
-    return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")
+    return folder_with(SCENE, tmp_path, monkeypatch)
 
 
 def test_a_run_ends_with_exit_code_0() -> None:

@@ -11,27 +11,16 @@ from digiclay.commands.compare import table
 from digiclay.core.metrics_trial import TRIAL_METRICS
 from digiclay.paper.figures_compare import PANELS, comparison
 
-SCENE = """\
-[layout]
-rows = 11
-columns = 11
+from tests.scene_files import folder_with, scene_text
 
-[trajectory]
-waypoints = [
-  { time = 0.0, position = [0, 0, 0.041] },
-  { time = 0.3, position = [0, 0, 0.035] },
-  { time = 0.5, position = [0, 0, 0.035] },
-]
-"""
+SCENE = scene_text(11, 11, (0.0, 0.041), (0.3, 0.035), (0.5, 0.035))
 BOTH = ["virtual_master", "cell_states"]
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in an empty folder with one scene, my.toml."""
-    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return folder_with(SCENE, tmp_path, monkeypatch)
 
 
 def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,23 +11,9 @@ import pytest
 import trimesh
 from digiclay.cli import main
 
-SCENE = """\
-[layout]
-rows = 9
-columns = 9
+from tests.scene_files import SMALL_BLISTER, scene_text
 
-[blister]
-radius = 0.005
-edge_radius = 0.008
-flat_radius = 0.002
-
-[trajectory]
-waypoints = [
-  { time = 0.0, position = [0, 0, 0.041] },
-  { time = 0.2, position = [0, 0, 0.036] },
-  { time = 0.3, position = [0, 0, 0.036] },
-]
-"""
+SCENE = scene_text(9, 9, (0.0, 0.041), (0.2, 0.036), (0.3, 0.036), parts=SMALL_BLISTER)
 
 
 @pytest.fixture(scope="module")

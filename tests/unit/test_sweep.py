@@ -16,28 +16,17 @@ from digiclay.core.session import run
 from digiclay.core.sweep import FIGURES, figure, points
 from digiclay.core.sweep_axis import Axis, axis
 
+from tests.scene_files import folder_with, scene_text
+
 ADDON = Path(__file__).parents[2] / "addon"
 GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd", "--quiet"]
-SCENE = """\
-[layout]
-rows = 11
-columns = 11
-
-[trajectory]
-waypoints = [
-  { time = 0.0, position = [0, 0, 0.041] },
-  { time = 0.05, position = [0, 0, 0.037] },
-  { time = 0.1, position = [0, 0, 0.05] },
-]
-"""
+SCENE = scene_text(11, 11, (0.0, 0.041), (0.05, 0.037), (0.1, 0.05))
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in an empty folder with one scene, my.toml."""
-    (tmp_path / "my.toml").write_text(SCENE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return folder_with(SCENE, tmp_path, monkeypatch)
 
 
 def rows(folder: str) -> list[dict[str, str]]:

@@ -1,0 +1,36 @@
+"""Scene files for tests of the command line: a few pins, a tenth of a second or so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+#: A blister that fits a bed of a few pins; on larger ones the default does.
+SMALL_BLISTER = """
+[blister]
+radius = 0.005
+edge_radius = 0.008
+flat_radius = 0.002
+"""
+#: A tenth of a second: the finger presses the pins, and lifts off.
+TOUCH = (0.0, 0.041), (0.05, 0.038), (0.1, 0.05)
+
+
+def scene_text(rows: int, columns: int, *waypoints: tuple[float, float], parts: str = "") -> str:
+    """Return a scene file: a bed, and a level finger over its middle (time in s, height in m)."""
+    places = [f"  {{ time = {time}, position = [0, 0, {height}] }}," for time, height in waypoints]
+    bed = f"[layout]\nrows = {rows}\ncolumns = {columns}\n{parts}"
+    return "\n".join([bed, "[trajectory]", "waypoints = [", *places, "]\n"])
+
+
+def folder_with(scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    (folder / "my.toml").write_text(scene, encoding="utf-8")
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def left(folder: Path) -> list[str]:
+    """Return what lies in the folder besides the scene, hidden things too."""
+    return sorted(path.name for path in folder.iterdir() if path.name != "my.toml")
