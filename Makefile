@@ -29,7 +29,7 @@ test: ## run all tests but those of the matrix, of the window and of other progr
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
 	$(PART) .reports/test.txt "tests" 400 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
-	$(PART) .reports/test.txt "tests in Blender 4.5" 240 -- tests/blender || status=1; \
+	$(PART) .reports/test.txt "tests in Blender 4.5" 240 -- -n auto --dist loadfile tests/blender || status=1; \
 	echo; cat .reports/test.txt; exit $$status
 
 lint: ## check style, format and types

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, settings
 # Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
 os.environ.setdefault("MPLBACKEND", "Agg")
 SETTINGS = tempfile.TemporaryDirectory(prefix="digiclay-blender-")
-os.environ.setdefault("BLENDER_USER_RESOURCES", SETTINGS.name)
+if "PYTEST_XDIST_WORKER" in os.environ or "BLENDER_USER_RESOURCES" not in os.environ:
+    os.environ["BLENDER_USER_RESOURCES"] = SETTINGS.name  # each worker its own: presets, extensions
 
 # The same examples in every run, so that a failure can be seen again; no deadline, since machines are shared.
 settings.register_profile(
