@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .compat import bpy
 from .core.errors import DigiclayError
 from .core.fingertip import Fingertip
-from .device.device_shapes import Shape
+from .device.shapes import Shape
 
 __all__ = [
     "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",

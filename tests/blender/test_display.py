@@ -14,7 +14,7 @@ from digiclay.core.errors import DigiclayError
 from digiclay.core.modes import Mode
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
-from digiclay.overlay import overlay
+from digiclay.overlay import views
 from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -46,7 +46,7 @@ def session(bed: Any) -> Iterator[running.Running]:
     running.put(begun)
     yield begun
     running.drop(begun.uid)
-    overlay.follow()
+    views.follow()
 
 
 def forces(bed: Any) -> np.ndarray:
@@ -92,41 +92,41 @@ def test_turning_arrows_on_after_a_session_shows_the_forces_it_ended_with(
 def test_the_overlay_is_drawn_only_while_a_session_runs_whose_bed_wants_it(
     bed: Any, session: running.Running
 ) -> None:
-    assert not overlay.shown()
-    overlay.follow()
-    assert overlay.shown()
+    assert not views.shown()
+    views.follow()
+    assert views.shown()
     bed.digiclay_display.overlay = False
-    assert not overlay.shown()
+    assert not views.shown()
     bed.digiclay_display.overlay = True
-    assert overlay.shown()
+    assert views.shown()
     running.drop(session.uid)
-    overlay.follow()
-    assert not overlay.shown()
+    views.follow()
+    assert not views.shown()
 
 
 def test_the_overlays_timer_comes_and_goes_with_it(bed: Any, session: running.Running) -> None:
     for wanted in (True, False, True):
         bed.digiclay_display.overlay = wanted
-        assert bpy.app.timers.is_registered(overlay._again) is wanted
+        assert bpy.app.timers.is_registered(views._again) is wanted
 
 
 def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: running.Running) -> None:
-    overlay.follow()
+    views.follow()
     display.unregister()
     try:
-        assert not overlay.shown()
+        assert not views.shown()
     finally:
         display.register()
 
 
 def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Running) -> None:
-    told = overlay.told(bed, session, palettes.PALETTES["okabe_ito"])
+    told = views.told(bed, session, palettes.PALETTES["okabe_ito"])
     assert (told.name, told.method, told.set_point) == (bed.name, "virtual_master", session.scene.set_point)
     assert told.modes.sum() == 400
     assert np.count_nonzero(told.modes) > 1
     total = session.state.row(session.system.rows.force).sum()
     assert told.force[-1] == pytest.approx(total, rel=1e-12)
-    stopped = overlay.told(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
+    stopped = views.told(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
     assert stopped.paused
     assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
 

@@ -16,8 +16,9 @@ from digiclay.core.quantity import quantities
 from digiclay.core.scene import OPTIONAL, SECTIONS, Scene, parameters
 from digiclay.core.scene_file import find, load, sample_names
 from digiclay.core.scene_table import PRESETS, resolve
-from digiclay.settings import properties, settings_table
+from digiclay.settings import properties
 from digiclay.settings.shown_units import unit_of
+from digiclay.settings.table import read
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -71,7 +72,7 @@ def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str)
             continue
         for end in (-1e30, 1e30):
             setattr(group, field.name, end)
-            value = settings_table.read(group, kind, {}, section)[field.name]
+            value = read(group, kind, {}, section)[field.name]
             bounds = (known.above, known.at_least) if end < 0 else (known.below, known.at_most)
             if any(bound is not None for bound in bounds):
                 assert known.broken_rule(value) == "", field.name

@@ -61,7 +61,7 @@ def note(blender: Any, name: str) -> None:
     blender.SEEN[name] |= {
         "bed": heights(blender).round(4).tolist(),
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
-        "overlay": blender.part("overlay.overlay").shown(),
+        "overlay": blender.part("overlay.views").shown(),
         "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
         "picked": list(blender.part("device.display").picked(blender.beds()[0])),
     }

@@ -14,7 +14,7 @@ from ..core.errors import DigiclayError
 from ..core.keeping import unpacked
 from ..core.trace import PICKED, SPAN
 from ..live import bed_state, running
-from ..overlay import overlay
+from ..overlay import views
 from ..settings import properties
 from . import heat, view
 from .node_arrows import LENGTH
@@ -50,7 +50,7 @@ def pick(bed: Any, pins: Iterable[int]) -> None:
     if unknown:
         raise DigiclayError(f"Display.picked must be pins 0 to {count - 1} of {bed.name} (got {unknown[0]}).")
     bed.digiclay_display.picked = (*chosen, *[NONE] * (PICKED - len(chosen)))
-    overlay.redraw()
+    views.redraw()
 
 
 def _rewrite(bed: Any) -> None:
@@ -114,7 +114,7 @@ def _set_length(display: Any, length: float) -> None:
 
 
 def _take_overlay(display: Any, context: Any) -> None:
-    overlay.follow()
+    views.follow()
 
 
 class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
@@ -188,6 +188,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Undo `register`; the overlay's draw handler goes as well."""
-    overlay.stop()
+    views.stop()
     del bpy.types.Object.digiclay_display
     bpy.utils.unregister_class(Display)

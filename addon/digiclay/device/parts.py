@@ -11,7 +11,7 @@ from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
 from ..core.modes import COLOURS, Mode
-from . import device_shapes, heat
+from . import heat, shapes
 from .instant import Instant
 
 __all__ = [
@@ -65,7 +65,7 @@ def material(name: str, colour: tuple[float, float, float], roughness: float, al
 def pins(instant: Instant, length: float) -> tuple[Any, Any]:
     """Make one pin a mode and one a level of force, in two collections that stand in no scene."""
     segments = 28 if len(instant.height) <= MANY else 12
-    shape = device_shapes.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
+    shape = shapes.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
     mesh.materials.append(None)
     modes = [(mode.name.lower(), COLOURS[mode]) for mode in Mode]
@@ -88,7 +88,7 @@ def _worn(name: str, mesh: Any, looks: Sequence[tuple[str, tuple[float, float, f
 
 def arrow(pitch: float) -> Any:
     """Make the arrow of a bed, which stands in no scene; the pitch in m."""
-    mesh = bridge.mesh("Digital Clay Force", device_shapes.arrow(HEAD * pitch * SCALE))
+    mesh = bridge.mesh("Digital Clay Force", shapes.arrow(HEAD * pitch * SCALE))
     mesh.materials.append(material("force_arrow", ARROW, roughness=0.5))
     made = bpy.data.objects.new("Digital Clay Force", mesh)
     made[ROLE] = PIN
@@ -101,7 +101,7 @@ def housing(instant: Instant, deck: float, rim: float) -> Any:
     half = float(reach[0]) * SCALE, float(reach[1]) * SCALE
     wall = WALL * instant.pitch * SCALE
     bottom = deck * SCALE - wall / 2
-    shape = device_shapes.housing(half, wall, bottom, deck * SCALE, rim * SCALE)
+    shape = shapes.housing(half, wall, bottom, deck * SCALE, rim * SCALE)
     mesh = bridge.mesh("Digital Clay Housing", shape)
     mesh.materials.append(material("housing", CASE, roughness=0.55))
     return mesh
@@ -117,7 +117,7 @@ def fingertip(collection: Any, bed: Any) -> Any:
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
-    mesh = bridge.mesh("Digital Clay Ellipsoid", device_shapes.ball())
+    mesh = bridge.mesh("Digital Clay Ellipsoid", shapes.ball())
     mesh.materials.append(None)
     ball = marked(mesh, mesh.name, ELLIPSOID, collection, parent=made)
     ball.hide_select = True

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..compat import bpy
-from ..overlay import overlay
+from ..overlay import views
 from . import keys, loop, running
 
 __all__ = ["ended", "register", "unregister", "watch"]
@@ -47,7 +47,7 @@ def ended(why: str) -> None:
         running.say(f"The session of {names} ended: {why}")
     loop.end()
     unwatch()
-    overlay.follow()
+    views.follow()
 
 
 def unwatch() -> None:

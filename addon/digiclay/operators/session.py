@@ -8,7 +8,7 @@ from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device.view import bed_of
 from ..live import handlers, loop, running, tick
-from ..overlay import overlay
+from ..overlay import views
 from ..recorded.bake import is_baked
 
 __all__ = ["Session", "end_all"]
@@ -55,7 +55,7 @@ class Session(bpy.types.Operator):  # type: ignore[misc]
             return {"CANCELLED"}
         self._tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
         handlers.watch()
-        overlay.follow()
+        views.follow()
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.runs():

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import handlers, running, tick
-from ..overlay import overlay
+from ..overlay import views
 from .session_context import decline_without, session_of
 
 __all__ = ["StopSession"]
@@ -30,7 +30,7 @@ class StopSession(bpy.types.Operator):  # type: ignore[misc]
         tick.stop(session.uid)
         running.say(f"The session of {session.name} was stopped; the bed keeps its state")
         if running.all():
-            overlay.follow()
+            views.follow()
         else:
             handlers.ended("")
         return {"FINISHED"}

@@ -14,7 +14,7 @@ from .. import bridge
 from ..bridge import linear
 from ..compat import bpy, shader_nodes
 from ..core.modes import COLOURS, MEANINGS, Mode
-from ..device import device_shapes, heat
+from ..device import heat, shapes
 
 __all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]
 
@@ -93,7 +93,7 @@ def of_modes(front: Front, modes: Sequence[Mode]) -> None:
     """List modes down the picture's left side, each with a dot of its colour."""
     size = front.letter
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
-    disc = device_shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
+    disc = shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
     left, y = LEFT * front.width, 0.86 * front.height
     for mode in modes:
         name, lines = mode.name.lower().replace("_", " "), textwrap.wrap(MEANINGS[mode], 26)

@@ -44,7 +44,7 @@ def outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) 
 
 def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     """Draw the patch under the mouse; Blender hands the place over in pixels of the window."""
-    from ..overlay import overlay_draw  # needs a graphics card: not there in the background
+    from ..overlay.draw import cursor  # needs a graphics card: not there in the background
 
     region = context.region
     if region is None or region.type != "WINDOW" or context.mode != "OBJECT":
@@ -59,7 +59,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     if not np.isfinite(points).all():
         return
     width = context.preferences.system.pixel_size
-    overlay_draw.cursor([Line(points, DARK, 4.0 * width), Line(points, LIGHT, 2.0 * width)])
+    cursor([Line(points, DARK, 4.0 * width), Line(points, LIGHT, 2.0 * width)])
 
 
 class PressTool(bpy.types.WorkSpaceTool):  # type: ignore[misc]

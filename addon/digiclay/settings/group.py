@@ -13,7 +13,7 @@ from ..core.scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
 from ..core.scene_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from .property_groups import Update, group, title
-from .settings_table import assign, read, reset
+from .table import assign, read, reset
 
 __all__ = ["CLASSES", "PLAIN", "PRESET_WORDS", "SETTINGS", "method_items"]
 

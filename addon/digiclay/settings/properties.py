@@ -15,8 +15,8 @@ from ..core.quantity import Parameters
 from ..core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
 from ..core.scene_table import ABSENT, resolve
 from ..device.pins_drawn import differs
-from . import settings_table
 from .group import CLASSES, SETTINGS
+from .table import Notes, read, write
 from .words import named
 
 __all__ = ["adopt", "described", "part_group", "register", "scene_of", "stale", "table_of", "unregister"]
@@ -70,7 +70,7 @@ def table_of(bed: Any) -> dict[str, Any]:
         elif section != "blister" or METHODS[method].blister is not None:
             own = part_group(settings, section)
             kind = parameters(section, method)
-            values = settings_table.read(own, kind, notes.get(_key(section, method), {}), section)
+            values = read(own, kind, notes.get(_key(section, method), {}), section)
             table[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:
         table["control"]["method"] = method
@@ -96,7 +96,7 @@ def adopt(bed: Any, scene: Scene) -> None:
             setattr(settings, f"use_{section}", part is not None)
         if part is not None:
             own = part_group(settings, section)
-            notes[_key(section, scene.method)] = settings_table.write(own, part)
+            notes[_key(section, scene.method)] = write(own, part)
     settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
 
 
@@ -105,7 +105,7 @@ def stale(bed: Any) -> str:
     settings = bed.digiclay
     notes = _notes(settings).get("layout", {})
     kind = parameters("layout", settings.method)
-    return differs(bed, kind(**settings_table.read(settings.layout, kind, notes, "layout")))
+    return differs(bed, kind(**read(settings.layout, kind, notes, "layout")))
 
 
 def part_group(settings: Any, section: str) -> Any:
@@ -129,7 +129,7 @@ def unregister() -> None:
         bpy.utils.unregister_class(kind)
 
 
-def _notes(settings: Any) -> dict[str, settings_table.Notes]:
+def _notes(settings: Any) -> dict[str, Notes]:
     """Return what was noted of values the properties cannot hold, by part."""
     return json.loads(settings.notes) if settings.notes else {}
 

@@ -131,7 +131,7 @@ def _room(area: Any, region: Any) -> Room:
 
 def _draw() -> None:
     """Draw the overlay into the region Blender is drawing."""
-    from . import overlay_draw  # needs a graphics card: not there in the background
+    from .draw import draw  # needs a graphics card: not there in the background
 
     context = bpy.context
     bed = _chosen(context) if context.space_data.overlay.show_overlays else None
@@ -145,7 +145,7 @@ def _draw() -> None:
     scale = settings.system.ui_scale
     picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
-    overlay_draw.draw(picture, context.region.width, context.region.height)
+    draw(picture, context.region.width, context.region.height)
 
 
 def _marks(
