@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from .device.shapes import Shape
 
 __all__ = [
     "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",
-    "resize_fingertip", "uniform", "write_cells",
+    "resize_fingertip", "srgb", "uniform", "write_cells",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -182,3 +183,9 @@ def linear(colour: tuple[float, float, float], alpha: float = 1.0) -> tuple[floa
     """Return an sRGB colour in the linear light Blender's materials want."""
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
     return r, g, b, alpha
+
+
+def srgb(light: Sequence[float]) -> tuple[float, float, float]:
+    """Return a colour of linear light as sRGB; what `linear` gave comes back."""
+    r, g, b = (c * 12.92 if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in light[:3])
+    return r, g, b

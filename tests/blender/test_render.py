@@ -14,7 +14,7 @@ import pytest
 from digiclay.core.errors import DigiclayError, OutputError
 from digiclay.core.layout import Layout
 from digiclay.core.modes import COLOURS, Mode
-from digiclay.device import view
+from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import render, stage
 
@@ -75,6 +75,16 @@ def test_the_legend_names_the_modes_present_in_their_colours(tmp_path: Path) -> 
     out = render.still(bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2)
     legend = picture(out)[:, : width // 5]
     assert of_the_hue(legend, COLOURS[Mode.HOLD]) > 20
+
+
+def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
+    view.build(bed_in(Mode.HOLD), bpy.context.collection)
+    palettes.wear("tol_muted")
+    width = 2 * WIDTH
+    out = render.still(bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2)
+    legend = picture(out)[:, : width // 5]
+    assert of_the_hue(legend, palettes.PALETTES["tol_muted"][Mode.HOLD]) > 20
+    assert of_the_hue(legend, COLOURS[Mode.HOLD]) < 20
 
 
 def test_a_still_leaves_the_users_file_as_it_was(tmp_path: Path, formed: Instant) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ..bridge import linear
+from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
 from ..core.modes import COLOURS, Mode
 from .parts import ROLE
 
-__all__ = ["DEFAULT", "PALETTES", "WORDS", "wear", "worn"]
+__all__ = ["DEFAULT", "PALETTES", "WORDS", "shown", "wear", "worn"]
 
 Colour = tuple[float, float, float]
 
@@ -40,6 +40,12 @@ WORDS = {
 def worn() -> bool:
     """Tell whether the open file has materials of the modes already, which may be the user's own by now."""
     return any(_material(mode) is not None for mode in Mode)
+
+
+def shown(mode: Mode) -> Colour:
+    """Return the sRGB a mode has in the open file: that of its material, which may be the user's own."""
+    material = _material(mode)
+    return COLOURS[mode] if material is None else srgb(material.diffuse_color)
 
 
 def wear(name: str) -> None:

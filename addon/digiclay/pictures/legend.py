@@ -13,8 +13,8 @@ import numpy as np
 from .. import bridge
 from ..bridge import linear
 from ..compat import bpy, shader_nodes
-from ..core.modes import COLOURS, MEANINGS, Mode
-from ..device import heat, shapes
+from ..core.modes import MEANINGS, Mode
+from ..device import heat, palettes, shapes
 
 __all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]
 
@@ -97,7 +97,7 @@ def of_modes(front: Front, modes: Sequence[Mode]) -> None:
     left, y = LEFT * front.width, 0.86 * front.height
     for mode in modes:
         name, lines = mode.name.lower().replace("_", " "), textwrap.wrap(MEANINGS[mode], 26)
-        for radius, colour, layer in ((0.42, COLOURS[mode], 0), (0.47, FADED, 1)):
+        for radius, colour, layer in ((0.42, palettes.shown(mode), 0), (0.47, FADED, 1)):
             dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
             dot.scale = (radius * size,) * 3
             front.put(dot, left, y + 0.33 * size, colour, layer)
