@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core import live
 from digiclay.core.scene_file import load
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
@@ -18,6 +19,12 @@ from numpy.typing import NDArray
 pytestmark = pytest.mark.usefixtures("extension")
 #: Time between two ticks, s: a session follows ten control periods in each.
 TICK = 0.05
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test records must not depend on who else uses the machine."""
+    monkeypatch.setattr(live, "SHARE", 1e9)
 
 
 @pytest.fixture
@@ -169,6 +176,43 @@ def test_a_session_that_is_stopped_while_it_records_keeps_the_take(bed: Any) -> 
     press(bed)
     tick.stop(bed.session_uid)
     assert [one.seconds for one in takes.entries(bed)] == [pytest.approx(0.6)]
+
+
+def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_former_scene(bed: Any) -> None:
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    press(bed)
+    bed.digiclay.control.virtual_master.force_setpoint = 0.8
+    later = [tick.tick(bpy.context, 101.0 + TICK * count) for count in range(tick.LOOK)]
+    (note,) = [note for notes in later for note in notes]
+    assert "The recording ended and was kept as Take 1" in note.words
+    (entry,) = takes.entries(bed)
+    assert takes.read(bed, entry.number).scene.set_point == 0.4
+    assert running.of(bed).recording is None
+    tick.stop(bed.session_uid)
+    assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
+
+
+def test_a_reset_keeps_what_was_recorded(bed: Any) -> None:
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    press(bed)
+    assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
+    assert [one.seconds for one in takes.entries(bed)] == [pytest.approx(0.6)]
+    assert running.of(bed).recording is None
+    tick.stop(bed.session_uid)
+
+
+def test_a_take_is_exported_while_a_session_runs_and_records(bed: Any, tmp_path: Path) -> None:
+    record(bed)
+    begin(bed)
+    bpy.ops.digiclay.take_record()
+    press(bed, deep=12e-3)
+    file = tmp_path / "live.toml"
+    assert bpy.ops.digiclay.take_export(filepath=str(file)) == {"FINISHED"}
+    assert load(file).simulation.duration == pytest.approx(0.6)
+    assert len(running.of(bed).path) > 1
+    tick.stop(bed.session_uid)
 
 
 @pytest.mark.parametrize("name", ["take_record", "take_keep", "take_replay", "take_export", "take_remove"])

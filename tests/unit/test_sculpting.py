@@ -87,6 +87,20 @@ def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
     assert len(hand.move(session, [(5.0, 38.0)] * 30).gestures) == 2
 
 
+def test_a_marked_gesture_is_taken_back_to_where_it_began_though_the_finger_never_rested() -> None:
+    # A finger undo has put somewhere moves on at once: without the mark the gesture began there.
+    hand = Hand()
+    session = hand.press(started(), -6.0)
+    session = sculpting.restored(session, session.kept, session.pose)
+    session = hand.move(session, [(3.0, 46.0), (6.0, 46.0)])
+    session, gesture = sculpting.marked(session)
+    kept, at = session.kept, session.pose
+    session = sculpting.taken_back(hand.press(session, 9.0), gesture)
+    assert session.kept == kept
+    assert np.array_equal(session.pose, at)
+    assert at[0] == 6e-3
+
+
 def test_gestures_kept_do_not_grow_in_number() -> None:
     hand, session = Hand(), started()
     for _ in range(sculpting.GESTURES + 3):

@@ -61,3 +61,32 @@ def test_a_long_recording_copies_itself_seldom() -> None:
         arrays.add(id(keep.rows))
     assert len(keep.path) == 35001
     assert len(arrays) < 12
+
+
+def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
+    hand = Hand()
+    session = hand.press(sculpting.recording(started(), True), -6.0)
+    session, gesture = sculpting.marked(session)
+    session = hand.press(sculpting.taken_back(hand.press(session), gesture), 6.0)
+    keep = session.recording
+    assert keep is not None
+    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
+    assert packed(session.system, again) == session.kept
+
+
+def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
+    hand = Hand()
+    session, gesture = sculpting.marked(started())
+    session = hand.press(sculpting.recording(hand.press(session), True), 6.0)
+    assert sculpting.taken_back(session, gesture).recording is None
+
+
+def test_a_recording_ends_with_a_reset_that_is_rewound() -> None:
+    # Periods are counted anew from a reset on: those before it are not the recording's.
+    hand = Hand()
+    session = sculpting.recording(sculpting.reset(hand.press(started())), True)
+    session = hand.press(hand.press(session), 6.0)
+    for _ in range(3):
+        session = sculpting.rewound(session)
+    assert session.state.period > 0
+    assert session.recording is None

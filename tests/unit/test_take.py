@@ -129,6 +129,16 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> No
     assert system.grid.count == read.cells
 
 
+def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
+    # Nobody begins to record in the very period a session starts in.
+    system, take, last = taken()
+    away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1))
+    *_, waited = lived(system, begin(system), away)
+    late = as_scene(replace(take, start=packed(system, waited)), "late")
+    done = record(assemble(late), late.trajectory.trajectory(), late.periods)
+    assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
+
+
 def test_only_turning_points_of_the_path_become_waypoints() -> None:
     _, take, _ = taken()
     # The finger was read every 6th period, and goes straight in between.

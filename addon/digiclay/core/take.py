@@ -24,6 +24,7 @@ from .scene import Path, Scene, Waypoint
 from .scene_table import resolve, text
 from .simulation import begin
 from .state import State
+from .system import System
 
 __all__ = ["Take", "as_scene", "difference", "finer", "from_bytes", "replayed", "states", "to_bytes"]
 
@@ -145,7 +146,7 @@ def as_scene(take: Take, name: str) -> Scene:
         When the take does not begin at rest: a scene file has no other beginning.
     """
     system = assemble(take.scene)
-    if packed(system, begin(system)) != take.start:
+    if not _rests(system, take.start):
         raise OutputError(
             f"The take {name!r} begins on a bed that is formed already, and a scene file begins at rest: "
             "reset the session before recording a take for export."
@@ -157,6 +158,16 @@ def as_scene(take: Take, name: str) -> Scene:
     )
     lasting = replace(take.scene.simulation, duration=float(times[-1]))
     return replace(take.scene, name=name, simulation=lasting, trajectory=Path("linear", waypoints))
+
+
+def _rests(system: System, start: bytes) -> bool:
+    """Tell whether a state is that of a bed nothing has happened to, however long it has waited."""
+    state, rest = unpacked(system, start), begin(system)
+    return (
+        all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))
+        and np.array_equal(state.mode(), rest.mode())
+        and packed(system, replace(rest, memory=state.memory)) == packed(system, rest)
+    )
 
 
 def _turning_points(poses: Floats) -> NDArray[np.bool_]:

@@ -78,6 +78,11 @@ class Recording:
         count = int(np.searchsorted(self.rows[: self.count, 7], moment, side="right"))
         return replace(self, count=count) if count and count - 1 == period - self.first else None
 
+    def until(self, period: int) -> Recording | None:
+        """Return the recording up to a period of its own; None when that is before its start."""
+        count = period - self.first + 1
+        return replace(self, count=count) if 0 < count <= self.count else None
+
 
 @dataclass(frozen=True, eq=False)
 class Running:

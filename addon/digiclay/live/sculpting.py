@@ -23,7 +23,10 @@ from ..core.trace import extended, felt, picked, row
 from ..device.instant import CLEARANCE
 from .running import Gesture, Recording, Running
 
-__all__ = ["adapted", "advanced", "begun", "recording", "reset", "restored", "rewound", "stepped"]
+__all__ = [
+    "adapted", "advanced", "begun", "marked", "recording", "reset", "restored", "rewound", "stepped",
+    "taken_back",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -200,13 +203,28 @@ def rewound(running: Running) -> Running:
     if not running.gestures:
         return running
     *earlier, last = running.gestures
-    back = restored(replace(running, gestures=tuple(earlier)), last.kept, last.pose, moment=-1)
-    return replace(back, coming=last)
+    return taken_back(replace(running, gestures=tuple(earlier)), last)
+
+
+def marked(running: Running) -> tuple[Running, Gesture]:
+    """Have a gesture begin now, as a tool knows that a fingertip left to itself does not tell."""
+    gesture = Gesture(running.state.period, running.kept, running.pose)
+    return replace(running, coming=gesture), gesture
+
+
+def taken_back(running: Running, gesture: Gesture) -> Running:
+    """Bring state and finger back to where a gesture began; a recording that began before goes back too."""
+    keep = running.recording
+    back = restored(replace(running, recording=None), gesture.kept, gesture.pose)
+    # The gesture a reset leaves behind has periods of another count.
+    counts = keep is not None and gesture.period == back.state.period
+    return replace(back, coming=gesture, recording=keep.until(gesture.period) if counts else None)
 
 
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
-    before = Gesture(0, running.kept, running.pose)
+    # Before period 0, at which the first gesture after the reset may begin.
+    before = Gesture(-1, running.kept, running.pose)
     pose = running.pose.copy()
     pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
     back = restored(replace(running, gestures=()), None, pose, moment=-1)

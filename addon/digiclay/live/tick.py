@@ -70,9 +70,8 @@ def stop(uid: int) -> Any | None:
     """End a session; return its bed, which keeps the state and a take, or None when that was deleted."""
     ended = running.drop(uid)
     bed = found(uid, ended.name) if ended else None
-    take = takes.recorded(ended) if ended else None
-    if bed is not None and take is not None:
-        takes.keep(bed, take)
+    if ended is not None and bed is not None:
+        takes.keep_recorded(bed, ended)
     return bed
 
 
@@ -156,7 +155,10 @@ def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str
         if session.stale or session.waits or session.moment % LOOK == 0:
             scene = properties.scene_of(bed)
             if scene != session.scene:
-                session, said = sculpting.adapted(session, scene)
+                before = session
+                session, said = sculpting.adapted(before, scene)
+                # A take is of one scene: what was recorded under the former one is not lost.
+                said = ". ".join(filter(None, (said, takes.keep_recorded(bed, before))))
                 bridge.resize_fingertip(view.fingertip_of(bed), scene.fingertip or Fingertip())
         if session.stale:
             at, moment = bed_state.pose(bed), bed_state.moment(bed)

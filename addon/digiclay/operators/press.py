@@ -9,9 +9,9 @@ from .. import bridge, preferences
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device import view
-from ..live import running
+from ..live import running, sculpting, tick, waiting
 from ..press import aim
-from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged, lifted
+from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged
 
 __all__ = ["Press"]
 
@@ -67,10 +67,15 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         except (DigiclayError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
+        if session.stale:
+            self.report({"INFO"}, "The bed is just taking up what was undone: press again")
+            return {"CANCELLED"}
         if session.paused:
             self.report({"WARNING"}, "The session is paused: the pins follow when it goes on")
         place = float(found.point[0]), float(found.point[1])
-        self.uid, self.seen, self.known = session.uid, session.state.period, session.gestures
+        self.uid, self.seen = session.uid, session.state.period
+        session, self.start = sculpting.marked(session)
+        running.put(session)
         self.gesture = begun(found.grid, found.height, finger, at, place, 1e-3 * self.depth)
         self._feel(event)
         self.region, self.last, self.before = context.region, time.perf_counter(), event.mouse_y
@@ -142,14 +147,15 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         return {"FINISHED"}
 
     def _taken_back(self, context: Any, bed: Any) -> set[str]:
-        """Bring bed and fingertip back to where the gesture began; one that touched nothing just ends."""
+        """Bring bed and fingertip back to where the gesture began; a session that waits, the finger alone."""
         self._end(context)
-        context.view_layer.objects.active = bed
-        tip = view.fingertip_of(bed)
-        bridge.place_fingertip(tip, lifted(self.gesture), self.gesture.finger)
-        # The session counts a new gesture wherever the finger rests: there may be several to take back.
-        while any(gesture not in self.known for gesture in running.of(bed).gestures[-1:]):
-            bpy.ops.digiclay.session_rewind()
+        session = running.of(bed)
+        if waiting.obstacle(context, bed, session.system.grid.count):
+            bridge.place_fingertip(view.fingertip_of(bed), self.start.pose, self.gesture.finger)
+            return {"CANCELLED"}
+        back = sculpting.taken_back(session, self.start)
+        tick.show(bed, back)
+        tick.place(context, bed, back)
         return {"CANCELLED"}
 
     def _keep_depth(self, context: Any) -> None:

@@ -1,7 +1,6 @@
 """Start a session: the bed follows its fingertip, however that is moved, until Esc is pressed."""
 
 # No postponed annotations here, as in the other operators.
-import time
 from typing import Any
 
 from ..compat import bpy
@@ -10,11 +9,12 @@ from ..device.view import bed_of
 from ..live import handlers, loop, running, tick
 from ..overlay import views
 from ..recorded.bake import is_baked
+from .session_loop import Looping
 
-__all__ = ["Session", "end_all"]
+__all__ = ["Session"]
 
 
-class Session(bpy.types.Operator):  # type: ignore[misc]
+class Session(Looping, bpy.types.Operator):  # type: ignore[misc]
     """Start to sculpt: the pins follow the fingertip while you move it by any means. Esc stops"""
 
     bl_idname = "digiclay.session"
@@ -53,50 +53,12 @@ class Session(bpy.types.Operator):  # type: ignore[misc]
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self._tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
+        self.tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
         handlers.watch()
         views.follow()
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.runs():
             return {"FINISHED"}
-        self.token = loop.begin(context)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: Any, event: Any) -> set[str]:
-        """Tick with the timer; leave every other event to whoever it is for."""
-        if self.token != loop.token():
-            return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            end_all()
-            return {"FINISHED"}
-        now = time.perf_counter()
-        if event.type != "TIMER" or not loop.due(context, now):
-            return {"PASS_THROUGH"}
-        self._tell(tick.tick(context, now))
-        loop.drawn(context, now)
-        if running.all():
-            return {"PASS_THROUGH"}
-        end_all()
-        return {"FINISHED"}
-
-    def cancel(self, context: Any) -> None:
-        """End with the window the loop was started in."""
-        if self.token == loop.token():
-            handlers.ended("its window was closed")
-
-    def _tell(self, notes: list[tick.Note]) -> None:
-        """Report what there is to tell, and keep it for the panel."""
-        for note in notes:
-            self.report({note.level}, note.words)
-            running.say(note.words)
-
-
-def end_all() -> None:
-    """End all sessions; one undo step holds what they came to."""
-    beds = [tick.stop(session.uid) for session in running.all()]
-    if any(bed is not None for bed in beds):
-        running.say("The session was stopped; the bed keeps its state")
-        bpy.ops.ed.undo_push(message="Stop Session")
-    handlers.ended("")
+        loop.begin(context)
+        return self.begun(context)

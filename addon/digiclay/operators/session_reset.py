@@ -13,6 +13,7 @@ from ..device import view
 from ..device.instant import CLEARANCE
 from ..device.view import bed_of
 from ..live import bed_state, sculpting, tick
+from ..recorded import takes
 from ..settings import properties
 from .session_context import decline_while_waiting, session_of
 
@@ -58,9 +59,12 @@ class ResetSession(bpy.types.Operator):  # type: ignore[misc]
                 _at_rest(context, bed_of(context))
             else:
                 bed, session = active
+                said = takes.keep_recorded(bed, session)
                 back = sculpting.reset(session)
                 tick.show(bed, back)
                 tick.place(context, bed, back)
+                if said:
+                    self.report({"INFO"}, said)
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import sculpting, tick
+from ..recorded import takes
 from .session_context import decline_while_waiting, session_of
 
 __all__ = ["RewindSession"]
@@ -32,6 +33,9 @@ class RewindSession(bpy.types.Operator):  # type: ignore[misc]
         """Go back, the fingertip along with the bed."""
         bed, session = session_of(context)
         back = sculpting.rewound(session)
+        if session.recording is not None and back.recording is None:
+            said = takes.keep_recorded(bed, session) or "The recording ended: the gesture began before it"
+            self.report({"INFO"}, said)
         tick.show(bed, back)
         tick.place(context, bed, back)
         return {"FINISHED"}

@@ -57,6 +57,7 @@ class Device(Panel, bpy.types.Panel):  # type: ignore[misc]
     bl_idname = "DIGICLAY_PT_device"
     bl_label = "Device"
     bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: Any) -> None:
         """Draw the presets, and what a bed needs that no longer is as its settings say."""

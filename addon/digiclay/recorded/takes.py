@@ -8,7 +8,7 @@ from ..core.errors import DigiclayError
 from ..core.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
-__all__ = ["Entry", "entries", "keep", "last", "read", "recorded", "remove"]
+__all__ = ["Entry", "entries", "keep", "keep_recorded", "last", "read", "recorded", "remove"]
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
@@ -67,6 +67,15 @@ def keep(bed: Any, take: Take, name: str = "") -> Entry:
     number = str(max(map(int, held.keys()), default=0) + 1)
     held[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
     return Entry(number, held[number]["name"], take.duration)
+
+
+def keep_recorded(bed: Any, session: Running) -> str:
+    """Keep what a session has recorded before its recording ends; return words about it, empty without."""
+    take = recorded(session)
+    if take is None:
+        return ""
+    entry = keep(bed, take)
+    return f"The recording ended and was kept as {entry.name} ({entry.seconds:.1f} s)"
 
 
 def read(bed: Any, number: str) -> Take:

@@ -1,0 +1,122 @@
+"""The modal part of a session: it ticks, ends with Esc, and now and then lets Blender save by itself.
+
+Blender postpones its automatic saving for as long as any modal operator runs, so a session of an hour
+would be lost in a crash. The operator therefore ends for a moment every so often, and is started anew.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from ..compat import bpy
+from ..live import handlers, loop, running, tick
+from ..overlay import views
+
+__all__ = ["GoOn", "Looping", "end_all"]
+
+#: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
+EVERY, MOMENT = 20.0, 0.1
+
+
+class Looping:
+    """Mixin of the operators that drive the sessions of a window."""
+
+    def begun(self, context: Any) -> set[str]:
+        """Begin to drive the loop that there is."""
+        self.token, self.since = loop.token(), time.perf_counter()
+        self.newer = _others(context)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Tick with the timer; leave every other event to whoever it is for."""
+        if self.token != loop.token():
+            return {"CANCELLED"}
+        if event.type == "ESC" and event.value == "PRESS" and not self.newer & _others(context):
+            end_all()
+            return {"FINISHED"}
+        now = time.perf_counter()
+        if event.type != "TIMER" or not loop.due(context, now):
+            return {"PASS_THROUGH"}
+        self.tell(tick.tick(context, now))
+        loop.drawn(context, now)
+        if not running.all():
+            end_all()
+            return {"FINISHED"}
+        if now - self.since > EVERY and _saves(context) and not _others(context):
+            _go_on_later(self.token, context.window)
+            return {"FINISHED", "PASS_THROUGH"}
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: Any) -> None:
+        """End with the window the loop was started in."""
+        if self.token == loop.token():
+            handlers.ended("its window was closed")
+
+    def tell(self, notes: list[tick.Note]) -> None:
+        """Report what there is to tell, and keep it for the panel."""
+        for note in notes:
+            self.report({note.level}, note.words)  # type: ignore[attr-defined]
+            running.say(note.words)
+
+
+class GoOn(Looping, bpy.types.Operator):  # type: ignore[misc]
+    """Go on with the sessions after Blender had a moment to save by itself"""
+
+    bl_idname = "digiclay.session_go_on"
+    bl_label = "Go On"
+    bl_options = {"INTERNAL"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Sessions without an operator that drives them are needed."""
+        if running.all() and context.window is not None:
+            return True
+        cls.poll_message_set("No session runs")
+        return False
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Drive the loop again."""
+        return self.begun(context)
+
+
+def end_all() -> None:
+    """End all sessions; one undo step holds what they came to."""
+    beds = [tick.stop(session.uid) for session in running.all()]
+    if any(bed is not None for bed in beds):
+        running.say("The session was stopped; the bed keeps its state")
+        bpy.ops.ed.undo_push(message="Stop Session")
+    handlers.ended("")
+
+
+def _saves(context: Any) -> bool:
+    """Tell whether Blender saves by itself."""
+    return bool(context.preferences.filepaths.use_auto_save_temporary_files)
+
+
+def _others(context: Any) -> frozenset[int]:
+    """Return the modal operators of all windows but those that drive sessions."""
+    own = ("DIGICLAY_OT_session", "DIGICLAY_OT_session_go_on")
+    windows = context.window_manager.windows
+    every = (operator for window in windows for operator in window.modal_operators)
+    return frozenset(operator.as_pointer() for operator in every if operator.bl_idname not in own)
+
+
+def _go_on_later(token: int, window: Any) -> None:
+    """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile."""
+    pointer = window.as_pointer()
+
+    def go_on() -> None:
+        if token != loop.token():
+            return
+        windows = bpy.context.window_manager.windows
+        found = next((one for one in windows if one.as_pointer() == pointer), None)
+        if found is None:
+            handlers.ended("its window was closed")
+            views.follow()
+            return
+        with bpy.context.temp_override(window=found):
+            bpy.ops.digiclay.session_go_on("INVOKE_DEFAULT")
+
+    bpy.app.timers.register(go_on, first_interval=MOMENT)
