@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .compat import bpy
 
-__all__ = ["NAME", "register", "run", "unregister"]
+__all__ = ["register", "run", "unregister"]
 
 NAME = "digiclay"
 

@@ -11,7 +11,7 @@ from .live import handlers
 from .press import press_tool
 from .settings import properties
 
-__all__ = ["MODULES", "register", "unregister"]
+__all__ = ["register", "unregister"]
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (

@@ -19,7 +19,7 @@ from .stop import Stop
 from .sweep import workers
 from .worker import Worker, cores
 
-__all__ = ["FAILED", "add"]
+__all__ = ["add"]
 
 EXAMPLES = """\
 examples:

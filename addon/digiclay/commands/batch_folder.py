@@ -23,7 +23,7 @@ from .gallery import Card, page
 from .job import RUNS, TIMING
 from .thumbnail import NAMES
 
-__all__ = ["JOBS", "LOGS", "MARK", "Folder", "opened"]
+__all__ = ["JOBS", "MARK", "Folder", "opened"]
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"

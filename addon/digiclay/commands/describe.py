@@ -15,7 +15,7 @@ from ..core.shape_file import fitted_to
 from ..core.simulation import System
 from .arguments import add_scene, scene_of
 
-__all__ = ["add", "description", "human"]
+__all__ = ["add", "description"]
 
 EXAMPLES = """\
 examples:

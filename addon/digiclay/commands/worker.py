@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-__all__ = ["ERROR", "PROGRESS", "Worker", "cores", "follow", "same_program"]
+__all__ = ["ERROR", "PROGRESS", "Worker", "cores", "follow"]
 
 #: What the lines of a log start with that are meant for the process that started the job.
 PROGRESS, ERROR = "@ ", "! "

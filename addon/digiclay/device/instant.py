@@ -17,7 +17,7 @@ from ..core.fingertip import LEVEL, Fingertip
 from ..core.layout import Layout, grid
 from ..core.modes import Mode
 
-__all__ = ["Instant", "read"]
+__all__ = ["CLEARANCE", "Instant", "read"]
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]

@@ -15,7 +15,7 @@ from . import heat, shapes
 from .instant import Instant
 
 __all__ = [
-    "BED", "ELLIPSOID", "FINGERTIP", "HOUSING", "PIN", "ROLE",
+    "BED", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
     "arrow", "ellipsoid", "fingertip", "housing", "marked", "material", "pins", "skin",
 ]  # fmt: skip
 

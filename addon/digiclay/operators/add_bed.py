@@ -15,9 +15,9 @@ from ..core.scene_table import PRESETS
 from ..device import palettes, view
 from ..device.instant import Instant
 from ..settings import own_presets, properties
+from ..settings.declared import title
 from ..settings.devices import device
-from ..settings.group import PRESET_WORDS, method_items
-from ..settings.property_groups import title
+from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import SHOWN, si
 
 __all__ = ["AddBed", "add", "add_shown", "entry", "select_only", "stand_at_cursor"]

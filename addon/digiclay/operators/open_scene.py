@@ -17,7 +17,7 @@ from ..core.shape_file import sample_shapes
 from ..device import view
 from ..exchange import shape_show
 from ..recorded import sample_take, takes
-from ..settings.property_groups import title
+from ..settings.declared import title
 from .add_bed import add, select_only, stand_at_cursor
 
 __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]

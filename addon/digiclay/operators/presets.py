@@ -11,7 +11,7 @@ from ..core.scene_table import PRESETS
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.devices import laid_out
-from ..settings.group import PRESET_WORDS
+from ..settings.groups import PRESET_WORDS
 
 __all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
 

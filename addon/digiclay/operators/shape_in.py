@@ -12,7 +12,7 @@ from ..device.view import bed_of
 from ..exchange import shape_show
 from ..live import running
 from ..recorded.bake import is_baked
-from ..settings.property_groups import title
+from ..settings.declared import title
 from ..settings.shown_units import SHOWN, si
 
 __all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["CURVES", "Colour", "Look", "contrast", "legible", "look"]
+__all__ = ["Colour", "Look", "contrast", "look"]
 
 #: sRGB.
 Colour = tuple[float, float, float]

@@ -7,7 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.scene_table import PRESETS
 from ..settings import own_presets, properties
-from ..settings.property_groups import title
+from ..settings.declared import title
 from .base import Panel, bed_of
 from .section import section_panel
 

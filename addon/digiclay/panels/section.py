@@ -8,8 +8,8 @@ from ..compat import bpy
 from ..core.methods import METHODS
 from ..core.quantity import quantities
 from ..core.scene import NEEDS, OPTIONAL, parameters
+from ..settings.declared import title
 from ..settings.properties import part_group
-from ..settings.property_groups import title
 from .base import Panel, bed_of
 
 __all__ = ["section_panel"]

@@ -16,7 +16,7 @@ from ..device import view
 from ..device.instant import Instant
 from .legend import Front, of_forces, of_modes
 
-__all__ = ["MARGINS", "camera_place", "half_frame", "outline", "set_up"]
+__all__ = ["MARGINS", "half_frame", "outline", "set_up"]
 
 Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from ..core.quantity import Parameters
 from ..core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
 from ..core.scene_table import ABSENT, resolve
 from ..device.pins_drawn import differs
-from .group import CLASSES, SETTINGS
+from .groups import CLASSES, SETTINGS
 from .table import Notes, read, write
 from .words import named
 

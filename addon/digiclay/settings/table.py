@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.errors import ParameterError
 from ..core.quantity import Parameters
-from .property_groups import INT_MAX, listed
+from .declared import INT_MAX, listed
 from .shown_units import shown, si, unit_of
 
 __all__ = ["Notes", "assign", "read", "reset", "write"]

@@ -8,7 +8,7 @@ from ..core.errors import ParameterError
 from ..core.methods import METHODS
 from ..core.quantity import quantities
 from ..core.scene import SECTIONS, parameters
-from .property_groups import title
+from .declared import title
 from .shown_units import in_words
 
 __all__ = ["named"]

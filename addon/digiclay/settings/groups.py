@@ -12,10 +12,10 @@ from ..core.quantity import quantities
 from ..core.scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
 from ..core.scene_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
-from .property_groups import Update, group, title
+from .declared import Update, group, title
 from .table import assign, read, reset
 
-__all__ = ["CLASSES", "PLAIN", "PRESET_WORDS", "SETTINGS", "method_items"]
+__all__ = ["CLASSES", "PRESET_WORDS", "SETTINGS", "method_items"]
 
 #: Sections whose parameters are the same whatever the method.
 PLAIN = tuple(section for section in SECTIONS if section != "control")

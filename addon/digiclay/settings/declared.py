@@ -15,7 +15,7 @@ from ..core.control.shapes import SHAPES
 from ..core.quantity import Parameters, Quantity
 from .shown_units import shown, unit_of
 
-__all__ = ["group", "title"]
+__all__ = ["INT_MAX", "Update", "group", "listed", "title"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
