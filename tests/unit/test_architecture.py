@@ -37,7 +37,7 @@ LEVELS = (
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display "
     "stack.recording stack.simulation",
-    "export_model simulation control.handover stack.virtual_master stack.behaviours",
+    "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
     "jobs accuracy keeping live shadow stack.assembly",
     "session take",

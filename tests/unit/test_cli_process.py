@@ -50,6 +50,16 @@ def test_a_missing_library_is_told_before_any_work(
     assert (started.returncode, err.count("\n"), install in err, left(here)) == (2, 1, True, []), err
 
 
+def test_a_job_of_a_batch_exports_without_any_library(here: Path) -> None:
+    (here / "jobs.toml").write_text('scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n')
+    assert main(["batch", "jobs.toml", "--prepare", "--quiet"]) == 0
+    (job,) = (here / "jobs" / "jobs").iterdir()
+    assert process("job", str(job), block="trimesh scipy matplotlib").wait(60) == 0
+    made = here / "jobs" / "runs" / job.name
+    assert (made / "surface.stl").is_file()
+    assert (made / "surface.3mf").is_file()
+
+
 LONG = ["run", "my.toml", "--set", "simulation.duration=1e4", "--set", "recorder.every=1000", "--quiet"]
 
 

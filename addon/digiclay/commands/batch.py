@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import DigiclayError
-from ..core.jobs import Batch, Job, batch, find_jobs
+from ..core.jobs import Job, batch, find_jobs
 from .batch_folder import Folder, opened
 from .counted import Counted, duration
 from .job import check_outputs
@@ -54,10 +54,9 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
     made = batch(find_jobs(arguments.file))
-    for job in made.jobs:
-        if job.scene is not None:
-            _refuse_what_none_can_have(made, job)
-            break
+    sound = next((job.scene for job in made.jobs if job.scene is not None), None)
+    if sound is not None:  # outputs that cannot be had here at all are refused before any work
+        check_outputs(sound, made.outputs)
     out: Path = arguments.out or Path(made.name)
     with opened(out, made) as folder:
         for job in made.jobs:
@@ -67,12 +66,6 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 print(f"{len(made.jobs)} jobs written to {out / 'jobs'}")
             return 0
         return _carry_on(arguments, folder)
-
-
-def _refuse_what_none_can_have(made: Batch, job: Job) -> None:
-    """Refuse, before any work, outputs that cannot be had here at all."""
-    assert job.scene is not None
-    check_outputs(job.scene, made.outputs)
 
 
 def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:

@@ -18,8 +18,8 @@ from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
 from .arguments import add_scene
-from .export import refuse_without
 from .progress import Bar
+from .refusals import refuse_without
 from .stop import Stop
 
 __all__ = ["READ", "add", "table"]

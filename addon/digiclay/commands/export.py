@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,13 +14,14 @@ from ..core.errors import OutputError
 from ..core.export import FORMATS, UNITS, known_format, suffix, write
 from ..core.export_model import KINDS, Model, bodies
 from ..core.features import Finding
+from ..core.finished import read
 from ..core.formed import of_history
 from ..core.scene import Scene
 from .arguments import add_run, seconds
-from .finished import read
+from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
-__all__ = ["add", "exported", "formats", "refuse_what_has_no_surface", "refuse_without"]
+__all__ = ["add", "exported", "formats"]
 
 EXAMPLES = """\
 examples:
@@ -60,20 +60,6 @@ def formats(text: str) -> list[str]:
         return list(dict.fromkeys(known_format(name.strip()) for name in text.split(",")))
     except OutputError as error:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
-
-
-def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
-    """Refuse, before any work, to make a surface of a bed that has none."""
-    if min(scene.layout.rows, scene.layout.columns) < 2:
-        raise OutputError(
-            f"{option} needs at least 2 x 2 cells (got {scene.layout.rows} x {scene.layout.columns})."
-        )
-
-
-def refuse_without(module: str, option: str, remedy: str) -> None:
-    """Refuse, before any work, what needs a library that is not installed."""
-    if importlib.util.find_spec(module) is None:
-        raise OutputError(f"{option} needs {module}: run '{remedy}'.")
 
 
 def exported(

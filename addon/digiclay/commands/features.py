@@ -8,11 +8,11 @@ from typing import Any
 
 from ..core.export_model import features
 from ..core.features import summary, table
+from ..core.finished import read
 from ..core.formed import of_history
 from .arguments import add_run, seconds
 from .benchmark_report import table as aligned
-from .export import refuse_what_has_no_surface
-from .finished import read
+from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
 __all__ = ["add"]

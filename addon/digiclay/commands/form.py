@@ -23,8 +23,9 @@ from ..core.session import Result, run, save
 from ..core.shape_file import Fitted, find_shape, fitted_to, sample_shapes
 from ..core.shape_text import packed
 from .arguments import add_scene, scene_of
-from .export import exported, formats, refuse_what_has_no_surface
+from .export import exported, formats
 from .progress import Bar
+from .refusals import refuse_what_has_no_surface
 from .stop import Stop
 
 __all__ = ["add"]

@@ -23,8 +23,9 @@ from ..core.scene import Scene
 from ..core.scene_file import load
 from ..core.session import Result, run, save
 from .counted import Counted
-from .export import exported, formats, refuse_what_has_no_surface, refuse_without
-from .render import draw_film, draw_still, draw_turntable, refuse_without_blender
+from .export import exported, formats
+from .refusals import refuse_what_has_no_surface, refuse_without_blender
+from .render import draw_film, draw_still, draw_turntable
 from .stop import Stop
 from .thumbnail import of_heights, of_picture
 from .worker import ERROR, PROGRESS, follow
@@ -99,7 +100,6 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
         except argparse.ArgumentTypeError as error:
             raise OutputError(f"export: {error}.") from None
         refuse_what_has_no_surface(scene, "export")
-        refuse_without("trimesh", "export", "pip install trimesh")
     if (outputs.drawn or outputs.export) and scene.recorder is None:
         raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
     if outputs.drawn:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.run_folder import may_be_written, written
-from .export import refuse_without
+from .refusals import refuse_without
 from .stop import Stop
 
 __all__ = ["add"]

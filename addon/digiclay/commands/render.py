@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,14 +12,15 @@ from numpy.typing import NDArray
 
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
+from ..core.finished import last_touch, read, row_at
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size
 from .counted import Counted
-from .finished import last_touch, read, row_at
+from .refusals import refuse_without_blender
 from .stop import Stop
 
-__all__ = ["ARRAYS", "add", "draw_film", "draw_still", "draw_turntable", "picture", "refuse_without_blender"]
+__all__ = ["ARRAYS", "add", "draw_film", "draw_still", "draw_turntable", "picture"]
 
 EXAMPLES = """\
 examples:
@@ -74,7 +74,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     looks = _looks(arguments)
     refuse_without_blender()
     run = read(arguments.run, *ARRAYS)
-    row = None if arguments.time is None else row_at(run.history, arguments.time)
+    row = None if arguments.time is None else row_at(run.history, arguments.time, "--time")
     path: Path | None
     if isinstance(looks, Still):
         out = arguments.out or arguments.run / "pins.png"
@@ -117,11 +117,6 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
     if arguments.size is not None:
         given["width"], given["height"] = arguments.size
     return kind(**given)
-
-
-def refuse_without_blender() -> None:
-    """Say what to install, before any work is done."""
-    importlib.import_module("..compat", __package__)
 
 
 def sizes(scene: Scene) -> dict[str, Any]:

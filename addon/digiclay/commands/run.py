@@ -12,15 +12,16 @@ from typing import Any
 from .. import __version__
 from ..core.accuracy import can_be_estimated, estimated
 from ..core.errors import DigiclayError, OutputError, ParameterError, SceneError
+from ..core.finished import last_touch
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.session import Result, run, save
 from .arguments import add_scene, length, scene_of
 from .budget import noted, within
-from .export import exported, formats, refuse_what_has_no_surface, refuse_without
-from .finished import last_touch
+from .export import exported, formats
 from .progress import Bar
-from .render import picture, refuse_without_blender
+from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
+from .render import picture
 from .stop import Stop
 
 __all__ = ["add"]
@@ -60,7 +61,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--no-errors",
         action="store_true",
-        help="do not estimate the errors, which takes twice the run's time",
+        help="do not estimate the errors, which takes some one and a half times the run's time",
     )
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
     parser.set_defaults(carry_out=carry_out)

@@ -8,11 +8,11 @@ from typing import Any
 from ..core.errors import OutputError
 from ..core.export_model import Model
 from ..core.features import Finding
+from ..core.finished import Run, row_at
 from ..core.quantity import parse
 from ..core.scene import Scene
 from ..core.skins import SKINS
 from .arguments import seconds
-from .finished import Run, row_at
 
 __all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]
 
@@ -58,7 +58,7 @@ def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
 
 def row_of(run: Run, time: float | None) -> int:
     """Return the row of an instant, s; the last one where none is given."""
-    return -1 if time is None else row_at(run.history, time)
+    return -1 if time is None else row_at(run.history, time, "--time")
 
 
 def former_of(run: Run, text: str) -> int | float:
@@ -69,10 +69,7 @@ def former_of(run: Run, text: str) -> int | float:
         time = seconds(text)
     except argparse.ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
-    try:
-        return row_at(run.history, time)
-    except OutputError as error:
-        raise OutputError(str(error).replace("--time", "--former")) from None
+    return row_at(run.history, time, "--former")
 
 
 def _length(text: str, option: str) -> float:

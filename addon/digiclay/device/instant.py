@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..commands import finished
+from ..core import finished
 from ..core.actuator import Actuator
 from ..core.errors import OutputError
 from ..core.fingertip import LEVEL, Fingertip

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import OutputError
-from ..core.scene import Scene
-from ..core.scene_file import load
+from .errors import OutputError
+from .scene import Scene
+from .scene_file import load
 
 __all__ = ["Run", "last_touch", "read", "row_at"]
 
@@ -29,7 +29,6 @@ SHAPES: dict[str, tuple[str | int, ...]] = {
 class Run:
     """Scene and history of a run."""
 
-    folder: Path
     scene: Scene
     history: dict[str, NDArray[Any]]
 
@@ -58,14 +57,16 @@ def read(folder: Path, *names: str) -> Run:
         shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
         if array.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {array.shape}).")
-    return Run(folder, scene, history)
+    return Run(scene, history)
 
 
-def row_at(history: Mapping[str, NDArray[Any]], time: float) -> int:
-    """Return the row nearest to a time, s, within the session."""
+def row_at(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
+    """Return the row nearest to a time, s, within the session; a message calls the time by a name."""
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
-        raise OutputError(f"--time must be between {moments[0]:g} s and {moments[-1]:g} s (got {time:g} s).")
+        raise OutputError(
+            f"{called} must be between {moments[0]:g} s and {moments[-1]:g} s (got {time:g} s)."
+        )
     return int(np.argmin(np.abs(moments - time)))
 
 
