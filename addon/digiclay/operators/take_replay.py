@@ -10,13 +10,13 @@ from .. import bridge, preferences
 from ..compat import bpy
 from ..core.assembly import assemble
 from ..core.errors import DigiclayError
-from ..core.fingertip import Fingertip
+from ..core.fingertip import LEVEL, Fingertip
 from ..core.keeping import packed, unpacked
 from ..core.live import Clock, due, lived
 from ..core.take import MOST_PARTS, Take, finer
 from ..device import view
 from ..device.view import bed_of
-from ..live import bed_state, sculpting
+from ..live import bed_state, sculpting, tick
 from ..live.running import Running
 from ..recorded import takes
 from ..settings import properties
@@ -110,6 +110,9 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
         """Read the take and put everything to its start."""
         bed = bed_of(context)
         self._uid = bed.session_uid
+        tip = view.fingertip_of(bed)
+        # Where the finger is now: it may have been moved since the last session.
+        self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
         self._took: Take = takes.read(bed, self.take or takes.last(bed))
         self._system = assemble(finer(self._took.scene, self.parts))
         if self._system.grid.count != len(bed.data.vertices):
@@ -165,15 +168,11 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
         if bed is not None:
             try:
                 scene = properties.scene_of(bed)
-                tip = view.fingertip_of(bed)
-                at = bed_state.pose(bed)
                 before, _ = sculpting.begun(
-                    bed.session_uid, bed.name, scene,
-                    bridge.pose(tip) if at is None else at, bed_state.kept(bed),
-                )  # fmt: skip
+                    bed.session_uid, bed.name, scene, self._stood, bed_state.kept(bed)
+                )
                 view.show_state(bed, before.system, before.state)
-                if at is not None and tip is not None:
-                    bridge.place_fingertip(tip, at, scene.fingertip or Fingertip())
+                tick.place(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
         self.report({"INFO"}, "Replay stopped: the bed is as it was")
