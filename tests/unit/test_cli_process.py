@@ -54,7 +54,9 @@ def test_a_job_of_a_batch_exports_without_any_library(here: Path) -> None:
     (here / "jobs.toml").write_text('scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n')
     assert main(["batch", "jobs.toml", "--prepare", "--quiet"]) == 0
     (job,) = (here / "jobs" / "jobs").iterdir()
-    assert process("job", str(job), block="trimesh scipy matplotlib").wait(60) == 0
+    started = process("job", str(job), block="trimesh scipy matplotlib")
+    _, err = started.communicate(timeout=60)
+    assert started.returncode == 0, err
     made = here / "jobs" / "runs" / job.name
     assert (made / "surface.stl").is_file()
     assert (made / "surface.3mf").is_file()
