@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from digiclay.commands import benchmark_stiff_runs as stiff
 from digiclay.commands.benchmark_cases import CASES, EASY
+from digiclay.core.errors import DivergenceError
 from numpy.typing import NDArray
 
 #: Numpy calls a period may cost more than the easy case.
 MOST = 10.0
+#: Steppers that may fail, but not silently.
+EXPLICIT = ("euler", "heun", "runge_kutta_4")
 WELL = [name for name, case in CASES.items() if not case.why]
 
 
@@ -52,6 +55,31 @@ def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(
     shortest, short, *longer = [max(error, floor) for error in errors]
     assert shortest <= min(short, *longer), errors
     assert short <= max(longer), errors
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_no_explicit_stepper_is_wrong_without_telling(
+    name: str, commands: dict[str, NDArray[np.float64]]
+) -> None:
+    # It stops, or its estimate is at least half its error; up to 0.1 mm is no failure.
+    case = CASES[name]
+    exact, _ = stiff.reference(case, commands[name], stiff.ROUGH)
+    said = {
+        (stepper, step): stiff.outcome(case, commands[name], exact, stepper, step)
+        for stepper in EXPLICIT
+        for step in stiff.STEPS
+    }
+    assert [key for key, one in said.items() if one.silent] == []
+
+
+@pytest.mark.parametrize("stepper", EXPLICIT)
+def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(
+    stepper: str, commands: dict[str, NDArray[np.float64]]
+) -> None:
+    with pytest.raises(
+        DivergenceError, match=r"At 0\.\d+ s the height of cell \d+ became inf\. Use a shorter"
+    ):
+        stiff.replayed(CASES[EASY], commands[EASY], stepper, 20e-3, 20e-3)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.accuracy import SHARE, judging
 from ..core.assembly import assemble
 from ..core.control.replay import Replay
 from ..core.errors import DivergenceError
-from ..core.scene import STEPPERS, part
 from ..core.simulation import begin, periods
 from ..core.system import System
 from ..core.trajectory import Trajectory
@@ -164,20 +164,16 @@ def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: flo
     try:
         with strict():
             found = replayed(case, commands, stepper, step, period)
-            error = float(np.abs(found - exact[every - 1 :: every]).max())
-            if error <= WRONG:
-                return Outcome(error)
-            finer = replayed(case, commands, stepper, step / 2, period)
     except DivergenceError as wrong:
         return Outcome(float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s")
     except (FloatingPointError, RuntimeWarning) as wrong:
         return Outcome(float("nan"), stopped=str(wrong).partition(" encountered")[0])
     except AssertionError as wrong:
         return Outcome(float("nan"), stopped=f"INVARIANT: {wrong}")
-    order = 2.0 ** _order(stepper)
-    return Outcome(error, order / (order - 1.0) * float(np.abs(found - finer).max()))
-
-
-def _order(stepper: str) -> int:
-    """Return a stepper's declared order."""
-    return int(part(*STEPPERS[stepper]).order)
+    error = float(np.abs(found - exact[every - 1 :: every]).max())
+    if error <= WRONG:
+        return Outcome(error)
+    judge = judging(scene(case, stepper, step, period).simulation)
+    with strict():
+        finer = replayed(case, commands, judge.stepper, judge.physics_step, period)
+    return Outcome(error, SHARE * float(np.abs(found - finer).max()))
