@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.layout import Layout, grid
-from digiclay.core.surface import prism_volume, solid
+from digiclay.core.surface import solid
 from hypothesis import example, given
 from hypothesis import strategies as st
+
+from tests.prisms import prism_volume
 
 #: Volumes are sums of up to 1e4 terms, the largest about 100 times the result: rounding stays below this.
 ROUNDING = 1e-9

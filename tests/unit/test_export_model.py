@@ -11,7 +11,8 @@ from digiclay.core.export_model import KINDS, Model, bodies
 from digiclay.core.features import Finding
 from digiclay.core.formed import Formed, of_history
 from digiclay.core.layout import Layout, grid
-from digiclay.core.surface import prism_volume
+
+from tests.prisms import prism_volume
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from digiclay.core.errors import ParameterError
 from digiclay.core.layout import Layout, grid
-from digiclay.core.surface import BASE_THICKNESS, base_level, grid_shape, prism_volume, skin, solid
+from digiclay.core.surface import BASE_THICKNESS, base_level, grid_shape, skin, solid
+
+from tests.prisms import prism_volume
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 

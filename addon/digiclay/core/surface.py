@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
 
-__all__ = ["BASE_THICKNESS", "base_level", "check_heights", "grid_shape", "prism_volume", "skin", "solid"]
+__all__ = ["BASE_THICKNESS", "base_level", "check_heights", "grid_shape", "skin", "solid"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -165,26 +165,6 @@ def solid(
     faces[:faced], faces[2 * faced :] = over, walls
     np.add(over[:, ::-1], n, out=faces[faced : 2 * faced])
     return vertices, faces
-
-
-def prism_volume(
-    position: ArrayLike,
-    height: ArrayLike,
-    rows: int,
-    columns: int,
-    *,
-    base: float | None = None,
-    base_thickness: float = BASE_THICKNESS,
-) -> float:
-    """Return the volume between the skin and the base, m³.
-
-    Exact: the sum over the triangles of area in plan times mean height above the base. The
-    parameters are those of `solid`.
-    """
-    place, top = check_heights(position, height, rows, columns)
-    level = base_level(top, base=base, base_thickness=base_thickness)
-    faces = skin(place, top, rows, columns)
-    return float(np.sum(_plan_area(place, faces) * (top[faces].mean(axis=1) - level)))
 
 
 def base_level(

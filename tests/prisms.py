@@ -1,0 +1,22 @@
+"""The volume under a skin, reckoned without the solid that it is compared with."""
+
+from __future__ import annotations
+
+import numpy as np
+from digiclay.core.surface import base_level, skin
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: float | None = None) -> float:
+    """Return the volume between the skin and the base, m³.
+
+    Exact: the sum over the triangles of area in plan times mean height above the base, which is
+    that of `solid` unless it is given, m.
+    """
+    faces = skin(place, height, rows, columns)
+    (ax, ay), (bx, by), (cx, cy) = (place[faces[:, corner]].T for corner in range(3))
+    area = 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+    level = base_level(height) if base is None else base
+    return float(np.sum(area * (height[faces].mean(axis=1) - level)))
