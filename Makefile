@@ -46,7 +46,7 @@ test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
 test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 600 -- tests/window
+	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 900 -- tests/window
 
 test-proof: ## judge exported meshes by admesh, assimp and PrusaSlicer, which root installs on Debian
 	@tools/proof .reports
