@@ -133,6 +133,16 @@ def test_a_method_that_counts_no_losses_has_none() -> None:
     assert bare.metrics["losses"] is None
 
 
+def test_a_bed_that_begins_with_a_shape_counts_what_its_method_counts() -> None:
+    bed = {
+        "layout": {"rows": 11, "columns": 11},
+        "shape": {"file": "crater"},
+        "simulation": {"duration": 0.02},
+    }
+    assert trial(resolve({**bed, "control": {"method": "elastic"}})).losses is None
+    assert trial(resolve(bed)).losses == 0
+
+
 def test_a_trial_that_is_asked_to_stop_does() -> None:
     with pytest.raises(KeyboardInterrupt):
         trial(device(rows=11, columns=11), stopped=lambda: True)

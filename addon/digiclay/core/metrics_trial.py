@@ -100,8 +100,8 @@ def trial(
     period = scene.simulation.control_period
 
     def listen(state: State) -> None:
-        more = getattr(state.memory, "losses", 0) - len(lost)
-        lost.extend([state.period * period] * more)
+        losses = getattr(state.memory, "losses", None) or 0  # a method that has no finger to lose counts none
+        lost.extend([state.period * period] * (losses - len(lost)))
 
     done = run(replace(scene, recorder=Recorder()), progress=progress, stopped=stopped, watched=listen)
     if done.incomplete:
