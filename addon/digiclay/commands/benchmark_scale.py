@@ -152,7 +152,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 def _text(sizes: list[Size]) -> Iterator[str]:
     """Give the lines of the report."""
     yield made_with()
-    yield "\nThe same finger, pressing and dragging, 1.6 s; default parts, control period 5 ms, step 1 ms\n"
+    yield "\nThe same finger, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
     head = ("pins", "taking part", "period, µs", "to smallest", "CPU mean, µs", "built in, ms", "bytes a pin")
     rows = [
         [

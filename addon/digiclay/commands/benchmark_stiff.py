@@ -34,14 +34,17 @@ __all__ = ["add"]
 
 def add(kinds: Any) -> None:
     """Add the benchmark."""
-    examples = "  digiclay benchmark stiff\n  digiclay benchmark stiff --quick --out results\n"
+    examples = "  digiclay benchmark stiff\n  digiclay benchmark stiff --full --out results\n"
     parser = add_kind(kinds, "stiff", "what the steppers withstand: stiff and extreme cases", examples)
+    parser.add_argument(
+        "--full", action="store_true", help="also the adaptive stepper, which takes longer than all others"
+    )
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run the table and print it."""
-    steppers = ("bernoulli", "euler") if arguments.quick else tuple(STEPPERS)
+    steppers = _steppers(quick=arguments.quick, full=arguments.full)
     started = time.process_time()
     lines: list[list[str]] = []
     figures: list[list[Any]] = []
@@ -77,6 +80,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = ("case", "stepper", "step_ms", "error_um", "own_estimate_um", "stopped", "reference_error_um")
     kept(arguments.out, "stiff", text, head, figures)
     return 0
+
+
+def _steppers(*, quick: bool, full: bool) -> tuple[str, ...]:
+    """Return the names of the steppers a table is made of."""
+    if quick:
+        return ("bernoulli", "euler")
+    return tuple(name for name in STEPPERS if full or name != "adaptive")
 
 
 def _took(case: Case, commands: Floats) -> float:
