@@ -25,7 +25,7 @@ def needs_idle_bed(operator: Any, context: Any) -> bool:
     """Tell whether a bed is active that no session runs on; if not, the operator says why."""
     bed = bed_of(context)
     if bed is None:
-        operator.poll_message_set("Select a Digital Clay bed or its fingertip first")
+        operator.poll_message_set("Select a bed or its fingertip first")
         return False
     if running.of(bed) is not None:
         operator.poll_message_set("Stop the session on this bed first")
@@ -115,7 +115,10 @@ class FreeBake(bpy.types.Operator):  # type: ignore[misc]
     def poll(cls, context: Any) -> bool:
         """A bed with a bake is needed."""
         bed = bed_of(context)
-        if bed is None or not bake.is_baked(bed):
+        if bed is None:
+            cls.poll_message_set("Select a bed or its fingertip first")
+            return False
+        if not bake.is_baked(bed):
             cls.poll_message_set("The bed has no bake")
             return False
         return True

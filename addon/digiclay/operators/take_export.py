@@ -18,7 +18,10 @@ __all__ = ["ExportTake", "RemoveTake", "needs_take"]
 def needs_take(operator: Any, context: Any) -> bool:
     """Tell whether the active bed has a take; if not, the operator says why."""
     bed = bed_of(context)
-    if bed is None or not takes.entries(bed):
+    if bed is None:
+        operator.poll_message_set("Select a bed or its fingertip first")
+        return False
+    if not takes.entries(bed):
         operator.poll_message_set("The bed has no take: record one in a session first")
         return False
     return True

@@ -1,0 +1,204 @@
+"""Drives a session by playback and by the gizmo, from second windows, during a render, in other views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+#: Size of the move gizmo: its arrows end so many pixels from its middle.
+ARROW = 65
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do one after the other, each on a bed that is at rest."""
+    yield from blender.empty_scene()
+    blender.call(bpy.ops.mesh.digital_clay_add)
+    bpy.ops.ed.undo_push(message="Add")
+    blender.key("HOME", blender.middle())
+    yield None
+    yield from gizmo(blender)
+    yield from playback(blender)
+    yield from windows(blender)
+    yield from render(blender)
+    yield from views(blender)
+
+
+def start(blender: Any, window: Any = None) -> Iterator[float | None]:
+    """Start a session on the bed, at rest, in the first window or another one."""
+    blender.select(blender.beds()[0])
+    if window is None:
+        blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    else:
+        with bpy.context.temp_override(window=window):
+            bpy.ops.digiclay.session("INVOKE_DEFAULT")
+    yield from blender.settle()
+
+
+def gizmo(blender: Any) -> Iterator[float | None]:
+    """Press the bed by dragging the gizmo's blue arrow."""
+    yield from start(blender)
+    blender.select(blender.fingertip())
+    blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
+    yield None
+    tip = blender.fingertip().matrix_world.translation.copy()
+    below = tip.copy()
+    below.z -= 0.12
+    here, there = np.array(blender.pixel(tip)), np.array(blender.pixel(below))
+    arrow = here - ARROW * (there - here) / np.linalg.norm(there - here)
+    # The arrow is lit up by one move over it, and taken by the next event.
+    for shift in (3, 1, 0):
+        blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(arrow + shift).astype(int).tolist()))
+        yield None
+    blender.event("LEFTMOUSE", "PRESS", tuple(np.rint(arrow).astype(int).tolist()))
+    for step in range(1, 7):
+        at = arrow + step / 6 * (there - here)
+        blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(at).astype(int).tolist()))
+        yield None
+        blender.look(f"gizmo {step}")
+    blender.shot("play_gizmo")
+    blender.event("LEFTMOUSE", "RELEASE", tuple(np.rint(arrow + there - here).astype(int).tolist()))
+    yield from blender.settle()
+    blender.look("gizmo")
+    blender.key("ESC", blender.middle())
+    yield 0.5
+    at_rest(blender)
+
+
+def playback(blender: Any) -> Iterator[float | None]:
+    """Play a keyframed fingertip; the first Esc stops the session, the next one the playback."""
+    tip = blender.fingertip()
+    for frame, z in ((1, 0.54), (24, 0.44), (48, 0.54)):
+        tip.location = 0.0, 0.0, z
+        tip.keyframe_insert("location", frame=frame)
+    scene = blender.window().scene
+    scene.frame_end = 48
+    scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
+    scene.frame_set(1)
+    yield from start(blender)
+    blender.call(bpy.ops.screen.animation_play)
+    yield from until(lambda: lowest(blender) < 39.5)
+    blender.look("played")
+    blender.shot("play_playback")
+    for name in ("after one Esc", "after two"):
+        blender.key("ESC", blender.middle())
+        yield 1.0
+        blender.look(name)
+        blender.SEEN[name]["plays"] = bpy.context.screen.is_animation_playing
+    blender.fingertip().animation_data_clear()
+    at_rest(blender)
+
+
+def lowest(blender: Any) -> float:
+    """Return the lowest pin drawn, mm."""
+    return float(1e3 * blender.part("bridge").read_cells(blender.beds()[0].data)["height"].min())
+
+
+def windows(blender: Any) -> Iterator[float | None]:
+    """Close a second window in mid-session; then close the one the session was started in."""
+    yield from start(blender)
+    bpy.ops.wm.window_new()
+    yield 1.0
+    yield from closed(blender, "second window closed")
+    blender.key("ESC", blender.middle())
+    yield 0.5
+    bpy.ops.wm.window_new()
+    yield 1.0
+    yield from start(blender, bpy.context.window_manager.windows[-1])
+    blender.look("started in the second")
+    yield from closed(blender, "its own window closed")
+
+
+def closed(blender: Any, name: str) -> Iterator[float | None]:
+    """Close the last window."""
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+        bpy.ops.wm.window_close()
+    yield 1.5
+    blender.look(name)
+    blender.SEEN[name]["windows"] = len(bpy.context.window_manager.windows)
+
+
+def render(blender: Any) -> Iterator[float | None]:
+    """Render a picture in mid-session."""
+    scene = blender.window().scene
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.location.z = 3.0
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 256, False
+    scene.render.resolution_x, scene.render.resolution_y = 320, 240
+    bpy.context.preferences.view.render_display_type = "NONE"
+    yield from start(blender)
+    blender.call(bpy.ops.render.render, "INVOKE_DEFAULT")
+    waits: list[str] = []
+    blender.SEEN["waits in a render"] = waits
+    for _ in range(100):
+        yield 0.2
+        waits += {session.waits for session in blender.part("live.running").all()} - set(waits)
+        if not bpy.app.is_job_running("RENDER"):
+            break
+    yield from blender.settle()
+    blender.look("rendered")
+
+
+def views(blender: Any) -> Iterator[float | None]:
+    """Press in an orthographic view, and in the top view of a quad view."""
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    area, region = blender.view()
+    area.spaces.active.region_3d.view_perspective = "ORTHO"
+    # Blender works out the matrices of a view when it draws it.
+    yield from until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
+    yield from tapped(blender, region, area.spaces.active.region_3d, (-15.0, 9.0), "orthographic")
+    blender.shot("play_orthographic")
+    blender.call(bpy.ops.screen.region_quadview)
+    yield 1.0
+    area, _ = blender.view()
+    for region in (one for one in area.regions if one.type == "WINDOW"):
+        if region.data.view_matrix.to_quaternion().angle < 1e-3:  # seen from straight above
+            yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
+    blender.shot("play_quad")
+    blender.call(bpy.ops.screen.region_quadview)
+    yield None
+
+
+def tapped(
+    blender: Any, region: Any, looking: Any, place: tuple[float, float], name: str
+) -> Iterator[float | None]:
+    """Press at a place of the bed, mm, in a region, and write down where the finger went down."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    from mathutils import Vector
+
+    scale = blender.part("bridge").SCALE * 1e-3
+    world = blender.beds()[0].matrix_world @ (Vector((*place, 40.0)) * scale)
+    seen = location_3d_to_region_2d(region, looking, world)
+    at = region.x + round(seen.x), region.y + round(seen.y)
+    blender.event("MOUSEMOVE", "NOTHING", at)
+    yield 0.3
+    blender.event("LEFTMOUSE", "PRESS", at)
+    yield from until(lambda: pressed(blender))
+    blender.look(name)
+    blender.event("LEFTMOUSE", "RELEASE", at)
+    yield from until(lambda: not pressed(blender))
+
+
+def pressed(blender: Any) -> bool:
+    """Tell whether the finger is down where the Press tool presses it, 4 mm below the pins."""
+    return bool(blender.part("bridge").pose(blender.fingertip())[2] < 36.1e-3)
+
+
+def until(found: Callable[[], bool]) -> Iterator[float | None]:
+    """Wait until something is so, however slow the machine is: at most 30 s."""
+    for _ in range(120):
+        yield 0.25
+        if found():
+            return
+
+
+def at_rest(blender: Any) -> None:
+    """Bring the bed back to rest, the fingertip above it."""
+    blender.select(blender.beds()[0])
+    blender.call(bpy.ops.digiclay.session_reset)
+    blender.fingertip().location = 0.0, 0.0, 0.54
+    bpy.ops.ed.undo_push(message="At rest")
