@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from digiclay.commands import benchmark_stiff_runs as stiff
-from digiclay.commands.benchmark_cases import CASES, EASY
+from digiclay.commands.benchmark_cases import CASES, EASY, HOLD
 from digiclay.core.errors import DivergenceError
 from numpy.typing import NDArray
 
@@ -14,6 +16,16 @@ MOST = 10.0
 #: Steppers that may fail, but not silently.
 EXPLICIT = ("euler", "heun", "runge_kutta_4")
 WELL = [name for name, case in CASES.items() if not case.why]
+
+#: A single pin's error goes from -34 µm at 25 ms to +5 µm at 50 ms: there it changes its sign. In larger
+#: beds another pin has the largest.
+CROSSES_ZERO = ("one pin",)
+
+
+def at_shared_ends(height: NDArray[np.float64], exact: NDArray[np.float64], period: float) -> float:
+    """Return the largest height error where control periods of all lengths end: with the held commands; m."""
+    own, every = round(HOLD / period), round(HOLD / stiff.PERIOD)
+    return float(np.abs(height[own - 1 :: own] - exact[every - 1 :: every]).max())
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +60,14 @@ def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(
 ) -> None:
     case = CASES[name]
     exact, off = stiff.reference(case, commands[name], stiff.ROUGH)
-    errors = [stiff.outcome(case, commands[name], exact, "bernoulli", step).error for step in stiff.STEPS]
+    errors = []
+    for step in stiff.STEPS:
+        period = stiff.period_of(step)
+        height = stiff.replayed(case, commands[name], "bernoulli", step, period)
+        errors.append(at_shared_ends(height, exact, period))
     floor = max(off, 1e-12)
-    # The longest steps have control periods of their own, and errors at the ends of those: which of two
-    # is larger may be chance there. None is smaller than at the shortest step.
-    shortest, short, *longer = [max(error, floor) for error in errors]
-    assert shortest <= min(short, *longer), errors
-    assert short <= max(longer), errors
+    known = errors[:-1] if name in CROSSES_ZERO else errors
+    assert all(finer <= max(coarser, floor) for finer, coarser in pairwise(known)), errors
 
 
 @pytest.mark.parametrize("name", CASES)
