@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.core.assembly import assemble
 from digiclay.core.errors import ParameterError
 from digiclay.core.recorder import (
     Recorder,
@@ -16,7 +17,10 @@ from digiclay.core.recorder import (
     refuse_what_cannot_fit,
     write,
 )
+from digiclay.core.simulation import begin, periods
 from digiclay.core.state import Rows, State, at_rest
+
+from tests.assemble import sample
 
 ROWS = Rows(physics=2, queue=2)
 CELLS = 3
@@ -129,3 +133,25 @@ def test_a_bed_too_large_for_any_history_is_refused_as_such() -> None:
 def test_this_machine_has_some_memory() -> None:
     # Less than this could not have started the interpreter that runs the test.
     assert available_memory() > 10_000_000
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_rows_written_together_are_those_of_the_states_one_by_one(every: int) -> None:
+    scene = sample("tap")
+    system = assemble(scene)
+    start = begin(system)
+    recording = Recording(Recorder(every), system.rows, start, scene.periods)
+    height, force, command, mode = [start.row(0)], [start.row(system.rows.force)], [], []
+    for state in periods(system, scene.trajectory.trajectory(), start, scene.periods):
+        recording.observe(state)
+        if (state.period - 1) % every == 0:
+            command.append(state.row(system.rows.command))
+            mode.append(state.mode())
+        if state.period % every == 0:
+            height.append(state.row(0))
+            force.append(state.row(system.rows.force))
+    rows = recording.arrays()
+    told = {"height": height, "force": force, "command": command, "mode": mode}
+    assert {name: np.array_equal(rows[name][: len(told[name])], told[name]) for name in told} == {
+        "height": True, "force": True, "command": True, "mode": True,
+    }  # fmt: skip

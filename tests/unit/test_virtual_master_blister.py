@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister
@@ -58,7 +56,7 @@ def test_cells_outside_the_blister_keep_their_target() -> None:
 
 
 def test_blister_targets_stay_within_the_stroke() -> None:
-    _, orders = created(master(height=100e-3, edge=130e-3), replace(bed(), height=np.full(BED.count, 0.13)))
+    _, orders = created(master(height=100e-3, edge=130e-3), bed()._replace(height=np.full(BED.count, 0.13)))
     assert orders.target.max() == 100e-3
 
 
@@ -112,7 +110,7 @@ def test_where_no_edge_cell_lies_ahead_the_edge_height_is_kept() -> None:
 
 def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
     """Return a bed whose cells behind a finger that moves along x stand higher than the profile."""
-    return replace(bed(), target=np.full(BED.count, 44e-3), mode=bed(mode=mode).mode)
+    return bed()._replace(target=np.full(BED.count, 44e-3), mode=bed(mode=mode).mode)
 
 
 EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
@@ -154,7 +152,7 @@ def test_a_blister_that_outgrows_a_frozen_cell_takes_it_along() -> None:
 
 
 def test_a_dent_that_outgrows_a_frozen_cell_takes_it_along() -> None:
-    seen = replace(ridge(Mode.FROZEN), target=np.full(BED.count, 39e-3))
+    seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, 39e-3))
     _, orders = created(master(*EAST, height=31e-3), seen)
     assert orders.target[at(-12, 0)] == pytest.approx(37e-3, abs=1e-9)
 

@@ -119,4 +119,8 @@ def _put_back(system: System, state: State) -> tuple[Cells, float]:
 
 def _together(near: Cells, moving: Cells, controlled: Cells) -> Cells:
     """Return the near cells first, then the moving and controlled ones that are not among them, ascending."""
-    return np.concatenate([near, np.setdiff1d(np.concatenate([moving, controlled]), near)])
+    others: Cells = np.unique(np.concatenate([moving, controlled]))
+    if not near.size:
+        return others
+    at = np.minimum(near.searchsorted(others), near.size - 1)
+    return np.concatenate([near, others[near.take(at) != others]])

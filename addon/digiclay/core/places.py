@@ -172,8 +172,7 @@ class Segment:
     nodes: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Measurement:
+class Measurement(NamedTuple):
     """What a controller sees of some cells.
 
     Attributes

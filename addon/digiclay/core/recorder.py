@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 BYTES_A_CELL = 3 * 8 + 1
 #: Bytes of memory assumed where the system does not tell.
 ASSUMED_MEMORY = 8 * 2**30
+#: Most rows that wait to be written together.
+CHUNK = 64
 
 
 @dataclass(frozen=True)
@@ -57,48 +59,72 @@ class Recording:
 
     def __init__(self, recorder: Recorder, rows: Rows, state: State, periods: int) -> None:
         count, cells = recorder.rows(periods), state.rows.shape[1]
-        self._every, self._rows, self._done = recorder.every, rows, 0
-        self._period = np.zeros(count, np.int64)
-        self._height, self._force, self._command = np.zeros((3, count, cells))
-        self._mode = np.zeros((count, cells), np.int8)
+        self._every, self._rows, self._last = recorder.every, rows, periods
+        # Not filled: numpy gives memory that is to be filled later in large pages, of which the first
+        # touch costs a quarter.
+        self._period = np.empty(count, np.int64)
+        self._height, self._force, self._command = np.empty((3, count, cells))
+        self._mode = np.empty((count, cells), np.int8)
+        self._done, self._begun = 0, 0
+        self._state = state
+        self._felt: list[Floats] = []
+        self._given: list[tuple[Floats, NDArray[np.int8]]] = []
         self._keep(0, state)
-        self._mode[0] = state.mode()
-        self._last = periods
 
     def observe(self, state: State) -> None:
         """Take in the state after a control period."""
-        started = state.period - 1
-        if started % self._every == 0:
-            held = state.gathered
-            self._fill(self._command, self._done, state, self._rows.command)
-            modes = self._mode[self._done]
-            modes[:] = state.modes
-            modes[held.cells] = held.mode
+        held, last = state.gathered, self._state
+        if held.cells is not last.gathered.cells or state.rows is not last.rows or len(self._given) >= CHUNK:
+            self._flush()
+        self._state = state
+        if (state.period - 1) % self._every == 0:
+            self._given.append((held.block[self._rows.command].copy(), held.mode.copy()))
         if state.period % self._every == 0 or state.period == self._last:
-            self._keep(self._done + 1, state)
+            self._felt.append(held.block.take((0, self._rows.force), axis=0))
+            self._period[self._done + len(self._felt)] = state.period
 
     def finish(self, state: State) -> None:
         """Keep the state the session ended in; one that was cut short ends between two rows."""
+        self._flush()
         if self._period[self._done] != state.period:
             self._keep(self._done + 1, state)
         self._mode[self._done] = state.mode()
 
     def _keep(self, row: int, state: State) -> None:
         """Copy what belongs to an instant into a row."""
-        self._fill(self._height, row, state, 0)
-        self._fill(self._force, row, state, self._rows.force)
-        self._period[row] = state.period
-        self._done = row
+        self._height[row], self._force[row] = state.row(0), state.row(self._rows.force)
+        self._command[row], self._mode[row] = 0.0, state.mode()
+        self._period[row], self._done = state.period, row
 
-    @staticmethod
-    def _fill(array: Floats, row: int, state: State, index: int) -> None:
-        """Copy a row of the state, as `State.row` gives it, into a row of an array."""
-        values = array[row]
-        values[:] = state.rows[index]
-        values[state.gathered.cells] = state.gathered.block[index]
+    def _flush(self) -> None:
+        """Write the rows that wait: all of the same gathered cells, so they are written together.
+
+        The cells that are not gathered have not changed meanwhile. Those that were may have been put
+        back since, but of them there are rows.
+        """
+        state, cells = self._state, self._state.gathered.cells
+        if self._felt:
+            rows = slice(self._done + 1, self._done + 1 + len(self._felt))
+            felt = np.array(self._felt)
+            for array, index, values in (
+                (self._height, 0, felt[:, 0]),
+                (self._force, self._rows.force, felt[:, 1]),
+            ):
+                array[rows] = state.rows[index]
+                array[rows, cells] = values
+            self._done += len(self._felt)
+            self._command[self._done], self._mode[self._done] = 0.0, 0
+        if self._given:
+            rows = slice(self._begun, self._begun + len(self._given))
+            commands, modes = zip(*self._given, strict=True)
+            self._command[rows], self._mode[rows] = state.rows[self._rows.command], state.modes
+            self._command[rows, cells], self._mode[rows, cells] = np.array(commands), np.array(modes)
+            self._begun += len(self._given)
+        self._felt, self._given = [], []
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the rows so far, without the finger: period (t,), height, force, command, mode (t, n)."""
+        self._flush()
         rows = slice(0, self._done + 1)
         names = ("period", "height", "force", "command", "mode")
         return {name: getattr(self, f"_{name}")[rows] for name in names}

@@ -25,7 +25,7 @@ from .blister import Blister
 from .servo import locked_under_overload
 from .tracking import Tracking
 from .transitions import BY_FORCE, BY_PLACE, changed
-from .travel import Heading, ahead_of, square_distance, turned
+from .travel import ABEAM, Heading, ahead_of, square_distance, turned
 
 __all__ = ["CellStates", "CellStatesControl", "Patch", "assembled"]
 
@@ -202,7 +202,7 @@ class CellStatesControl:
         in_blister = nearest < blister.radius * (1.0 - ON_THE_SIDE)
         at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - ON_THE_SIDE))
         ahead = ahead_of(memory.heading, memory.x, memory.y, place)
-        facing = seen.height[at_edge & (ahead >= 0.0)]
+        facing = seen.height[at_edge & (ahead >= -ABEAM)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
         from_patch = np.sqrt(square_distance(memory.x, memory.y, place))

@@ -12,9 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Heading", "ahead_of", "seen_from", "square_distance", "turned"]
+__all__ = ["ABEAM", "Heading", "ahead_of", "seen_from", "square_distance", "turned"]
 
 Floats = NDArray[np.float64]
+
+#: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a finger
+#: may cross at a right angle, and rounding must not decide on them.
+ABEAM = 1e-12
 
 
 class Heading(NamedTuple):

@@ -23,7 +23,7 @@ from .blister import Blister
 from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
 from .servo import locked_under_overload
-from .travel import Heading, seen_from, square_distance, turned
+from .travel import ABEAM, Heading, seen_from, square_distance, turned
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
 
@@ -162,14 +162,15 @@ class VirtualMasterControl:
     def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         blister, stroke = self.blister, self.actuator.stroke
-        none, radius, edge_radius, flat_radius, behind, release = filled(self.limits, seen.target.size)
+        limits = filled(self.limits, seen.target.size)
+        none, abeam, radius, edge_radius, flat_radius, behind, release = limits
         edge, formed, spring, follow, froze = filled(CODES, seen.target.size, np.int8)
         distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
         inside = distance <= radius
         ring = distance <= edge_radius
         ring ^= inside
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
-        facing = ahead >= none
+        facing = ahead >= abeam
         facing &= ring
         count = np.count_nonzero(facing)
         if count:
@@ -196,8 +197,9 @@ class VirtualMasterControl:
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """What tells cells apart: no force; radii of blister, edge and flat top, m; a cosine; a force, N.
+        """What tells cells apart.
 
+        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; a force, N.
         Circles are widened by a billionth, for the sake of cells exactly on them.
         """
         blister = self.blister
@@ -205,7 +207,7 @@ class VirtualMasterControl:
             radius * (1.0 + ON_THE_SIDE)
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
-        return (0.0, *wider, self.parameters.behind, self.parameters.release_force)
+        return (0.0, -ABEAM, *wider, self.parameters.behind, self.parameters.release_force)
 
 
 def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..actuator import Actuator
 from ..control.blister import Blister
 from ..control.master import Master, Phase, VirtualMaster
-from ..control.travel import Heading
+from ..control.travel import ABEAM, Heading
 from ..control.virtual_master import VirtualMasterControl
 from ..layout import ON_THE_SIDE
 from ..modes import Mode
@@ -213,7 +213,7 @@ class VirtualMasters:
         ring = distance <= np.where(active, blister.edge_radius * (1.0 + ON_THE_SIDE), -1.0)
         ring ^= inside
         # While a master travels, only what lies ahead counts: the finished ridge behind is no edge.
-        facing = ring & (ahead >= 0.0)
+        facing = ring & (ahead >= -ABEAM)
         count = np.count_nonzero(facing, axis=0)
         level = np.add.reduce(seen.height * facing) / np.maximum(count, 1)
         master = master._replace(edge=np.where(count > 0, level, master.edge))
