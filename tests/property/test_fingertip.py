@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from digiclay.core.fingertip import JOIN, Fingertip, reach, reaches
 from digiclay.core.layout import Layout, grid
-from digiclay.core.touch import approach, bounds
+from digiclay.core.touch import approach, reached
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -63,7 +63,8 @@ def test_the_window_has_every_cell_the_finger_could_touch_on_its_way(
     direction = np.array(toward) / max(np.linalg.norm(toward), 1e-3)
     poses = np.array([pose(tuple(np.array(spot) + part * way * direction), turn) for part in (0.0, 0.5, 1.0)])
     outline, peak = finger.outline(poses), 40e-3
-    cells = BED.within(bounds(BED, approach(finger, poses[None])[0].window, peak, 0.0))
+    disc = reached(approach(finger, poses[None])[0].window, peak)
+    cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()
 
@@ -74,6 +75,7 @@ def test_a_dip_within_the_period_is_seen_as_well(
 ) -> None:
     poses = np.array([pose(at, turn) for at in (spot, dip, spot)])
     outline, peak = finger.outline(poses), 40e-3
-    cells = BED.within(bounds(BED, approach(finger, poses[None])[0].window, peak, 0.0))
+    disc = reached(approach(finger, poses[None])[0].window, peak)
+    cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()

@@ -18,7 +18,7 @@ from digiclay.core.scene_table import text
 from digiclay.core.simulation import begin
 from digiclay.core.state import State
 from digiclay.core.system import System
-from digiclay.core.take import Take, as_scene, difference, finer, from_bytes, replayed, states, to_bytes
+from digiclay.core.take import Take, as_scene, finer, from_bytes, replayed, states, to_bytes
 from numpy.typing import NDArray
 
 from tests.assemble import record, sample
@@ -54,6 +54,12 @@ def taken(start: State | None = None) -> tuple[System, Take, State]:
     first, poses = packed(system, state), gesture()
     *_, last = lived(system, state.copy(), poses)
     return system, Take(scene(), first, poses, packed(system, last)), last
+
+
+def difference(take: Take, parts: int) -> float:
+    """Return how far a take's heights are from those at a finer physics step, at most, m."""
+    both = zip(states(take), states(take, finer(take.scene, parts)), strict=True)
+    return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
 
 
 def test_a_replay_ends_in_the_same_state_bit_for_bit() -> None:

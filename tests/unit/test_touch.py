@@ -10,7 +10,7 @@ from digiclay.core.fingertip import LEVEL, Fingertip
 from digiclay.core.layout import Layout, grid
 from digiclay.core.relaxation import Relaxation
 from digiclay.core.simulation import begin, step
-from digiclay.core.touch import Touch, approach, bounds, force
+from digiclay.core.touch import Touch, approach, force, reached
 
 from tests.assemble import AWAY, make_system, path, record
 
@@ -37,7 +37,8 @@ def test_there_is_no_force_across_a_gap() -> None:
 def near(*poses: tuple[float, float, float]) -> np.ndarray:
     """Return the cells a level finger may touch while it is at some places, mm; pins stand at 40 mm."""
     bed, table = grid(Layout()), np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]])
-    return bed.within(bounds(bed, approach(Fingertip(), table)[0].window, 40e-3, 0.0))
+    disc = reached(approach(Fingertip(), table)[0].window, 40e-3)
+    return bed.disc(*disc) if disc else np.empty(0, int)
 
 
 def test_a_finger_above_the_highest_pin_touches_none() -> None:

@@ -13,12 +13,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .fingertip import reach
 from .layout import Grid
 from .modes import Mode
 from .state import Disc, Gathered, State
 from .system import System
-from .touch import Approach
+from .touch import Approach, reached
 
 __all__ = ["taking_part"]
 
@@ -77,12 +76,8 @@ def taking_part(
 
 
 def _reach(finger: Approach | None, peak: float) -> Disc | None:
-    """Return the disc that holds every cell the finger may touch while no pin is above `peak`, m."""
-    if finger is None:
-        return None
-    x, y, spread, base, tilt, bend = finger.window
-    radius = reach(base, tilt, bend, peak)
-    return (x, y, radius + spread) if radius >= 0.0 else None
+    """Return the disc the finger may touch while no pin is above `peak`, m; None without a finger."""
+    return reached(finger.window, peak) if finger else None
 
 
 def _wider(disc: Disc | None, margin: float) -> Disc | None:

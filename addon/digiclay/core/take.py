@@ -26,7 +26,7 @@ from .simulation import begin
 from .state import State
 from .system import System
 
-__all__ = ["Take", "as_scene", "difference", "finer", "from_bytes", "replayed", "states", "to_bytes"]
+__all__ = ["Take", "as_scene", "finer", "from_bytes", "replayed", "states", "to_bytes"]
 
 Floats = NDArray[np.float64]
 
@@ -129,12 +129,6 @@ def finer(scene: Scene, parts: int) -> Scene:
     if not 1 <= parts <= MOST_PARTS:
         raise ParameterError("Take", "parts", f"must be from 1 to {MOST_PARTS}", str(parts))
     return replace(scene, simulation=scene.simulation.refined(parts))
-
-
-def difference(take: Take, parts: int) -> float:
-    """Return how far a take's heights are from those at a finer physics step, at most, m."""
-    both = zip(states(take), states(take, finer(take.scene, parts)), strict=True)
-    return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
 
 
 def as_scene(take: Take, name: str) -> Scene:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from .contact import Contact
 from .filled import filled
 from .fingertip import Fingertip, forms, reach, reaches
-from .layout import NOWHERE, Bounds, Grid
 from .places import Pulp
+from .state import Disc
 
-__all__ = ["Approach", "Touch", "Window", "approach", "bounds", "force"]
+__all__ = ["Approach", "Touch", "Window", "approach", "force", "reached"]
 
 Floats = NDArray[np.float64]
 
@@ -71,21 +71,18 @@ def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
     ]
 
 
-def bounds(grid: Grid, window: Window, peak: float, margin: float) -> Bounds:
-    """Return rows and columns that hold every cell the finger may touch in a period.
+def reached(window: Window, peak: float) -> Disc | None:
+    """Return the disc x, y, radius that holds every cell the finger may touch in a period, m; None: no cell.
 
     Parameters
     ----------
-    grid : Grid
     window : Window
     peak : float
         No pin top is higher than this, m.
-    margin : float
-        How much farther to look, m.
     """
     x, y, spread, base, tilt, bend = window
     radius = reach(base, tilt, bend, peak)
-    return grid.bounds(x, y, radius + spread + margin) if radius >= 0.0 else NOWHERE
+    return (x, y, radius + spread) if radius >= 0.0 else None
 
 
 def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
