@@ -39,8 +39,8 @@ LEVELS = (
     "stack.recording stack.simulation",
     "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
-    "jobs accuracy keeping live shadow stack.assembly",
-    "session take",
+    "jobs accuracy keeping live stack.assembly",
+    "shadow session take",
     "metrics_trial sweep budget stack.session",
     "metrics_speed sweep_folder sweep_bundles",
 )

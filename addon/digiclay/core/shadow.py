@@ -1,4 +1,4 @@
-"""How exact a live session is: a shadow of it gets the same commands, at half the physics step.
+"""How exact a live session is: a shadow of it gets the same commands and is integrated more finely.
 
 It comes along for a short stretch now and then, which is cheap, and is then as far from the
 session as the integration's errors over that stretch; see `accuracy`, which does the same with
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .accuracy import SHARE, judging
 from .assembly import assemble
 from .control.replay import Replay
 from .errors import DigiclayError
@@ -52,9 +53,7 @@ class Shadow:
     Attributes
     ----------
     system : System
-        The session's, at half the step.
-    share : float
-        What of the difference to the shadow is the session's error.
+        The session's, integrated as `accuracy.judging` says.
     state : State or None
         None between two stretches.
     left : int
@@ -62,7 +61,6 @@ class Shadow:
     """
 
     system: System
-    share: float
     state: State | None = None
     left: int = 0
 
@@ -70,11 +68,9 @@ class Shadow:
 def cast(scene: Scene) -> Shadow | None:
     """Return the shadow of a session's beginning; None where the step cannot be halved."""
     try:
-        system = assemble(replace(scene, simulation=scene.simulation.refined(2)))
+        return Shadow(assemble(replace(scene, simulation=judging(scene.simulation))))
     except DigiclayError:
         return None
-    order = 2.0**system.stepper.order
-    return Shadow(system, order / (order - 1.0))
 
 
 def cast_from(shadow: Shadow, before: State) -> Shadow:
@@ -113,5 +109,5 @@ def compared(shadow: Shadow, after: State, path: Floats) -> tuple[Shadow, LiveEr
         return replace(shadow, state=state, left=shadow.left - 1), None
     height = float(np.abs(state.row(0) - after.row(0)).max())
     force = float(np.abs(state.row(rows.force) - after.row(rows.force)).max())
-    errors = LiveErrors(shadow.share * height, shadow.share * force)
+    errors = LiveErrors(SHARE * height, SHARE * force)
     return replace(shadow, state=None, left=PAUSE), errors
