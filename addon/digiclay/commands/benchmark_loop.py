@@ -10,7 +10,7 @@ import numpy as np
 from ..core.closed_form import TINY, crossed
 from ..core.fingertip import JOIN
 from ..core.simulation import begin
-from ..core.steppers.bernoulli_plan import BEND, NODES, WEIGHTS
+from ..core.steppers.bernoulli_plan import NODES, WEIGHTS
 from .benchmark_peers import ROOT, Line
 from .benchmark_problems import Measured, Problem
 
@@ -104,7 +104,7 @@ class Scalar:
         first, exponent = self.tension(y[0], start), self.m * (y[0] - start)
         lost = sum(a * b for a, b in zip(self.lost, [*y[1:4], first], strict=True))
         decay, slip = self.stiff * mobility + TINY, self.m * (free - end + start)
-        bow = min(self.m * (bow - (2.0 * middle - start - end) / 3.0), BEND)
+        bow = self.m * (bow - (2.0 * middle - start - end) / 3.0)
         idle = first <= lost
         stiffness = TINY if idle else decay
         growth = stiffness * (1.0 + lost) + slip + TINY

@@ -14,7 +14,7 @@ import numpy as np
 from ..closed_form import TINY, careful, crossed, pressed
 from ..contact import LARGEST_EXPONENT
 from ..physics import Cell
-from ..steppers.bernoulli_plan import BEND, BernoulliPlan
+from ..steppers.bernoulli_plan import BernoulliPlan
 from .columns import Floats, numbers
 
 __all__ = ["Unlike", "mapped", "unlike"]
@@ -116,7 +116,8 @@ class Unlike:
             growth = push + slip
             growth += TINY
             end, bent = exponent + slip, exponent + bow
-            if not np.count_nonzero(np.maximum(bent, end) >= self.hard):
+            strained = np.maximum(bent, end) >= self.hard
+            if not np.count_nonzero(strained):
                 relief = pressed(np.exp(bent), growth, stiffness)
                 np.divide(relief, stiffness, mean)
             else:
@@ -124,7 +125,7 @@ class Unlike:
                 slip = m * rise - lift
                 stiffness = np.where(idle, TINY, decay)
                 push = stiffness * relaxed
-                np.clip(bow, -BEND, BEND, out=bow)
+                np.putmask(bow, strained, 0.0)
                 relief, mean[:] = careful(exponent + bow, push + slip + TINY, stiffness)
                 end = exponent + slip
             push -= relief

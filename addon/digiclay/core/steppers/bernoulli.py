@@ -22,7 +22,7 @@ from ..delay import Queue
 from ..filled import filled
 from ..physics import Cell
 from ..places import Segment
-from .bernoulli_plan import BEND, BernoulliPlan, bernoulli_plan
+from .bernoulli_plan import BernoulliPlan, bernoulli_plan
 
 __all__ = ["BernoulliExponential", "BernoulliPlan"]
 
@@ -113,7 +113,8 @@ def _under_finger(
         growth = push + slip
         growth += tiny
         end, bent = exponent + slip, exponent + bow
-        if not np.count_nonzero(np.maximum(bent, end) >= hard):
+        strained = np.maximum(bent, end) >= hard
+        if not np.count_nonzero(strained):
             relief = pressed(np.exp(bent), growth, stiffness)
             np.divide(relief, stiffness, mean)
         else:
@@ -121,7 +122,8 @@ def _under_finger(
             slip = m * rise[:k] - lift
             stiffness = np.where(idle, tiny, decay)
             push = stiffness * relaxed
-            np.clip(bow, -BEND, BEND, out=bow)
+            # Their way bends with the load, not as it would without.
+            np.putmask(bow, strained, zero)
             relief, mean[:] = careful(exponent + bow, push + slip + tiny, stiffness)
             end = exponent + slip
         push -= relief

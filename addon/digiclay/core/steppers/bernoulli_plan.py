@@ -26,8 +26,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped
 #: Four-point Gauss-Legendre nodes and weights on [0, 1]: within a step a valve may go all its way.
 NODES: tuple[float, ...] = tuple((0.5 + 0.5 * _NODES).tolist())
 WEIGHTS: tuple[float, ...] = tuple((0.5 * _WEIGHTS).tolist())
-#: A way that bends more than this within a step, in 1/m, is beyond correcting.
-BEND = 0.25
 
 
 @dataclass(frozen=True, eq=False)
