@@ -79,7 +79,7 @@ def ridge(blender: Any) -> Iterator[float | None]:
     yield from blender.grab((-16, 0, 0), "X", steps=2)
     yield from to_height(blender, 35.0, steps=4)
     note(blender, "pressed")
-    yield from to_height(blender, 47.0, steps=12)
+    yield from to_height(blender, 47.0, steps=24)
     note(blender, "raised")
     yield from blender.grab((30, 0, 0), "X", steps=10)
     yield from blender.settle()
