@@ -130,7 +130,7 @@ def _fields_counted(value: Any) -> Any:
 @contextmanager
 def _counting() -> Iterator[None]:
     """Let the simulation work on `Counted` arrays for as long as the block lasts."""
-    gather, approaches = simulation.taking_part, simulation.approaches
+    gather = simulation.taking_part
 
     def gathered(*arguments: Any) -> Any:
         state = gather(*arguments)
@@ -140,21 +140,18 @@ def _counting() -> Iterator[None]:
         counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
         return dataclasses.replace(state, gathered=dataclasses.replace(held, **counted))
 
-    def coming(*arguments: Any) -> list[Any]:
-        return [one and _fields_counted(one) for one in approaches(*arguments)]
-
     constants = [module for module in _core() if hasattr(module, "filled")]
 
     def full(*arguments: Any) -> Any:
         return _fields_counted(filled(*arguments))
 
     try:
-        simulation.taking_part, simulation.approaches = gathered, coming  # type: ignore[assignment]
+        simulation.taking_part = gathered
         for module in constants:
             module.filled = full  # type: ignore[attr-defined]
         yield
     finally:
-        simulation.taking_part, simulation.approaches = gather, approaches
+        simulation.taking_part = gather
         for module in constants:
             module.filled = filled  # type: ignore[attr-defined]
 

@@ -10,11 +10,14 @@ import numpy as np
 from ..core.closed_form import TINY, crossed
 from ..core.fingertip import JOIN
 from ..core.simulation import begin
-from ..core.steppers.bernoulli_plan import NODES, WEIGHTS
+from ..core.steppers.bernoulli_plan import POINTS
 from .benchmark_peers import ROOT, Line
 from .benchmark_problems import Measured, Problem
 
 __all__ = ["Scalar", "loop"]
+
+#: Gauss points of a whole step.
+WHOLE = POINTS[-1][1]
 
 
 def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
@@ -45,7 +48,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
             unders = [own.underside(pose, xs[i], ys[i]) for pose in poses] if near else []
             for s in range(count):
                 command = new[i] if s * step >= dead - 1e-12 else old[i]
-                openings = [command + (y[4] - command) * math.exp(-node * step / tau) for node in NODES]
+                openings = [command + (y[4] - command) * math.exp(-node * step / tau) for node, _ in WHOLE]
                 y[4] = command + (y[4] - command) * math.exp(-step / tau)
                 own.step(y, openings, unders[2 * s : 2 * s + 3])
             if near:
@@ -90,7 +93,7 @@ class Scalar:
     def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
         """Move a cell on by a step, in place."""
         mobility = free = bow = 0.0
-        for node, weight, opening in zip(NODES, WEIGHTS, openings, strict=True):
+        for (node, weight), opening in zip(WHOLE, openings, strict=True):
             lift = opening * opening
             g = weight * self.h * lift / (1.0 / self.laminar + self.resistance * lift) / self.area
             rise = g * (self.high if opening > 0.0 else self.low)

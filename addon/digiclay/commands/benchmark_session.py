@@ -29,8 +29,8 @@ PARTS = {
     "observe": "a row of the history",
     "the rest": "gathering the cells that move, and putting them back",
 }
-#: What of the simulation's own functions is contact.
-CONTACT = ("approaches", "_underside")
+#: What the simulation's own functions belong to.
+TIMED = {"approaches": "contact", "_underside": "contact", "_moved": "integrate"}
 EXAMPLES = """\
 examples:
   digiclay benchmark session
@@ -140,13 +140,11 @@ def measured(scene: Scene, clock: Clock | None = None) -> float:
     state = simulation.begin(system)
     observe = Recording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
     if clock:
-        timed = {"stepper": clock.on("integrate", system.stepper, "advance")}
         if system.controller:
-            timed["controller"] = clock.on("control", system.controller, "attend", "command")
-        system = replace(system, **timed)
+            system = replace(system, controller=clock.on("control", system.controller, "attend", "command"))
         trajectory = clock.on("contact", trajectory, "poses")
         observe = clock.timed("observe", observe)
-    with _contact_timed(clock):
+    with _timed(clock):
         started = perf_counter()
         for reached in simulation.periods(system, trajectory, state, scene.periods):
             observe(reached)
@@ -154,15 +152,15 @@ def measured(scene: Scene, clock: Clock | None = None) -> float:
 
 
 @contextmanager
-def _contact_timed(clock: Clock | None) -> Iterator[None]:
-    """Time the simulation's own functions that are contact, for as long as the block lasts."""
+def _timed(clock: Clock | None) -> Iterator[None]:
+    """Time the simulation's own functions for as long as the block lasts."""
     if clock is None:
         yield
         return
-    former = {name: getattr(simulation, name) for name in CONTACT}
+    former = {name: getattr(simulation, name) for name in TIMED}
     try:
         for name, function in former.items():
-            setattr(simulation, name, clock.timed("contact", function))
+            setattr(simulation, name, clock.timed(TIMED[name], function))
         yield
     finally:
         for name, function in former.items():

@@ -44,7 +44,9 @@ def assemble(scene: Scene) -> System:
         plan=stepper.plan(cell, line, steps),
         fastest=_fastest(cell),
         instants=instants,
-        rows=Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows),
+        rows=Rows(
+            cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0
+        ),
     )
 
 
@@ -90,16 +92,15 @@ def _pulp(scene: Scene) -> Pulp:
     return Unrelaxed()
 
 
-def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
+def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     """Return what the controller gets to know: all there is, less what each part takes away."""
-    from .absent import PerfectSensors
-
-    sensors: Sensors = PerfectSensors()
     known = scene.sensors
     if known is None:
-        return sensors
+        return None
+    from .absent import PerfectSensors
     from .sensors import Delayed, Noisy, Quantised
 
+    sensors: Sensors = PerfectSensors()
     if known.force_noise or known.height_noise:
         sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
     if known.force_step or known.height_step:

@@ -137,24 +137,25 @@ def forms(outline: Floats) -> tuple[Floats, Floats]:
 
 
 def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
-    """Return the height of the finger's underside, shape (p, k), m.
+    """Return the height of the finger's underside, shape (..., p, k), m.
 
     Parameters
     ----------
-    forms : ndarray (2 p, 6)
-    join : ndarray (2, p, 1)
+    forms : ndarray (..., 2 p, 6)
+    join : ndarray (..., 2, p, 1)
         From `forms`.
     place : ndarray (6, k)
         Rows 1, x, y, x², x y, y² of the places asked for.
     """
-    least, root = join
-    rows = forms.dot(place)
-    inner: Floats = rows[: len(least)]
-    np.maximum(inner, least, out=inner)
+    count = join.shape[-2]
+    # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
+    rows = np.matmul(forms, place)
+    inner: Floats = rows[..., :count, :]
+    np.maximum(inner, join[..., 0, :, :], inner)
     np.sqrt(inner, inner)
-    inner -= root
+    inner -= join[..., 1, :, :]
     inner *= inner
-    inner += rows[len(least) :]
+    inner += rows[..., count:, :]
     return inner
 
 

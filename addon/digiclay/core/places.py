@@ -6,7 +6,7 @@ computes nothing. Parts hold parameters only: state is handed in and handed back
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -20,6 +20,7 @@ __all__ = [
     "Flow",
     "Lag",
     "Measurement",
+    "Movement",
     "Orders",
     "Pulp",
     "Segment",
@@ -29,6 +30,9 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+#: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
+#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N.
+Movement = Callable[[Floats], Floats]
 
 
 class Flow(Protocol):
@@ -135,8 +139,8 @@ class Stepper(Protocol):
         """Work out once what all periods share."""
         ...
 
-    def advance(self, plan: Any, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place.
+    def bind(self, plan: Any, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on, as often as its set of cells serves.
 
         Parameters
         ----------
@@ -144,13 +148,8 @@ class Stepper(Protocol):
             From `plan`.
         driven : ndarray (r + q, n)
             State rows, see `physics.Cell`, then the commands of the queue, oldest first.
-        under : ndarray (p, k)
-            Underside of the finger over the first k cells at the period's instants, m.
-
-        Returns
-        -------
-        ndarray (k,)
-            Force on the first k cells at the end, N.
+        near : int
+            Number k of cells, the first, that the finger may touch.
         """
         ...
 

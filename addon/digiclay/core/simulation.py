@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DivergenceError
-from .fingertip import underside
 from .gathering import taking_part
-from .places import Measurement, Truth
+from .places import Measurement, Movement, Truth
 from .state import Gathered, Part, State, at_rest
 from .system import System
 from .touch import Approach, approach
@@ -75,20 +74,49 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
     held = state.gathered
     if not held.cells.size:
         return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
-    under = _underside(system, finger, held)
-    memory = _command(system, state, memory)
-    held.touched.force[:] = system.stepper.advance(system.plan, held.driven, under)
-    if system.rows.sensors:
+    ready = _ready(system, held)
+    memory = _command(system, state, ready, memory)
+    held.touched.force[:] = _moved(ready, _underside(system, finger, held))
+    if system.sensors:
         system.sensors.update(held.all.sensed, _truth(held.all, state.period + 1))
     _check_finite(system, state)
     return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
+
+
+class _Ready(NamedTuple):
+    """What every period needs of one gathered set: made once for it.
+
+    Attributes
+    ----------
+    touched, all : Measurement
+        What is true of them, in the arrays of the set.
+    movement : Movement
+    """
+
+    touched: Measurement
+    all: Measurement
+    movement: Movement
+
+
+def _ready(system: System, held: Gathered) -> _Ready:
+    """Return what this system needs of a gathered set."""
+    known: _Ready | None = held.ready.get(system.plan)
+    if known is None:
+        touched, everything = (
+            Measurement(part.place, part.height, part.force, part.target, part.mode, part.controlled)
+            for part in (held.touched, held.all)
+        )
+        movement = system.stepper.bind(system.plan, held.driven, held.near)
+        known = held.ready[system.plan] = _Ready(touched, everything, movement)
+    return known
 
 
 def _attend(system: System, state: State) -> tuple[Any, tuple[float, float, float] | None]:
     """Let the controller take in the touched cells; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
-    seen = _measured(system, state.gathered.touched, state.period)
+    held = state.gathered
+    seen = _measured(system, _ready(system, held).touched, held.touched, state.period)
     return system.controller.attend(state.memory, seen)
 
 
@@ -97,31 +125,39 @@ def _truth(part: Part, period: int) -> Truth:
     return Truth(part.cells, period, part.force, part.height, part.command)
 
 
-def _measured(system: System, part: Part, period: int) -> Measurement:
+def _measured(system: System, true: Measurement, part: Part, period: int) -> Measurement:
     """Measure some gathered cells."""
+    if system.sensors is None:
+        return true
     force, height = system.sensors.measure(part.sensed, _truth(part, period))
-    return Measurement(part.place, height, force, part.target, part.mode, part.controlled)
+    return true._replace(force=force, height=height)
 
 
 def _underside(system: System, finger: Approach | None, held: Gathered) -> Floats:
     """Return the finger's underside over the near cells at the period's instants, shape (p, k), m."""
     if finger is None or not held.near:
         return np.empty((system.instants.size, 0))
-    return underside(finger.forms, finger.join, held.touched.place)
+    return finger.under(held.touched.place)
 
 
-def _command(system: System, state: State, memory: Any) -> Any:
+def _command(system: System, state: State, ready: _Ready, memory: Any) -> Any:
     """Let the controller command the gathered cells, and queue the commands; return its memory."""
     if system.controller is None:
         return memory
     part, queue = state.gathered.all, state.gathered.queue
-    memory, orders = system.controller.command(memory, _measured(system, part, state.period))
+    seen = _measured(system, ready.all, part, state.period)
+    memory, orders = system.controller.command(memory, seen)
     part.target[:] = orders.target
     part.mode[:] = orders.mode
     for older, newer in pairwise(queue):
         older[:] = newer
     queue[-1][:] = orders.command
     return memory
+
+
+def _moved(ready: _Ready, under: Floats) -> Floats:
+    """Let the stepper move the gathered cells on; return the forces on the near ones, N."""
+    return ready.movement(under)
 
 
 def _check_finite(system: System, state: State) -> None:

@@ -150,6 +150,11 @@ class Gathered:
         return self.block[self.rows.driven]
 
     @cached_property
+    def ready(self) -> dict[Any, Any]:
+        """What a simulation works with on just these cells, by the stepper's plan; made when first needed."""
+        return {}
+
+    @cached_property
     def queue(self) -> tuple[Floats, ...]:
         """The commands on their way, oldest first."""
         return tuple(self.block[self.rows.commands])

@@ -27,7 +27,8 @@ class System:
     ----------
     grid : Grid
     cell : Cell
-    sensors : Sensors
+    sensors : Sensors or None
+        None: the controller knows all there is.
     controller : Controller or None
         None: every valve stays shut.
     stepper : Stepper
@@ -44,7 +45,7 @@ class System:
 
     grid: Grid
     cell: Cell
-    sensors: Sensors
+    sensors: Sensors | None
     controller: Controller | None
     stepper: Stepper
     plan: Any

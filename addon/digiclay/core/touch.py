@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .contact import Contact
 from .filled import filled
-from .fingertip import Fingertip, forms, reach, reaches
+from .fingertip import Fingertip, forms, reach, reaches, underside
 from .places import Pulp
 from .state import Disc
 
-__all__ = ["Approach", "Touch", "Window", "approach", "force", "reached"]
+__all__ = ["Approach", "Coming", "Touch", "Window", "approach", "force", "reached"]
 
 Floats = NDArray[np.float64]
+
+#: Control periods whose undersides are worked out at a time, and most numbers that they may be.
+AHEAD, MOST = 32, 200_000
 
 
 @dataclass(frozen=True)
@@ -32,21 +36,53 @@ class Touch:
 Window = tuple[float, float, float, float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Approach:
-    """The finger in one control period, at p instants.
+@dataclass(eq=False)
+class Coming:
+    """The finger's way through t control periods, at p instants of each.
 
     Attributes
     ----------
-    forms : ndarray (2 p, 6)
-    join : ndarray (2, p, 1)
+    forms : ndarray (t, 2 p, 6)
+    join : ndarray (t, 2, p, 1)
         From `fingertip.forms`.
-    window : Window
+    windows : list of Window
+        One a period.
     """
 
     forms: Floats
     join: Floats
+    windows: list[Window]
+
+    def __post_init__(self) -> None:
+        # The undersides worked out last: of which places, from which period on.
+        self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
+
+    def under(self, period: int, place: Floats) -> Floats:
+        """Return the underside in one of the periods, see `Approach.under`.
+
+        It is asked for period by period, mostly of the same places: several are worked out at a time.
+        """
+        known, first, unders = self._last
+        if known is not place or not first <= period < first + len(unders):
+            # Not so many that a large bed under a large finger would not fit in memory.
+            count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * place.shape[1])))
+            several = slice(period, period + count)
+            first, unders = period, underside(self.forms[several], self.join[several], place)
+            self._last = (place, first, unders)
+        under: Floats = unders[period - first]
+        return under
+
+
+class Approach(NamedTuple):
+    """The finger in one control period of its way."""
+
+    coming: Coming
+    period: int
     window: Window
+
+    def under(self, place: Floats) -> Floats:
+        """Return its underside at the period's p instants over some places (6, k), shape (p, k), m."""
+        return self.coming.under(self.period, place)
 
 
 def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
@@ -65,10 +101,8 @@ def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
     shape = reaches(outline)
     farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
     windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    return [
-        Approach(rows, join, tuple(window))
-        for rows, join, window in zip(*forms(outline), windows, strict=True)
-    ]
+    coming = Coming(*forms(outline), [tuple(window) for window in windows])
+    return [Approach(coming, period, window) for period, window in enumerate(coming.windows)]
 
 
 def reached(window: Window, peak: float) -> Disc | None:

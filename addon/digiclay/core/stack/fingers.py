@@ -73,9 +73,8 @@ def _approaches(system: System, way: Trajectory, first: int, count: int) -> tupl
     assert system.cell.touch is not None
     starts = (first + np.arange(count)) * system.period
     poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
-    coming = approach(system.cell.touch.fingertip, poses)
-    forms, join = (np.array([getattr(one, name) for one in coming]) for name in ("forms", "join"))
-    return forms, join, np.array([one.window for one in coming])
+    coming = approach(system.cell.touch.fingertip, poses)[0].coming
+    return coming.forms, coming.join, np.array(coming.windows)
 
 
 def undersides(coming: Fingers, period: int, place: Floats) -> Floats:

@@ -49,9 +49,9 @@ class Alike:
         """Move a block of cells on, in place; see `Movement`."""
         flat, below = driven.reshape(len(driven), -1), under.reshape(len(under), -1)
         for part in _pieces(0, below.shape[1]):
-            self.stepper.advance(self.plan, flat[:, part], below[:, part])
+            self.stepper.bind(self.plan, flat[:, part], part.stop - part.start)(below[:, part])
         for part in _pieces(below.shape[1], flat.shape[1]):
-            self.stepper.advance(self.plan, flat[:, part], below[:, :0])
+            self.stepper.bind(self.plan, flat[:, part], 0)(below[:, :0])
 
 
 def _pieces(first: int, end: int) -> Iterator[slice]:

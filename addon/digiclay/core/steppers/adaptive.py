@@ -9,18 +9,23 @@ smaller still.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
 from ..physics import Cell, felt
-from ..places import Segment
+from ..places import Movement, Segment
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Adaptive", "AdaptivePlan"]
 
 Floats = NDArray[np.float64]
+
+#: A block to work in, the map to the finger's underside at the instants of a level's steps, and what moves
+#: the block on.
+Bound = tuple[Floats, Floats, Movement]
 
 #: Steps are halved at most so often.
 FINEST = 7
@@ -81,16 +86,26 @@ class Adaptive:
         stiffness = cell.touch.contact.stiffness if cell.touch else 0.0
         return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed)
 
-    def advance(self, plan: AdaptivePlan, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+    def bind(self, plan: AdaptivePlan, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on; see `places.Stepper`."""
+        # Every period is done at these two levels, by all cells.
+        coarse, fine = (_bound(plan, level, driven.shape, near) for level in (0, 1))
+        return partial(self._advance, plan, driven, coarse, fine)
+
+    def _advance(
+        self, plan: AdaptivePlan, driven: Floats, whole: Bound, halves: Bound, under: Floats
+    ) -> Floats:
+        """Move a block of cells on by one control period, in place; see `places.Movement`."""
         cell, k = plan.levels[0].cell, under.shape[1]
         start, share = driven.copy(), np.full(driven.shape[1], FREE)
         share[:k][start[0, :k] > under.min(axis=0)] = PRESSED
-        coarse = _done(plan, 0, start, under)
+        coarse = _done(whole, start, under)
         open_cells = np.arange(driven.shape[1])
         for level in range(1, FINEST + 1):
             near = open_cells[open_cells < k]
-            fine = _done(plan, level, start[:, open_cells], under[:, near])
+            if level > 1:
+                halves = _bound(plan, level, (len(driven), open_cells.size), near.size)
+            fine = _done(halves, start[:, open_cells], under[:, near])
             # Extrapolation holds where the error is of second order; a free cell's is of fourth.
             gain = (fine[: cell.rows] - coarse[: cell.rows]) / 3.0
             driven[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
@@ -106,11 +121,18 @@ class Adaptive:
         return felt(cell, driven, under[-1])
 
 
-def _done(plan: AdaptivePlan, level: int, block: Floats, under: Floats) -> Floats:
-    """Return a block moved on by one control period with the steps of a level."""
-    moved = block.copy()
-    BernoulliExponential().advance(plan.levels[level], moved, np.dot(plan.between[level], under))
-    return moved
+def _bound(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:
+    """Return what moves a block of some shape with the steps of a level."""
+    block = np.empty(shape)
+    return block, plan.between[level], BernoulliExponential().bind(plan.levels[level], block, near)
+
+
+def _done(bound: Bound, start: Floats, under: Floats) -> Floats:
+    """Return rows moved on by one control period, in the arrays of `bound`."""
+    block, between, advance = bound
+    block[:] = start
+    advance(np.dot(between, under))
+    return block
 
 
 def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tuple[Segment, ...], Floats]:

@@ -24,7 +24,7 @@ from ..physics import Cell
 from ..places import Segment
 from .bernoulli_plan import BernoulliPlan, bernoulli_plan
 
-__all__ = ["BernoulliExponential", "BernoulliPlan"]
+__all__ = ["BernoulliExponential", "BernoulliPlan", "Block"]
 
 Floats = NDArray[np.float64]
 
@@ -42,153 +42,176 @@ class BernoulliExponential:
         """Work out once what all periods share."""
         return bernoulli_plan(cell, queue, segments)
 
-    def advance(self, plan: BernoulliPlan, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
-        cell, k, count = plan.cell, under.shape[1], driven.shape[1]
-        openings = plan.response.dot(driven[cell.lag_rows.start :])
-        lag = driven[cell.lag_rows]
-        lag[:] = openings[len(openings) - len(lag) :]
-        openings = openings[:-1]
-        # Below the openings' own conductances those with the openings' signs: the sign picks the reservoir.
-        conductance = np.empty((2 * len(openings), count))
-        size, signed = conductance[: len(openings)], conductance[len(openings) :]
-        size[:] = plan.unloaded(openings)
-        np.copysign(size, openings, signed)
-        moves = plan.moves.dot(conductance)
-        free = moves[: len(plan.segments)]
-        if k:
-            return _under_finger(plan, driven, under, openings[:, :k], free, moves[len(free) :, :k])
-        height, (lowest, highest) = driven[0], filled((0.0, cell.actuator.stroke), count)
-        for rise in free:
-            rise += height
-            np.maximum(rise, lowest, out=height)
-            np.minimum(height, highest, out=height)
-        return np.empty(0)
+    def bind(self, plan: BernoulliPlan, driven: Floats, near: int) -> Block:
+        """Make ready to move a block of cells on; see `places.Stepper`."""
+        return Block(plan, driven, near)
 
 
-def _under_finger(
-    plan: BernoulliPlan, driven: Floats, under: Floats, openings: Floats, free: Floats, loaded: Floats
-) -> Floats:
-    """Move a block on step by step, its first k cells under the finger and their pulp with them.
+class Block:
+    """A block of cells, ready to be moved on period by period: its rows, and the arrays to work in.
 
-    Returns the forces at the end, see `places.Stepper`.
+    What is in the arrays before a period does not count. Numpy takes two operands of one shape
+    twice as fast as an array and a number, so constants are arrays as well.
 
     Parameters
     ----------
-    plan, driven, under
-        See `places.Stepper`; all m cells.
-    openings : ndarray (g, k)
-        At the Gauss points.
-    free : ndarray (s, m)
-        Rise of each step without load, m; used up.
-    loaded : ndarray (3 s, k)
-        The other rows that `BernoulliPlan.moves` makes.
+    plan, driven, near
+        See `places.Stepper.bind`; k is short for `near` here.
     """
-    cell, k, rows, count = plan.cell, under.shape[1], plan.cell.pulp_rows, len(free)
-    # Numpy takes two operands of one shape twice as fast as an array and a number.
-    m, offset, most, zero, one, half, tiny, hard = filled(plan.numbers, k)
-    lowest, highest = filled((0.0, cell.actuator.stroke), driven.shape[1])
-    height, near = driven[0], driven[0, :k]
-    path = plan.path.dot(under)
-    exponent = m * near
-    exponent -= offset
-    exponent -= path[2 * count]
-    # The filters, then the tension at the start of a step, on average and at its end.
-    work = np.empty((rows.stop + 2, k))
-    filters, first, mean, last = work[:-3], work[-3], work[-2], work[-1]
-    pulp = driven[rows, :k]
-    _tension(exponent, zero, most, last)
-    for s, rise in enumerate(free):
-        filters[:], first[:] = pulp, last
-        lift = path[s]
-        slip = loaded[s] - lift
-        bow = loaded[count + s] - path[count + s]
-        decay = loaded[2 * count + s] + tiny
-        lost = plan.lost[s].dot(work[:-2])
-        relaxed = lost + one
-        idle = first <= lost
-        stiffness = decay.copy()
-        np.putmask(stiffness, idle, tiny)
-        push = stiffness * relaxed
-        growth = push + slip
-        growth += tiny
-        end, bent = exponent + slip, exponent + bow
-        strained = np.maximum(bent, end) >= hard
-        if not np.count_nonzero(strained):
-            relief = pressed(np.exp(bent), growth, stiffness)
-            np.divide(relief, stiffness, mean)
-        else:
-            decay, rise[:k] = _loaded_valve(plan, s, openings, exponent, relaxed, lift)
-            slip = m * rise[:k] - lift
-            stiffness = np.where(idle, tiny, decay)
+
+    def __init__(self, plan: BernoulliPlan, driven: Floats, near: int) -> None:
+        cell, count, k = plan.cell, driven.shape[1], near
+        gauss, instants = len(plan.weights), plan.path.shape[1]
+
+        def empty(*shape: int) -> Floats:
+            return np.empty_like(driven, shape=shape)
+
+        self.plan, self.height, self.near = plan, driven[0], driven[0, :k]
+        self.pulp, self.lag = driven[cell.pulp_rows, :k], driven[cell.lag_rows]
+        self.opened_by = driven[cell.lag_rows.start :]
+        self.openings = empty(len(plan.response), count)
+        self.opening = self.openings[:gauss]
+        self.opening_after = self.openings[len(self.openings) - len(self.lag) :]
+        # The valves' conductances, the same with the signs of the openings, underside, and ones.
+        inputs = empty(2 * gauss + instants + 1, count)
+        inputs[-1] = 1.0
+        self.conductances, self.inputs = inputs[: 2 * gauss], inputs[:, :k]
+        self.size, self.signed = inputs[:gauss], inputs[gauss : 2 * gauss]
+        self.under = inputs[2 * gauss : -1, :k]
+        # What the maps make of them: see `BernoulliPlan.loaded`.
+        self.free, self.loaded = empty(len(plan.segments), count), empty(len(plan.loaded), k)
+        self.steps = tuple(
+            (rise, rise[:k], self.loaded[at : at + 2], *self.loaded[at : at + 3])
+            for rise, at in zip(self.free, range(1, len(self.loaded), 3), strict=True)
+        )
+        self.start = self.loaded[0]
+        self.lost = empty(2, k)
+        # What `BernoulliPlan.begin` and `finish` are maps of.
+        self.work = empty(len(self.pulp) + 5, k)
+        self.work[-5], self.work[-4] = 0.0, 1.0
+        self.filters = self.work[:-5]
+        self.force: Floats = self.work[-5]
+        self.begun, self.moved = self.work[:-2], self.work[:-4]
+        self.first, self.mean, self.last = self.work[-3:]
+        self.constants = filled(plan.numbers[:-1], k)
+        self.none, self.hard = np.zeros_like(self.moved), np.full_like(self.lost, plan.numbers[-1])
+        self.stops = filled((0.0, cell.actuator.stroke), count)
+
+    def __call__(self, under: Floats) -> Floats:
+        """Move the block on by one control period, in place; see `places.Movement`."""
+        plan = self.plan
+        plan.response.dot(self.opened_by, self.openings)
+        self.lag[:] = self.opening_after
+        self.size[:] = plan.unloaded(self.opening)
+        # The sign picks the reservoir.
+        np.copysign(self.size, self.opening, self.signed)
+        plan.free.dot(self.conductances, self.free)
+        if under.shape[1]:
+            self.under[:] = under
+            plan.loaded.dot(self.inputs, self.loaded)
+            self._under_finger()
+            return self.force
+        height, (lowest, highest) = self.height, self.stops
+        for rise in self.free:
+            rise += height
+            np.maximum(rise, lowest, height)
+            np.minimum(height, highest, height)
+        return self.force
+
+    def _under_finger(self) -> None:
+        """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
+        plan, height, near = self.plan, self.height, self.near
+        first, mean, last, (lost, relaxed) = self.first, self.mean, self.last, self.lost
+        m, offset, per_m, most, zero, one, half, tiny = self.constants
+        lowest, highest = self.stops
+        self.filters[:] = self.pulp
+        exponent = near * m
+        exponent -= self.start
+        _tension(exponent, zero, most, last)
+        for s, (rise, risen, ways, slip, bow, decay) in enumerate(self.steps):
+            first[:] = last
+            plan.begin[s].dot(self.begun, self.lost)
+            idle = first <= lost
+            stiffness = decay.copy()
+            np.putmask(stiffness, idle, tiny)
             push = stiffness * relaxed
-            # Their way bends with the load, not as it would without.
-            np.putmask(bow, strained, zero)
-            relief, mean[:] = careful(exponent + bow, push + slip + tiny, stiffness)
-            end = exponent + slip
-        push -= relief
-        mean -= one
-        end += push
-        _tension(end, zero, most, last)
-        crossing = (last <= lost) != idle
-        if np.count_nonzero(crossing):
-            parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
-            push[crossing], mean[crossing] = crossed(*parts)
-            end = exponent + slip + push
+            growth = push + slip
+            growth += tiny
+            ends = exponent + ways
+            end, bent = ends
+            strained = ends >= self.hard
+            if not np.count_nonzero(strained):
+                relief = pressed(np.exp(bent), growth, stiffness)
+                np.divide(relief, stiffness, mean)
+                mean -= one
+            else:
+                decay, risen[:] = self._loaded_valve(s, exponent, relaxed)
+                slip = m * risen - plan.path[s].dot(self.under)
+                stiffness = np.where(idle, tiny, decay)
+                push = stiffness * relaxed
+                # Their way bends with the load, not as it would without.
+                np.putmask(bow, strained.any(axis=0), zero)
+                relief, grown = careful(exponent + bow, push + slip + tiny, stiffness)
+                np.subtract(grown, one, mean)
+                end = exponent + slip
+            push -= relief
+            end += push
             _tension(end, zero, most, last)
-        push /= m
-        rise[:k] += push
-        rise += height
-        np.maximum(rise, lowest, out=height)
-        np.minimum(height, highest, out=height)
-        stopped = rise[:k] != near
-        if np.count_nonzero(stopped):
-            # The mean found above is that of a pin that no end stop holds.
-            end = m * near - offset - path[2 * count + s + 1]
-            _tension(end, zero, most, last)
-            np.putmask(mean, stopped, half * (first + last))
-        # Where the finger is not touched all through the step the mean is that of no tension.
-        np.maximum(mean, zero, out=mean)
-        # Of a tension that falls steeply a straight line would make a filter that pulls.
-        moved: Floats = plan.transition[s].dot(work)
-        np.maximum(moved, zero, out=moved)
-        pulp[:] = moved[:-1]
-        exponent = end
-    force: Floats = moved[-1]
-    return force
+            crossing = last <= lost
+            crossing ^= idle
+            if np.count_nonzero(crossing):
+                parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+                push[crossing], mean[crossing] = crossed(*parts)
+                end = exponent + slip + push
+                _tension(end, zero, most, last)
+            push *= per_m
+            rise += height
+            risen += push
+            np.maximum(rise, lowest, height)
+            np.minimum(height, highest, height)
+            stopped = risen != near
+            if np.count_nonzero(stopped):
+                # The mean found above is that of a pin that no end stop holds.
+                end = near * m - offset - plan.path[2 * len(self.steps) + s + 1].dot(self.under)
+                _tension(end, zero, most, last)
+                np.putmask(mean, stopped, half * (first + last))
+            # Where the finger is not touched all through the step the mean is that of no tension.
+            np.maximum(mean, zero, mean)
+            # Of a tension that falls steeply a straight line would make a filter that pulls.
+            np.maximum(plan.finish[s].dot(self.work), self.none, self.moved)
+            exponent = end
+        self.pulp[:] = self.filters
+
+    def _loaded_valve(self, s: int, exponent: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
+        """Return decay and free rise of step s where the load decides on the valve's branch.
+
+        The secant conductance is taken at the load of mid step, predicted with the one at the
+        start: second order, like the rest.
+        """
+        plan, m = self.plan, self.constants[0]
+        area, lift = plan.cell.actuator.area, plan.path[s].dot(self.under)
+        opening, weights = self.opening[plan.nodes[s], : len(m)], plan.weights[plan.nodes[s]] / area
+        to_load = plan.to_load * plan.shares[s]
+        pressure = plan.cell.supply.pressure(opening)
+        grown = middle = _grown(exponent)
+        for _ in range(2):
+            load = to_load * np.maximum(middle - relaxed, 0.0)
+            conductance = plan.cell.flow.conductance(opening, pressure - load)
+            decay = m * to_load * (weights @ conductance) + TINY
+            free = weights @ (conductance * pressure)
+            slip = m * free - lift
+            growth = slip + decay * relaxed + TINY
+            relief, _ = careful(exponent, growth, decay)
+            way = np.where(grown > relaxed, growth - relief, slip)
+            middle = 0.5 * (grown + _grown(exponent + way))
+        return decay, free
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:
     """Work out the elastic force in units of b/m, into `out`; 0 where there is a gap."""
-    np.maximum(exponent, zero, out=out)
-    np.minimum(out, most, out=out)
+    np.maximum(exponent, zero, out)
+    np.minimum(out, most, out)
     np.expm1(out, out)
-
-
-def _loaded_valve(
-    plan: BernoulliPlan, s: int, openings: Floats, exponent: Floats, relaxed: Floats, lift: Floats
-) -> tuple[Floats, Floats]:
-    """Return decay and free rise of step s where the load decides on the valve's branch.
-
-    The secant conductance is taken at the load of mid step, predicted with the one at the
-    start: second order, like the rest.
-    """
-    m, area = plan.numbers[0], plan.cell.actuator.area
-    opening, weights = openings[plan.nodes[s]], plan.weights[plan.nodes[s]] / area
-    to_load = plan.to_load * plan.shares[s]
-    pressure = plan.cell.supply.pressure(opening)
-    grown = middle = _grown(exponent)
-    for _ in range(2):
-        load = to_load * np.maximum(middle - relaxed, 0.0)
-        conductance = plan.cell.flow.conductance(opening, pressure - load)
-        decay = m * to_load * (weights @ conductance) + TINY
-        free = weights @ (conductance * pressure)
-        slip = m * free - lift
-        growth = slip + decay * relaxed + TINY
-        relief, _ = careful(exponent, growth, decay)
-        way = np.where(grown > relaxed, growth - relief, slip)
-        middle = 0.5 * (grown + _grown(exponent + way))
-    return decay, free
 
 
 def _grown(exponent: Floats) -> Floats:

@@ -18,14 +18,20 @@ from ..physics import Cell
 from ..places import Pulp, Segment
 from ..supply import Supply
 
-__all__ = ["BernoulliPlan", "bernoulli_plan"]
+__all__ = ["POINTS", "BernoulliPlan", "bernoulli_plan"]
 
 Floats = NDArray[np.float64]
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]
-#: Four-point Gauss-Legendre nodes and weights on [0, 1]: within a step a valve may go all its way.
-NODES: tuple[float, ...] = tuple((0.5 + 0.5 * _NODES).tolist())
-WEIGHTS: tuple[float, ...] = tuple((0.5 * _WEIGHTS).tolist())
+
+def _legendre(count: int) -> tuple[tuple[float, float], ...]:
+    """Return Gauss-Legendre nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)  # type: ignore[no-untyped-call]
+    return tuple(zip((0.5 + 0.5 * nodes).tolist(), (0.5 * weights).tolist(), strict=True))
+
+
+#: Gauss points, nodes and weights, for a piece that is at most this share of its step: within a step a valve
+#: may go all its way, within a short piece it goes less of it.
+POINTS = ((0.3, _legendre(2)), (0.6, _legendre(3)), (1.0, _legendre(4)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +48,14 @@ class BernoulliPlan:
     moves : ndarray (4 s, 2 g)
         From conductances at the Gauss points, and the same with the signs of the openings, to
         what each step has: free rise, m; the same and its `bow`, in 1/m; decay, see `closed_form`.
+    free : ndarray (s, 2 g)
+        The free rise's rows of it.
     path : ndarray (3 s + 1, p)
         From the finger's underside at the period's instants to what each step has, in 1/m: rise
         and its bow; underside at the start, and at the end of the last.
+    loaded : ndarray (1 + 3 s, 2 g + p + 1)
+        Both together: from conductances, underside and a row of ones to the exponent less m H at the
+        start, with its sign changed; then what each step has: slip, bow and decay.
     nodes : tuple of slice
         The Gauss points of each step.
     weights : ndarray (g,)
@@ -52,13 +63,18 @@ class BernoulliPlan:
     lost, transition : tuple of ndarray
         The relaxation's maps, one a step: to the tension at which the pulp begins to push, and
         to the filters and the force at its end, N.
+    begin : tuple of ndarray (2, r + 3)
+        `lost` as a block uses it: from filters, force (which does not count), ones, and tension, to the
+        same, and to one more.
+    finish : tuple of ndarray (r + 1, r + 5)
+        `transition` as a block uses it: from these, and the tension on average and at the end.
     shares : tuple of float
         Share of the tension that does push, one a step: the rest is lost within it.
     unloaded : callable
         Conductance of a valve without load, m³/(s Pa), from its opening.
     numbers : tuple of float
-        The contact's m, 1/m; m x0; the largest exponent; 0, 1, 1/2 and `TINY`; and the
-        exponent below which every flow is laminar and nothing overflows.
+        The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`; and
+        the exponent below which every flow is laminar and nothing overflows.
     unit : float
         b/m, N.
     to_load : float
@@ -69,11 +85,15 @@ class BernoulliPlan:
     segments: tuple[Segment, ...]
     response: Floats
     moves: Floats
+    free: Floats
     path: Floats
+    loaded: Floats
     nodes: tuple[slice, ...]
     weights: Floats
     lost: tuple[Floats, ...]
     transition: tuple[Floats, ...]
+    begin: tuple[Floats, ...]
+    finish: tuple[Floats, ...]
     shares: tuple[float, ...]
     unloaded: Callable[[Floats], Floats]
     numbers: tuple[float, ...]
@@ -102,19 +122,27 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
     def under_supply(opening: Floats) -> Floats:
         return cell.flow.conductance(opening, supply.pressure(opening))
 
+    moves = _moves(supply, steps, m * bows, to_decay * np.array(shares)[:, None] * steps, m)
+    path = m * _path(segments)
+    lost = tuple(_lost(pulp, part.length, unit) for part in segments)
+    transition = tuple(_transition(pulp, part.length, unit, contact.share) for part in segments)
     return BernoulliPlan(
         cell,
         segments,
         cell.lag.response(queue, [*times, end]),
-        _moves(supply, steps, m * bows, to_decay * np.array(shares)[:, None] * steps, m),
-        m * _path(segments),
+        moves,
+        moves[: len(segments)],
+        path,
+        _loaded(moves, path, m * contact.offset),
         nodes,
         weights,
-        tuple(_lost(pulp, part.length, unit) for part in segments),
-        tuple(_transition(pulp, part.length, unit, contact.share) for part in segments),
+        lost,
+        transition,
+        tuple(_begin(one) for one in lost),
+        tuple(_finish(one) for one in transition),
         shares,
         cell.flow.laminar_conductance if cell.flow.knee > supply.largest else under_supply,
-        (m, m * contact.offset, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY, hard),
+        (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY, hard),
         unit,
         to_load,
     )
@@ -143,6 +171,19 @@ def _moves(supply: Supply, steps: Floats, bows: Floats, decay: Floats, exponent:
     middle, half = 0.5 * (supply.high + supply.low), 0.5 * (supply.high - supply.low)
     rows = [[middle * part, half * part] for part in (steps, exponent * steps, bows)]
     return np.block([*rows, [decay, np.zeros_like(decay)]])
+
+
+def _loaded(moves: Floats, path: Floats, offset: float) -> Floats:
+    """Return `BernoulliPlan.loaded` from the other two maps and m x0."""
+    count, inputs, instants = len(moves) // 4, moves.shape[1], path.shape[1]
+    loaded = np.zeros((1 + 3 * count, inputs + instants + 1))
+    loaded[0, inputs:] = *path[2 * count], offset
+    for s in range(count):
+        slip, bow, decay = loaded[1 + 3 * s : 4 + 3 * s]
+        slip[:-1] = *moves[count + s], *-path[s]
+        bow[:-1] = *moves[2 * count + s], *-path[count + s]
+        decay[:inputs], decay[-1] = moves[3 * count + s], TINY
+    return loaded
 
 
 def _path(segments: tuple[Segment, ...]) -> Floats:
@@ -175,8 +216,9 @@ def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, 
         inner = (queue.cut,) if part.start < queue.cut * (1.0 - 1e-9) < end * (1.0 - 2e-9) else ()
         first = len(times)
         for a, b in pairwise((part.start, *inner, end)):
-            times += [a + node * (b - a) for node in NODES]
-            weights += [weight * (b - a) for weight in WEIGHTS]
+            points = next(points for most, points in POINTS if b - a <= most * part.length * (1.0 + 1e-9))
+            times += [a + node * (b - a) for node, _ in points]
+            weights += [weight * (b - a) for _, weight in points]
         nodes.append(slice(first, len(times)))
     return np.array(times), np.array(weights), tuple(nodes)
 
@@ -196,3 +238,15 @@ def _transition(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
     last = np.zeros(transition.shape[1])
     last[-1] = unit
     return np.vstack([transition, share * (last - pulp.relaxed(transition))])
+
+
+def _begin(lost: Floats) -> Floats:
+    """Return an entry of `BernoulliPlan.begin`."""
+    begin = np.tile([*lost[:-1], 0.0, 0.0, lost[-1]], (2, 1))
+    begin[1, -2] = 1.0
+    return begin
+
+
+def _finish(transition: Floats) -> Floats:
+    """Return an entry of `BernoulliPlan.finish`."""
+    return np.insert(transition, [-3, -3], 0.0, axis=1)

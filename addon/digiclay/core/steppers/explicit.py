@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
 from ..physics import Cell, felt, rates
-from ..places import Segment
+from ..places import Movement, Segment
 
 __all__ = ["Explicit", "ExplicitPlan", "Rates"]
 
@@ -22,7 +23,7 @@ Rates = Callable[[Floats, int], Floats]
 ASTRAY = 0.01
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExplicitPlan:
     """What all periods share.
 
@@ -68,8 +69,12 @@ class Explicit:
         """Return how far the rows go in one step, s long."""
         raise NotImplementedError
 
+    def bind(self, plan: ExplicitPlan, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on; see `places.Stepper`."""
+        return partial(self.advance, plan, driven)
+
     def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+        """Move a block of cells on by one control period, in place; see `places.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = driven[: cell.rows], driven[cell.rows :]
         thrown = np.zeros(y.shape[1], np.bool_)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..delay import Queue
 from ..physics import Cell, felt
-from ..places import Segment
+from ..places import Movement, Segment
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Richardson", "RichardsonPlan", "halved"]
@@ -47,18 +47,25 @@ class Richardson:
             closed_form.plan(cell, queue, whole), closed_form.plan(cell, queue, halved(segments))
         )
 
-    def advance(self, plan: RichardsonPlan, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Stepper`."""
+    def bind(self, plan: RichardsonPlan, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on; see `places.Stepper`."""
         closed_form, cell = BernoulliExponential(), plan.coarse.cell
-        coarse = driven.copy()
-        closed_form.advance(plan.coarse, coarse, under)
-        closed_form.advance(plan.fine, driven, under)
-        y = driven[: cell.rows]
-        y += (y - coarse[: cell.rows]) / 3.0
-        np.clip(y[0], 0.0, cell.actuator.stroke, out=y[0])
-        pulp = y[cell.pulp_rows]
-        np.maximum(pulp, 0.0, out=pulp)
-        return felt(cell, y, under[-1])
+        coarse = np.empty_like(driven)
+        once = closed_form.bind(plan.coarse, coarse, near)
+        twice = closed_form.bind(plan.fine, driven, near)
+        fine_rows, coarse_rows = driven[: cell.rows], coarse[: cell.rows]
+        pulp = driven[cell.pulp_rows]
+
+        def advance(under: Floats) -> Floats:
+            coarse[:] = driven
+            once(under)
+            twice(under)
+            np.add(fine_rows, (fine_rows - coarse_rows) / 3.0, fine_rows)
+            np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
+            np.maximum(pulp, 0.0, out=pulp)
+            return felt(cell, driven, under[-1])
+
+        return advance
 
 
 def halved(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
