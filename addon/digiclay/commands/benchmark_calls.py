@@ -138,7 +138,7 @@ def _counting() -> Iterator[None]:
         if isinstance(held.block, Counted):
             return state
         counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
-        return dataclasses.replace(state, gathered=dataclasses.replace(held, **counted))
+        return state._replace(gathered=dataclasses.replace(held, **counted))
 
     constants = [module for module in _core() if hasattr(module, "filled")]
 

@@ -102,7 +102,7 @@ def compared(shadow: Shadow, after: State, path: Floats) -> tuple[Shadow, LiveEr
     system, rows = shadow.system, shadow.system.rows
     told = Replay(system.grid, after.row(rows.command)[None])
     # A period's commands are row 0 of what is played: its own memory does not count on.
-    state = replace(shadow.state, memory=0)
+    state = shadow.state._replace(memory=0)
     finger = approaches(system, along(path, system.instants / system.period))[0]
     state = advance(replace(system, controller=told), state, finger)
     if shadow.left > 1:

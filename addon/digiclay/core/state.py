@@ -179,8 +179,7 @@ class Part(NamedTuple):
     sensed: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+class State(NamedTuple):
     """A session at the start of a control period.
 
     Attributes
@@ -224,8 +223,8 @@ class State:
     def copy(self) -> State:
         """Return a state that shares no array with this one that a step would change."""
         held = replace(self.gathered, block=self.gathered.block.copy(), mode=self.gathered.mode.copy())
-        return replace(
-            self, rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), gathered=held
+        return self._replace(
+            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), gathered=held
         )
 
 

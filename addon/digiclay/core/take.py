@@ -160,7 +160,7 @@ def _rests(system: System, start: bytes) -> bool:
     return (
         all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))
         and np.array_equal(state.mode(), rest.mode())
-        and packed(system, replace(rest, memory=state.memory)) == packed(system, rest)
+        and packed(system, rest._replace(memory=state.memory)) == packed(system, rest)
     )
 
 

@@ -85,7 +85,8 @@ class Block:
             for rise, at in zip(self.free, range(1, len(self.loaded), 3), strict=True)
         )
         self.start = self.loaded[0]
-        self.lost = empty(2, k)
+        self.begins = empty(2, k)
+        self.lost, self.relaxed = self.begins
         # What `BernoulliPlan.begin` and `finish` are maps of.
         self.work = empty(len(self.pulp) + 5, k)
         self.work[-5], self.work[-4] = 0.0, 1.0
@@ -94,7 +95,7 @@ class Block:
         self.begun, self.moved = self.work[:-2], self.work[:-4]
         self.first, self.mean, self.last = self.work[-3:]
         self.constants = filled(plan.numbers[:-1], k)
-        self.none, self.hard = np.zeros_like(self.moved), np.full_like(self.lost, plan.numbers[-1])
+        self.none, self.hard = np.zeros_like(self.moved), np.full_like(self.begins, plan.numbers[-1])
         self.stops = filled((0.0, cell.actuator.stroke), count)
 
     def __call__(self, under: Floats) -> Floats:
@@ -121,7 +122,7 @@ class Block:
     def _under_finger(self) -> None:
         """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
         plan, height, near = self.plan, self.height, self.near
-        first, mean, last, (lost, relaxed) = self.first, self.mean, self.last, self.lost
+        first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
         m, offset, per_m, most, zero, one, half, tiny = self.constants
         lowest, highest = self.stops
         self.filters[:] = self.pulp
@@ -130,7 +131,7 @@ class Block:
         _tension(exponent, zero, most, last)
         for s, (rise, risen, ways, slip, bow, decay) in enumerate(self.steps):
             first[:] = last
-            plan.begin[s].dot(self.begun, self.lost)
+            plan.begin[s].dot(self.begun, self.begins)
             idle = first <= lost
             stiffness = decay.copy()
             np.putmask(stiffness, idle, tiny)
