@@ -13,8 +13,8 @@ from typing import Any
 from ..core.errors import DigiclayError
 from ..core.jobs import Job, batch, find_jobs
 from .batch_folder import Folder, opened
-from .counted import Counted, duration
 from .job import check_outputs
+from .progress import Counted, duration
 from .stop import Stop
 from .sweep import workers
 from .worker import Worker, cores

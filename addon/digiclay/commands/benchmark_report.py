@@ -1,4 +1,4 @@
-"""What the benchmarks share: options, aligned tables, progress, and results kept in a folder."""
+"""What the benchmarks share: options, aligned tables, and results kept in a folder."""
 
 from __future__ import annotations
 
@@ -8,58 +8,17 @@ import io
 import os
 import platform
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..core.errors import OutputError
+from .progress import Steps
 
-__all__ = ["Steps", "add_kind", "kept", "made_with", "number", "table"]
-
-#: Cells of the bar, and seconds between two drawings of it.
-WIDTH, PAUSE = 28, 0.2
-
-
-class Steps:
-    """A progress bar over pieces of work, on a terminal; nothing elsewhere.
-
-    Parameters
-    ----------
-    stream : TextIO
-    label : str
-    total : int
-        Pieces of work.
-    """
-
-    def __init__(self, stream: TextIO, label: str, total: int) -> None:
-        self._stream, self._label, self._total, self._done = stream, label, total, 0
-        self._started = self._drawn = time.monotonic()
-
-    def __enter__(self) -> Steps:
-        return self
-
-    def __call__(self, doing: str = "") -> None:
-        """Count one more piece as done, and draw the bar if it is time to."""
-        self._done += 1
-        now = time.monotonic()
-        if now - self._drawn < PAUSE or not self._stream.isatty():
-            return
-        filled = WIDTH * self._done // self._total
-        left = (now - self._started) * (self._total - self._done) / self._done
-        bar = "#" * filled + "." * (WIDTH - filled)
-        text = f"{self._label} [{bar}] {self._done} of {self._total}, {left:.0f} s left  {doing}"
-        self._stream.write(f"\r{text[:110]}\033[K")
-        self._stream.flush()
-        self._drawn = now
-
-    def __exit__(self, *raised: object) -> None:
-        if self._stream.isatty():
-            self._stream.write("\r\033[K")
-            self._stream.flush()
+__all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
 
 
 def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:

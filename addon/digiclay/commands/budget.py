@@ -10,23 +10,16 @@ from typing import Any
 from ..core.budget import Fitted, fitted
 from ..core.scene import Scene
 from .benchmark_report import table
+from .progress import Line
 
 __all__ = ["noted", "report", "within"]
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
-    shows = not quiet and sys.stderr.isatty()
-
-    def told(said: str) -> None:
-        if shows:
-            print(f"\rtrying: {said}\033[K", end="", file=sys.stderr, flush=True)
-
-    try:
+    with Line(sys.stderr) as line:
+        told = None if quiet else lambda said: line.draw(f"trying: {said}")
         found = fitted(scene, budget, told=told)
-    finally:
-        if shows:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
     if not quiet:
         print("\n".join(report(found)))
     return found

@@ -22,8 +22,8 @@ from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import load
 from ..core.session import Result, run, save
-from .counted import Counted
 from .export import exported, formats
+from .progress import Counted
 from .refusals import refuse_what_has_no_surface, refuse_without_blender
 from .render import draw_film, draw_still, draw_turntable
 from .stop import Stop

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.run_folder import may_be_written, written
+from .progress import Line
 from .refusals import refuse_without
 from .stop import Stop
 
@@ -56,7 +57,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-class Stages:
+class Stages(Line):
     """Tells on a terminal what is being done, on one line; elsewhere nothing. Stops when asked to.
 
     Parameters
@@ -68,22 +69,12 @@ class Stages:
     """
 
     def __init__(self, stream: TextIO, stop: Stop, *, quiet: bool) -> None:
-        self._stream, self._stop = stream, stop
-        self._shown = stream.isatty() and not quiet
-        self._started = time.monotonic()
-
-    def __enter__(self) -> Stages:
-        return self
+        super().__init__(stream)
+        self._stop, self._quiet = stop, quiet
 
     def __call__(self, stage: str) -> None:
         """Tell the next stage."""
         if self._stop():
             raise KeyboardInterrupt
-        if self._shown:
-            self._stream.write(f"\r{time.monotonic() - self._started:4.0f} s  {stage}\033[K")
-            self._stream.flush()
-
-    def __exit__(self, *raised: object) -> None:
-        if self._shown:
-            self._stream.write("\r\033[K")
-            self._stream.flush()
+        if not self._quiet:
+            self.draw(f"{time.monotonic() - self._started:4.0f} s  {stage}")

@@ -16,7 +16,7 @@ from ..core.finished import last_touch, read, row_at
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size
-from .counted import Counted
+from .progress import Counted
 from .refusals import refuse_without_blender
 from .stop import Stop
 
