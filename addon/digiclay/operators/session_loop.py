@@ -12,6 +12,7 @@ from typing import Any
 from ..compat import bpy
 from ..live import handlers, loop, running, tick
 from ..overlay import views
+from .reasons import allowed
 
 __all__ = ["GoOn", "Looping", "end_all"]
 
@@ -71,10 +72,7 @@ class GoOn(Looping, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """Sessions without an operator that drives them are needed."""
-        if running.all() and context.window is not None:
-            return True
-        cls.poll_message_set("No session runs")
-        return False
+        return allowed(cls, "" if running.all() and context.window is not None else "No session runs")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Drive the loop again."""
