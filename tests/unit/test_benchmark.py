@@ -16,8 +16,9 @@ from digiclay.commands import benchmark_precision as precision
 from digiclay.commands.benchmark_calls import Counted, Ledger, floor
 from digiclay.commands.benchmark_loop import loop
 from digiclay.commands.benchmark_problems import PROBLEMS, Work, problem, solved
-from digiclay.commands.benchmark_report import kept, made_with, table
+from digiclay.commands.benchmark_report import kept, made_with
 from digiclay.commands.benchmark_terms import LONGER, TERMS, without
+from digiclay.commands.tables import table
 from digiclay.core.errors import OutputError
 
 from tests.assemble import sample

@@ -1,4 +1,4 @@
-"""What the benchmarks share: options, aligned tables, and results kept in a folder."""
+"""What the benchmarks share: options, progress, and results kept in a folder."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import io
 import os
 import platform
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from .. import __version__
 from ..core.errors import OutputError
 from .progress import Steps
+from .tables import table
 
 __all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
 
@@ -37,16 +38,6 @@ def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = Tru
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
     """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet."""
     return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> Iterator[str]:
-    """Give the lines of an aligned table; the first `left` columns are texts, all others numbers."""
-    widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
-    for line in (head, ["-" * width for width in widths], *rows):
-        cells = (
-            c.ljust(w) if i < left else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True))
-        )
-        yield ("  " + "  ".join(cells)).rstrip()
 
 
 def number(value: float, unit: str = "") -> str:

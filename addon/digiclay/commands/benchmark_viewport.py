@@ -7,7 +7,8 @@ import importlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
+from .tables import table
 
 if TYPE_CHECKING:  # Blender is imported when it is needed
     from ..live.viewport_cost import Cost

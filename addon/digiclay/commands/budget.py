@@ -9,8 +9,8 @@ from typing import Any
 
 from ..core.budget import Fitted, fitted
 from ..core.scene import Scene
-from .benchmark_report import table
 from .progress import Line
+from .tables import table
 
 __all__ = ["noted", "report", "within"]
 

@@ -21,6 +21,7 @@ from .arguments import add_scene
 from .progress import Bar
 from .refusals import refuse_without
 from .stop import Stop
+from .tables import table as aligned
 
 __all__ = ["READ", "add", "table"]
 
@@ -136,12 +137,9 @@ def table(found: dict[str, Metrics]) -> Iterator[str]:
     """Give the lines of the table: a metric a line, a method a column, units people read."""
     known, columns = {**TRIAL_METRICS, **SPEEDS}, list(found)
     names = [name for name in known if name in found[columns[0]]]
-    rows = [["", "", *columns]]
+    rows = []
     for name in names:
         factor, unit = READ.get(known[name][0], (1.0, known[name][0]))
         values = (found[method][name] for method in columns)
         rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
-    wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    for name, unit, *cells in rows:
-        right = "  ".join(cell.rjust(size) for cell, size in zip(cells, wide[2:], strict=True))
-        yield f"{name.ljust(wide[0])}  {unit.ljust(wide[1])}  {right}".rstrip()
+    yield from aligned(("metric", "unit", *columns), rows, left=2)
