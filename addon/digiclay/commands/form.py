@@ -71,7 +71,8 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and tell in a few lines what came of it."""
-    out: Path = arguments.out or Path(find_shape(arguments.shape).stem)
+    file = find_shape(arguments.shape)
+    out: Path = arguments.out or Path(file.stem)
     may_be_written(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
