@@ -117,10 +117,10 @@ def test_a_stack_has_no_more_runs_than_pay() -> None:
 
 
 def test_long_sessions_make_smaller_stacks() -> None:
-    long = [Setting("simulation.duration", "200")]
+    long = [Setting("simulation.duration", "1e4")]
     parts = bundles(some("control.force_gain=1:6:20", settings=long))
-    # 40,000 control periods of 121 cells at 25 bytes are 121 MB, and a stack may hold 1 GiB.
-    assert [len(stack) for stack in parts.stacks] == [6, 7, 7]
+    # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB.
+    assert [len(stack) for stack in parts.stacks] == [10, 10]
 
 
 def test_points_without_their_like_run_alone_and_it_is_said() -> None:
@@ -129,11 +129,11 @@ def test_points_without_their_like_run_alone_and_it_is_said() -> None:
     assert parts.told() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
 
 
-def test_sessions_of_hours_run_alone_and_it_is_said() -> None:
-    hours = [Setting("simulation.duration", "1e4")]
-    parts = bundles(some("control.force_gain=1:6:5", settings=hours))
+def test_sessions_of_days_run_alone_and_it_is_said() -> None:
+    days = [Setting("simulation.duration", "1e5")]
+    parts = bundles(some("control.force_gain=1:6:5", settings=days))
     assert parts.stacks == ()
-    assert parts.told() == ["5 points one at a time: their histories are too long to keep many at once"]
+    assert parts.told() == ["5 points one at a time: they have too many rows to keep for many at once"]
 
 
 def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
@@ -172,7 +172,7 @@ def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest
     def faulty(*given: Any, **known: Any) -> Any:
         raise MemoryError
 
-    monkeypatch.setattr("digiclay.core.sweep_bundles.run_together", faulty)
+    monkeypatch.setattr("digiclay.core.sweep_bundles.judge_together", faulty)
     scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
     assert all(record and "figures" in record for record in evaluate_all(scenes))
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from .errors import DigiclayError
 from .scene import Scene
 from .stack.assembly import structure, why_not
-from .stack.session import run_together
+from .stack.session import judge_together
 from .sweep import Point, Record, evaluate, recorded
 
 __all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
@@ -18,10 +18,9 @@ __all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
 LEAST = 4
 #: From twice as many points on there are two stacks: a larger one gains little, and busies one core only.
 RUNS = 32
-#: Bytes the histories of a stack may take before they are judged, and bytes a cell takes in a control period.
-BUDGET, BYTES_A_CELL = 2**30, 25
-#: Cells that take part at a time with a method that looks after a blister only; else it may be all.
-FEW = 200
+#: Bytes a stack may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
+#: by unseen.
+BUDGET, BYTES_A_ROW = 2**30, 41
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def bundles(points: Sequence[Point]) -> Bundles:
             reason = (
                 f"fewer than {LEAST} have the same bed, parts and steps"
                 if len(group) < LEAST
-                else "their histories are too long to keep many at once"
+                else "they have too many rows to keep for many at once"
             )
             why[reason] = why.get(reason, 0) + len(group)
             continue
@@ -91,9 +90,8 @@ def bundles(points: Sequence[Point]) -> Bundles:
 def _most(scene: Scene | None) -> int:
     """Return how many runs like this one may be in a stack."""
     assert scene is not None
-    cells = scene.cells if scene.blister is None else min(scene.cells, FEW)
-    periods = scene.periods // scene.recorder.every if scene.recorder else 1
-    return BUDGET // max(1, periods * cells * BYTES_A_CELL)
+    rows = scene.recorder.rows(scene.periods) if scene.recorder else 1
+    return BUDGET // (rows * BYTES_A_ROW)
 
 
 def _some(count: int, what: str) -> str:
@@ -109,7 +107,7 @@ def evaluate_all(scenes: Sequence[Scene], stopped: Callable[[], bool] | None = N
     records: list[Record | None] = [None] * len(scenes)
     if len(scenes) > 1:
         try:
-            for number, result in run_together(scenes, stopped=stopped):
+            for number, result in judge_together(scenes, stopped=stopped):
                 if isinstance(result, DigiclayError):
                     records[number] = {"error": " ".join(str(result).split())}
                 else:

@@ -1,4 +1,4 @@
-"""The fingers of many runs: how they come, and their undersides."""
+"""The fingers of many runs: how they come, their undersides, and which cells they pass over."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..layout import Grid
 from ..system import System
 from ..touch import approach
 from ..trajectory import Trajectory
 from .columns import Floats
 
-__all__ = ["Fingers", "fingers", "undersides"]
+__all__ = ["Fingers", "Way", "fingers", "undersides", "way_over"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +103,30 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     under *= under
     under += rows[len(least) :]
     return under
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A finger's way over a bed, at some times.
+
+    Attributes
+    ----------
+    time : ndarray (t,)
+        s.
+    fingertip : ndarray (t, 7)
+        Lowest point, m, and quaternion.
+    cells : ndarray of int (m,)
+        Those that are the nearest to it at some time, ascending.
+    """
+
+    time: Floats
+    fingertip: Floats
+    cells: NDArray[np.intp]
+
+
+def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
+    """Work out a finger's way at times (t,), s."""
+    tip = trajectory.poses(time)
+    places = np.unique(tip[:, :2], axis=0)
+    nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+    return Way(time, tip, np.unique(nearest))
