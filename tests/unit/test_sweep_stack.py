@@ -88,11 +88,11 @@ def calls(count: int) -> list[int]:
         made[0] += event == "c_call"
 
     coming = fingers(systems, ways, 0, 100)
-    for period in range(100):
+    for _ in range(100):
         made[0] = 0
         sys.setprofile(count_one)
         try:
-            state = advance(stack, state, coming, period)
+            state = advance(stack, state, coming)
         finally:
             sys.setprofile(None)
         counted.append(made[0])

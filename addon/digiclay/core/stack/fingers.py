@@ -12,9 +12,12 @@ from ..layout import Grid
 from ..system import System
 from ..touch import approach
 from ..trajectory import Trajectory
-from .columns import Floats
+from .columns import Floats, mapped
 
-__all__ = ["Fingers", "Way", "fingers", "undersides", "way_over"]
+__all__ = ["Fingers", "Way", "fingers", "still_coming", "undersides", "way_over"]
+
+#: Control periods that are worked out at a time.
+CHUNK = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +28,14 @@ class Fingers:
 
     Attributes
     ----------
+    first : int
+        The first of these periods.
     forms : ndarray (t, 2 p, 6, b)
     join : ndarray (t, 2, p, 1, b)
     window : ndarray (t, 6, b)
     """
 
+    first: int
     forms: Floats
     join: Floats
     window: Floats
@@ -50,7 +56,16 @@ def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, c
     runs = list(zip(systems, ways, strict=True))
     alike = all(_same(run, runs[0]) for run in runs)
     known = [_approaches(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
-    return Fingers(*(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+    return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+
+
+def still_coming(
+    coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+) -> Fingers | None:
+    """Return how the fingers come in a period and some more: what is known, or worked out anew."""
+    if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
+        return coming
+    return fingers(systems, ways, period, CHUNK)
 
 
 def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
@@ -87,15 +102,11 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     ----------
     coming : Fingers
     period : int
-        Which of its periods.
+        One of these.
     place : ndarray (6, k, b)
     """
-    forms, (least, root) = coming.forms[period], coming.join[period]
-    if forms.shape[-1] == 1:
-        flat = np.dot(forms[..., 0], place.reshape(6, -1))
-        rows = flat.reshape(-1, *place.shape[1:])
-    else:
-        rows = np.einsum("pcb,ckb->pkb", forms, place)
+    forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
+    rows = mapped(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
     under: Floats = rows[: len(least)]
     np.maximum(under, least, under)
     np.sqrt(under, under)

@@ -12,14 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..layout import Grid
+from ..metrics import BAND, cell_area, contact_loss_share, first_touch, in_contact, rfd
+from ..metrics_path import ridge_errors
+from ..metrics_signal import deviation, mean, overshoot, settling_time, weights
 from ..modes import Mode
 from ..recorder import Recorder
 from ..state import Rows
 from .beds import Beds, Gathered
 from .columns import Floats
+from .fingers import Way
 from .gathering import KEPT
 
-__all__ = ["StackRecording", "StackTraces", "Trace"]
+__all__ = ["StackRecording", "StackTraces", "Trace", "summary"]
 
 #: A plain number: numpy compares with it ten times as fast.
 FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
@@ -236,3 +241,57 @@ def _felt(held: Gathered, rows: Rows) -> Floats:
         np.einsum("kb,kb->b", values[: held.near], force, out=found)
     np.maximum.reduce(force, out=felt[4], initial=0.0)
     return felt
+
+
+def summary(trace: Trace, way: Way, grid: Grid, set_point: float) -> dict[str, float | None]:
+    """Return what `metrics.summary` makes of the history that a trace is of.
+
+    Parameters
+    ----------
+    trace : Trace
+    way : Way
+        The finger's, at the times of the trace's rows.
+    grid : Grid
+    set_point : float
+        Force the finger should feel, N.
+    """
+    time, total, weight = way.time, trace.total, weights(way.time)
+    felt, formed, area = in_contact(total), trace.last - trace.first, cell_area(grid.positions)
+    place = np.column_stack([trace.x, trace.y])[felt] / total[felt, None]
+    behind = np.round(np.hypot(*(way.fingertip[felt, :2] - place).T), 12)
+    above = trace.height[felt] / total[felt] - way.fingertip[felt, 2]
+    rows, first = felt & trace.following, first_touch(total)
+    ridge = ridge_errors(grid.positions[way.cells], trace.last[way.cells], way.fingertip, rows)
+    each = np.ones(len(ridge))
+    beyond = settled = None
+    if first.stop > first.start:
+        beyond = overshoot(np.concatenate([[0.0], total[first]]), set_point)
+        settled = settling_time(time[first], total[first], set_point, BAND * set_point)
+    found: dict[str, float | None] = {
+        "duration": float(time[-1] - time[0]),
+        "set_point": set_point,
+        "rfd": rfd(time, total, set_point),
+        "rfd_shaping": rfd(time, total, set_point, rows),
+        "rfd_session": rfd(time, total, set_point, np.ones(len(time), dtype=bool)),
+        "contact_share": mean(felt.astype(np.float64), weight),
+        "contact_loss_share": contact_loss_share(time, total),
+        "lag_mean": mean(behind, weight[felt]),
+        "lag_max": float(behind.max()) if len(behind) else None,
+        "force_deviation": deviation(total[rows], weight[rows]),
+        "force_overshoot": beyond,
+        "settling_time": settled,
+        "height_deviation": deviation(above[rows[felt]], weight[rows]),
+        "ridge_offset": mean(ridge, each),
+        "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
+        "ridge_unevenness": deviation(ridge, each),
+        "max_cell_force": float(trace.strongest.max()),
+        "max_total_force": float(total.max()),
+        "lowest": float(trace.last.min()),
+        "highest": float(trace.last.max()),
+        "height_range": float(np.ptp(trace.last)),
+        "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
+        "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
+    }
+    return {
+        name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
+    }

@@ -10,23 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accuracy import SHARE, Errors, can_be_estimated, judging
 from ..assembly import assemble
 from ..errors import DigiclayError
-from ..layout import Grid
-from ..metrics import BAND, METRICS, cell_area, contact_loss_share, first_touch, in_contact, rfd
-from ..metrics_path import ridge_errors
-from ..metrics_signal import deviation, mean, overshoot, settling_time, weights
+from ..metrics import METRICS
 from ..scene import Scene
 from ..session import FORCE_DEVIATIONS, Result, fits, judged
-from ..simulation import CHUNK
 from ..system import System
 from .assembly import put_together
 from .beds import Beds
-from .fingers import Fingers, Way, fingers, way_over
-from .recording import StackRecording, StackTraces, Trace
-from .simulation import Stack, advance, begin, blow_up, broken, kept
+from .fingers import Fingers, Way, still_coming, way_over
+from .recording import StackRecording, StackTraces, summary
+from .simulation import Stack, advance, begin, blow_up, broken, differences, follow, kept
 
-__all__ = ["judge_together", "run_together"]
+__all__ = ["judge_of", "judge_together", "run_together"]
 
 
 @dataclass(frozen=True)
@@ -89,13 +86,10 @@ def _played(
     state = begin(stack)
     yield _Now(stack, state, runs, (), np.zeros(len(runs), np.bool_), share)
     coming: Fingers | None = None
-    until = first = 0
     while runs:
         started = time.perf_counter()
-        if state.period == until and stack.touch:
-            first, until = until, until + CHUNK
-            coming = fingers(stack.systems, [ways[run] for run in runs], first, CHUNK)
-        state = advance(stack, state, coming, state.period - first)
+        coming = still_coming(coming, stack.systems, [ways[run] for run in runs], state.period)
+        state = advance(stack, state, coming)
         failed = broken(state)
         share += (time.perf_counter() - started) / len(runs)
         if stopped and stopped():
@@ -107,8 +101,7 @@ def _played(
             runs, ends = tuple(runs[place] for place in left), ends[left]
             if runs:
                 state = kept(state, stack.controller, left)
-                stack = put_together([systems[run] for run in runs])
-                until = state.period
+                stack, coming = put_together([systems[run] for run in runs]), None
 
 
 def _judged(now: _Now, place: int, scene: Scene, rows: Any, versions: Mapping[str, str]) -> Result:
@@ -162,10 +155,61 @@ def run_together(
             yield run, _judged(now, place, scenes[run], rows, versions or {})
 
 
+def judge_of(scene: Scene) -> Scene:
+    """Return the scene that judges a run of another, see `accuracy`: its commands are the other's."""
+    return replace(scene, control=None, shape=None, simulation=judging(scene.simulation))
+
+
+class _Judges:
+    """Integrates sessions once more, side by side with them, and keeps the largest differences.
+
+    Parameters
+    ----------
+    scenes : mapping of int to Scene
+        By the numbers of their runs.
+    """
+
+    def __init__(self, scenes: Mapping[int, Scene]) -> None:
+        self._systems = {run: assemble(judge_of(scene)) for run, scene in scenes.items()}
+        self._ways = {run: scene.trajectory.trajectory() for run, scene in scenes.items()}
+        self._runs = tuple(scenes)
+        self._stack = put_together(list(self._systems.values()))
+        self._state = begin(self._stack)
+        self._coming: Fingers | None = None
+        self._largest = np.zeros((3, len(self._runs)))
+
+    def observe(self, state: Beds, runs: tuple[int, ...]) -> None:
+        """Do the control period that the sessions have just done; `runs` says whose the last axis is."""
+        if runs != self._runs:
+            left = [self._runs.index(run) for run in runs]
+            self._runs, self._largest = runs, self._largest[:, left]
+            self._state = kept(self._state, None, left)
+            self._stack, self._coming = put_together([self._systems[run] for run in runs]), None
+        ways = [self._ways[run] for run in runs]
+        self._coming = still_coming(self._coming, self._stack.systems, ways, self._state.period)
+        self._state = follow(self._stack, self._state, self._coming, state)
+        np.maximum(self._largest, differences(self._state, state, self._stack.rows), self._largest)
+
+    def of(self, place: int) -> Errors:
+        """Return the estimated errors so far of the run at a place on the last axis."""
+        height, force, total = (SHARE * self._largest[:, place]).tolist()
+        return Errors(height, force, total)
+
+
 def judge_together(
-    scenes: Sequence[Scene], *, stopped: Callable[[], bool] | None = None
+    scenes: Sequence[Scene], *, errors: bool = False, stopped: Callable[[], bool] | None = None
 ) -> Iterator[tuple[int, Result | DigiclayError]]:
     """Run scenes as `run_together` does, and judge them without ever having their histories.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Of one `assembly.structure`, with a recorder.
+    errors : bool, optional
+        Estimate their errors too, where `accuracy.can_be_estimated`; those that judge them, see
+        `judge_of`, must be of one structure as well.
+    stopped : callable, optional
+        See `run_together`.
 
     Yields
     ------
@@ -181,9 +225,14 @@ def judge_together(
     assert recorder is not None
     start, longest = next(playing), max(scenes[run].periods for run in systems)
     traces = StackTraces(recorder, start.stack.rows, start.state, start.runs, longest)
+    judges = (
+        _Judges({run: scenes[run] for run in systems}) if errors and can_be_estimated(scenes[0]) else None
+    )
     ways: dict[Any, Way] = {}
     for now in playing:
         traces.observe(now.state, now.runs)
+        if judges:
+            judges.observe(now.state, now.runs)
         for place in now.over:
             run = now.runs[place]
             if now.failed[place]:
@@ -194,57 +243,11 @@ def judge_together(
             if same not in ways:
                 times = trace.period * scene.simulation.control_period
                 ways[same] = way_over(systems[run].grid, scene.trajectory.trajectory(), times)
-            found = _summary(trace, ways[same], systems[run].grid, scene.set_point)
+            found = summary(trace, ways[same], systems[run].grid, scene.set_point or 0.0)
+            if scene.set_point is None:  # nothing was asked of the force, so nothing deviates
+                found |= dict.fromkeys(FORCE_DEVIATIONS)
             result = _judged(now, place, scene, None, {})
             units = {name: METRICS[name][0] for name in found}
             metrics = {**result.metrics, **found, "units": {**result.metrics["units"], **units}}
-            yield run, replace(result, metrics=metrics)
-
-
-def _summary(trace: Trace, way: Way, grid: Grid, set_point: float | None) -> dict[str, float | None]:
-    """Return what `metrics.summary` would make of the history a trace is of; the same keys.
-
-    Without a set point nothing was asked of the force, so nothing deviates.
-    """
-    time, total, target, weight = way.time, trace.total, set_point or 0.0, weights(way.time)
-    felt, formed, area = in_contact(total), trace.last - trace.first, cell_area(grid.positions)
-    place = np.column_stack([trace.x, trace.y])[felt] / total[felt, None]
-    behind = np.round(np.hypot(*(way.fingertip[felt, :2] - place).T), 12)
-    above = trace.height[felt] / total[felt] - way.fingertip[felt, 2]
-    rows, first = felt & trace.following, first_touch(total)
-    ridge = ridge_errors(grid.positions[way.cells], trace.last[way.cells], way.fingertip, rows)
-    each = np.ones(len(ridge))
-    beyond = settled = None
-    if first.stop > first.start:
-        beyond = overshoot(np.concatenate([[0.0], total[first]]), target)
-        settled = settling_time(time[first], total[first], target, BAND * target)
-    found: dict[str, float | None] = {
-        "duration": float(time[-1] - time[0]),
-        "set_point": target,
-        "rfd": rfd(time, total, target),
-        "rfd_shaping": rfd(time, total, target, rows),
-        "rfd_session": rfd(time, total, target, np.ones(len(time), dtype=bool)),
-        "contact_share": mean(felt.astype(np.float64), weight),
-        "contact_loss_share": contact_loss_share(time, total),
-        "lag_mean": mean(behind, weight[felt]),
-        "lag_max": float(behind.max()) if len(behind) else None,
-        "force_deviation": deviation(total[rows], weight[rows]),
-        "force_overshoot": beyond,
-        "settling_time": settled,
-        "height_deviation": deviation(above[rows[felt]], weight[rows]),
-        "ridge_offset": mean(ridge, each),
-        "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
-        "ridge_unevenness": deviation(ridge, each),
-        "max_cell_force": float(trace.strongest.max()),
-        "max_total_force": float(total.max()),
-        "lowest": float(trace.last.min()),
-        "highest": float(trace.last.max()),
-        "height_range": float(np.ptp(trace.last)),
-        "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
-        "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
-    }
-    void = FORCE_DEVIATIONS if set_point is None else ()
-    return {
-        name: value if value is not None and name not in void and np.isfinite(value) else None
-        for name, value in found.items()
-    }
+            result = replace(result, metrics=metrics)
+            yield run, result.with_errors(judges.of(place)) if judges else result
