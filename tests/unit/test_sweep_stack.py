@@ -123,6 +123,19 @@ def test_long_sessions_make_smaller_stacks() -> None:
     assert [len(stack) for stack in parts.stacks] == [10, 10]
 
 
+def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
+    # A dead time of half a control period falls on the end of a half step.
+    varied = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
+    assert indices(bundles(some(*varied)).stacks) == [[0, 1, 2, 3, 4, 5, 6, 7]]
+    assert indices(bundles(some(*varied), errors=True).stacks) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+def test_points_whose_steps_cannot_be_halved_are_told_when_they_run() -> None:
+    finest = [*SHORT, Setting("simulation.physics_step", "5e-6")]
+    parts = bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
+    assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
+
+
 def test_points_without_their_like_run_alone_and_it_is_said() -> None:
     parts = bundles(some("layout.rows=11,13,15"))
     assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2]])
@@ -153,11 +166,12 @@ def test_values_that_do_not_go_together_are_in_no_stack() -> None:
     assert (indices(parts.stacks), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
 
 
-def test_a_bundle_comes_to_the_figures_of_its_points() -> None:
+@pytest.mark.parametrize("errors", [False, True])
+def test_a_bundle_comes_to_the_figures_of_its_points(errors: bool) -> None:
     scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    found = evaluate_all(scenes)
+    found = evaluate_all(scenes, errors=errors)
     for record, scene in zip(found, scenes, strict=True):
-        alone = evaluate(scene)
+        alone = evaluate(scene, errors=errors)
         assert record is not None
         assert alone is not None
         times = ("run_time", "real_time_factor")
