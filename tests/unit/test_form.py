@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from digiclay.cli import WRONG, main
+from digiclay.cli import main
+from digiclay.commands.exit_codes import WRONG
 from digiclay.core.actuator import Actuator
 from digiclay.core.assembly import assemble
 from digiclay.core.fingertip import Fingertip

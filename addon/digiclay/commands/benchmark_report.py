@@ -16,7 +16,9 @@ import numpy as np
 
 from .. import __version__
 from ..core.errors import OutputError
+from .arguments import add_command
 from .progress import Steps
+from .refusals import refuse_unwritable
 from .tables import table
 
 __all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
@@ -24,15 +26,23 @@ __all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
 
 def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:
     """Add a benchmark with the options all of them take."""
-    parser: argparse.ArgumentParser = kinds.add_parser(
-        name, help=help, description=help[0].upper() + help[1:] + ".", epilog="examples:\n" + examples,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(kinds, name, help, f"examples:\n{examples}")
     parser.add_argument("--quick", action="store_true", help="fewer and shorter runs")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     if out:
-        parser.add_argument("--out", metavar="DIR", type=Path, help="also write the results into this folder")
+        parser.add_argument(
+            "--out", metavar="DIR", type=_folder, help="also write the results into this folder"
+        )
     return parser
+
+
+def _folder(text: str) -> Path:
+    """Read the name of a folder to write into; it is refused now what is bound to fail after the work."""
+    try:
+        refuse_unwritable(Path(text))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+    return Path(text)
 
 
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:

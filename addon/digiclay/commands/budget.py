@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.budget import Fitted, fitted
 from ..core.scene import Scene
+from .arguments import told_as_options
 from .progress import Line
 from .tables import table
 
@@ -19,7 +20,8 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
     with Line(sys.stderr) as line:
         told = None if quiet else lambda said: line.draw(f"trying: {said}")
-        found = fitted(scene, budget, told=told)
+        with told_as_options("run"):
+            found = fitted(scene, budget, told=told)
     if not quiet:
         print("\n".join(report(found)))
     return found

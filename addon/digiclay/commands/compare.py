@@ -17,7 +17,7 @@ from ..core.quantity import nearest
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
-from .arguments import add_scene
+from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
 from .stop import Stop
@@ -44,11 +44,8 @@ Metrics = dict[str, float | None]
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "compare", help="run control methods on the same input",
-        description="Run control methods on the same input, and set their metrics side by side.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Run control methods on the same input, and set their metrics side by side."
+    parser = add_command(commands, "compare", "run control methods on the same input", EXAMPLES, said)
     add_scene(parser)
     parser.add_argument(
         "--methods", metavar="M,...", type=_methods, default=("virtual_master", "cell_states"),
@@ -110,10 +107,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
     """Return the scene with one method, and the settings of the command line."""
-    settings = [*arguments.settings, Setting("control.method", method, "--methods")]
-    if arguments.stepper is not None:
-        settings.append(Setting("simulation.stepper", arguments.stepper, "--stepper"))
-    return load(path, settings)
+    return load(path, [*settings_of(arguments), Setting("control.method", method, "--methods")])
 
 
 def _run(scene: Scene, method: str, stop: Stop, *, quiet: bool) -> Trial:

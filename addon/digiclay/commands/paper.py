@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.run_folder import may_be_written, written
+from .arguments import add_command
 from .progress import Line
 from .refusals import refuse_without
 from .stop import Stop
@@ -26,11 +27,8 @@ The folder holds paper.md (start there), the figures, and metrics.json with ever
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "paper", help="reproduce the paper's results",
-        description="Reproduce the paper's figures, and set its claims beside what is measured.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Reproduce the paper's figures, and set its claims beside what is measured."
+    parser = add_command(commands, "paper", "reproduce the paper's results", EXAMPLES, said)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("paper"), help="default ./paper")
     parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
     parser.add_argument("--quick", action="store_true", help="coarse: few speeds and gains, for a first look")
