@@ -5,7 +5,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..device.view import bed_of
-from ..live import running, sculpting
+from ..live import recovery, running, sculpting
 from ..recorded import takes
 from .reasons import allowed
 
@@ -17,7 +17,7 @@ class RecordTake(bpy.types.Operator):  # type: ignore[misc]
 
     bl_idname = "digiclay.take_record"
     bl_label = "Record Take"
-    bl_options = {"REGISTER"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -53,6 +53,7 @@ class KeepTake(bpy.types.Operator):  # type: ignore[misc]
 
     def execute(self, context: Any) -> set[str]:
         """Keep it."""
+        recovery.take_back()
         bed = bed_of(context)
         session = running.of(bed)
         take = takes.recorded(session)
