@@ -227,9 +227,12 @@ class StackTraces:
         if count > 1:
             felt[-1], following[-1] = _felt(state.gathered, self._rows)[:, place], following[-2]
         period = np.minimum(np.arange(count) * self._every, end)
-        total, x, y, height, strongest = felt.T
-        first, last = self._first[:, column], state.row(0)[:, place]
-        return Trace(period, total, x, y, height, strongest, following, first, last)
+        # In one piece each: they are gone through many times.
+        total, x, y, height, strongest = np.ascontiguousarray(felt.T)
+        last, held = state.rows[0, :, place].copy(), state.gathered
+        last[held.cells[:, place]] = held.block[0, :, place]
+        first = self._first[:, column]
+        return Trace(period, total, x, y, height, strongest, following.copy(), first, last)
 
 
 def _felt(held: Gathered, rows: Rows) -> Floats:
