@@ -179,13 +179,8 @@ class StackTraces:
 
     Parameters
     ----------
-    recorder : Recorder
-    rows : Rows
-        Which row of the state holds what.
-    state : Beds
-        Before the sessions.
-    runs : tuple of int
-        Whose its last axis is.
+    recorder, rows, state, runs
+        See `StackRecording`.
     periods : int
         Control periods of the longest session.
     """
