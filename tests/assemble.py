@@ -17,6 +17,7 @@ from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.delay import Delay
 from digiclay.core.fingertip import LEVEL, Fingertip, forms, underside
 from digiclay.core.fluid import Fluid
+from digiclay.core.keeping import packed
 from digiclay.core.layout import Layout
 from digiclay.core.modes import Mode
 from digiclay.core.places import Measurement, Orders
@@ -26,6 +27,7 @@ from digiclay.core.scene_file import find, load
 from digiclay.core.simulation import System, begin, periods
 from digiclay.core.state import State
 from digiclay.core.supply import Supply
+from digiclay.core.take import Take, states
 from digiclay.core.trajectory import Trajectory, level
 from digiclay.core.valve import Valve
 from digiclay.core.valve_lag import ValveLag
@@ -157,6 +159,12 @@ def record(system: System, trajectory: Trajectory | Motion, count: int, state: S
     time = np.arange(count + 1) * system.period
     mode = np.array([*modes, state.mode()])
     return Record(time, kept[:, 0], kept[:, system.rows.force], command, mode, kept, memory, state)
+
+
+def replayed(take: Take) -> bool:
+    """Tell whether a take played again ends in the very same state, bit for bit."""
+    *_, last = states(take)
+    return packed(assemble(take.scene), last) == take.end
 
 
 def place(x: Floats, y: Floats) -> Floats:

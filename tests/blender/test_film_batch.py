@@ -73,9 +73,9 @@ def test_a_run_is_filmed_and_turned_from_the_command_line(capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--film", "--size", "65x40"], "Film.width must be an even number"),
-        (["--film", "--rate", "0"], "Film.rate must be at least 1"),
-        (["--film", "--start", "7"], "Film.start must be between 0 s and"),
+        (["--film", "--size", "65x40"], "--size must be an even number"),
+        (["--film", "--rate", "0"], "--rate must be at least 1"),
+        (["--film", "--start", "7"], "--start must be between 0 s and"),
         (["--film", "--time", "0"], "--time must not be given with --film"),
         (["--speed", "2"], "--speed must be given with --film only"),
         (["--film", "--frames", "9"], "--frames must be given with --turntable only"),

@@ -11,11 +11,12 @@ import pytest
 from digiclay import bridge
 from digiclay.core.scene_file import SAMPLES, find, load, sample_names
 from digiclay.core.shape_file import sample_shapes
-from digiclay.core.take import replayed
 from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
 from digiclay.recorded import takes
 from digiclay.settings import properties
+
+from tests.assemble import replayed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -79,7 +80,7 @@ def test_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path: Pa
         (None, "cannot be read"),
         ("[valve\n", "line 1"),
         ("[layout]\nrows = 0", "layout.rows must be at least 1"),
-        ('[shape]\nfile = "nowhere.stl"', "there is no file nowhere.stl"),
+        ('[shape]\nfile = "nowhere.stl"', "nowhere.stl: there is no such file"),
     ],
 )
 def test_a_file_that_is_no_scene_is_refused_and_nothing_is_added(

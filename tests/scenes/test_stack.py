@@ -180,6 +180,12 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
         assert_as_alone(found, one)
 
 
+def test_richardsons_form_moves_cells_of_their_own_as_alone() -> None:
+    settings = ("simulation.stepper=richardson", "simulation.duration=0.4")
+    scenes = [scene("tap", f"valve.stroke={stroke}", *settings) for stroke in ("25e-6", "40e-6")]
+    assert_as_alone(together(scenes)[1], scenes[1])
+
+
 @pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
 def test_any_stepper_can_move_a_stack(stepper: str) -> None:
     settings = (f"simulation.stepper={stepper}", "simulation.physics_step=5e-4", "simulation.duration=0.4")

@@ -22,7 +22,7 @@ LEVELS = (
     "body feature_region skin_spline errors modes png closed_form filled control.travel metrics_signal "
     "stack.columns",
     "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
-    "shape layout fluid delay supply actuator contact relaxation fingertip part_table "
+    "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export metrics control.servo control.blister",
     "feature_crest pins_solid skin_membrane "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",

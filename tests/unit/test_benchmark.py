@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import sys
 from collections.abc import Iterator
@@ -17,8 +16,9 @@ from digiclay.commands import benchmark_precision as precision
 from digiclay.commands.benchmark_calls import Counted, Ledger, floor
 from digiclay.commands.benchmark_loop import loop
 from digiclay.commands.benchmark_problems import PROBLEMS, Work, problem, solved
-from digiclay.commands.benchmark_report import Steps, kept, made_with, table
+from digiclay.commands.benchmark_report import kept, made_with
 from digiclay.commands.benchmark_terms import LONGER, TERMS, without
+from digiclay.commands.tables import table
 from digiclay.core.errors import OutputError
 
 from tests.assemble import sample
@@ -83,13 +83,6 @@ def test_results_that_cannot_be_written_are_told_of_in_one_line(tmp_path: Path) 
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="Cannot write into"):
         kept(tmp_path / "file", "what", "", ("a",), [])
-
-
-def test_the_bar_draws_nothing_where_nobody_sees_it() -> None:
-    stream = io.StringIO()
-    with Steps(stream, "stiff", 2) as bar:
-        bar()
-    assert stream.getvalue() == ""
 
 
 def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:

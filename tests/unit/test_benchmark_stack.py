@@ -31,6 +31,7 @@ def test_the_benchmark_prints_and_keeps_a_table_and_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(benchmark_stack, "COUNTS", (1, 4))
+    monkeypatch.setattr(benchmark_stack, "REST", 0.0)
     out = ["--out", str(tmp_path)]
     assert main(["benchmark", "stack", "--scene", "tap", "--quick", "--quiet", *out]) == 0
     said = capsys.readouterr().out
@@ -38,10 +39,10 @@ def test_the_benchmark_prints_and_keeps_a_table_and_a_picture(
     assert "valve.stroke varies" in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.csv", "stack.md", "stack.png"]
     lines = (tmp_path / "stack.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "study,runs,alone,stacked,judged_alone,judged_stacked"
+    assert lines[0] == ("study,runs,alone,stacked,judged_alone,judged_stacked,errors_alone,errors_stacked")
     assert [line.split(",")[:2] for line in lines[1:]] == [[s, n] for s in STUDIES for n in ("1", "4")]
 
 
 def test_the_table_gives_runs_a_second_and_their_ratio() -> None:
-    row = benchmark_stack._row(Size("control", 64, 0.1, 0.01, 0.2, 0.05))
-    assert row == ["64", "10", "100", "10.0", "5", "20", "4.0"]
+    row = benchmark_stack._row(Size("control", 64, 0.1, 0.01, 0.2, 0.05, 0.5, 0.1))
+    assert row == ["64", "10", "100", "10.0", "5", "20", "4.0", "2", "10", "5.0"]

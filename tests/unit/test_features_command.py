@@ -97,20 +97,37 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
     assert made.bounds[0, 2] == pytest.approx(lowest - 5.0, abs=0.2)  # the spline goes a little lower
 
 
+@pytest.mark.parametrize("said", ["0.8", "0.8 mm", "0.8mm", "800um"])
+def test_a_length_is_in_millimetres_or_has_a_unit_behind_it(
+    said: str, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--quiet"]) == 0
+    heights = [
+        float(line.split()[3]) for line in (run / "surface.obj").read_text().splitlines() if line[:2] == "v "
+    ]
+    with np.load(run / "history.npz") as history:
+        lowest = float(history["height"][-1].min()) * 1e3
+    assert min(heights) == pytest.approx(lowest - 0.8, abs=1e-5)  # digits of the file
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["export", "run", "--separate"], "--separate needs --kind features."),
-        (["export", "run", "--resolution", "65"], "Model.resolution must be at most 64 (got 65)."),
-        (["export", "run", "--base-thickness", "0"], "Model.base_thickness must be above 0 m (got 0 m)."),
-        (["export", "run", "--base-thickness", "thick"], "--base-thickness must be a number"),
+        (["export", "run", "--resolution", "65"], "--resolution must be at most 64 (got 65)."),
+        (["export", "run", "--base-thickness", "0"], "--base-thickness must be above 0 m (got 0 m)."),
+        (["export", "run", "--base-thickness", "thick"], "argument --base-thickness: must be a number"),
         (["export", "run", "--kind", "features", "--time", "0"], "There is no feature of at least 3 pins"),
         (
             ["features", "run", "--threshold", "-1"],
-            "Finding.threshold must be at least 1e-06 m (got -0.001 m).",
+            "--threshold must be at least 1e-06 m (got -0.001 m).",
         ),
-        (["features", "run", "--threshold", "1 N"], "--threshold must be in m or a multiple of it"),
-        (["features", "run", "--smallest", "0"], "Finding.smallest must be at least 1 (got 0)."),
+        (
+            ["features", "run", "--threshold", "1 furlong"],
+            "argument --threshold: must have a unit known here",
+        ),
+        (["features", "run", "--threshold", "1 N"], "argument --threshold: must be in m or a multiple of it"),
+        (["features", "run", "--smallest", "0"], "--smallest must be at least 1 (got 0)."),
         (["features", "run", "--former", "99"], "--former must be between 0 s and"),
         (["features", "run", "--former", "soon"], "--former must be a time or 'rest'"),
         (["features", "nowhere"], "nowhere is no run's folder"),

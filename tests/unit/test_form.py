@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from digiclay.cli import WRONG, main
+from digiclay.cli import main
+from digiclay.commands.exit_codes import WRONG
 from digiclay.core.actuator import Actuator
 from digiclay.core.assembly import assemble
 from digiclay.core.fingertip import Fingertip
@@ -140,7 +141,6 @@ def test_the_finger_touches_at_the_height_it_is_said_to(x: float, y: float) -> N
     ("arguments", "said"),
     [
         (["form", "craters"], "Did you mean crater?"),
-        (["form", "nowhere.stl"], "there is no file nowhere.stl"),
         (["form", "dome", "--set", "shape.fit=actual", "--set", "shape.x=1"], "leave the shape over the bed"),
         (["form", "dome", "--set", "recorder=absent"], "form needs a recorder"),
         (["form", "dome", "--set", "shape=absent"], "form needs a shape"),
@@ -179,3 +179,8 @@ def test_an_older_run_is_not_replaced_unasked(tmp_path: Path, capsys: pytest.Cap
 def test_a_scene_s_shape_is_described(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["describe", "crater_breached"]) == 0
     assert "shape       crater.png: heights from 32.0 to 46.0 mm, covers all cells" in capsys.readouterr().out
+
+
+def test_a_shape_that_is_not_there_is_told_by_its_name_alone(capfd: pytest.CaptureFixture[str]) -> None:
+    code = main(["form", "nowhere.stl", "--out", "new"])
+    assert (code, capfd.readouterr().err) == (2, "nowhere.stl: there is no such file.\n")

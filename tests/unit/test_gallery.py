@@ -9,7 +9,6 @@ from io import BytesIO
 import matplotlib.image
 import numpy as np
 import pytest
-from digiclay.commands.counted import Counted, duration
 from digiclay.commands.gallery import Card, page
 from digiclay.commands.thumbnail import height_map
 from digiclay.core.png import png
@@ -88,33 +87,3 @@ def test_a_map_of_heights_shows_the_far_side_above_and_high_pins_bright() -> Non
     height[3, 0] = 1.0  # far, left
     shown = height_map(height, 4).astype(int).sum(axis=2)
     assert np.unravel_index(shown.argmax(), shown.shape) == (0, 0)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
-)
-def test_times_are_written_as_people_say_them(seconds: float, said: str) -> None:
-    assert duration(seconds) == said
-
-
-class Terminal(BytesIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self) -> bool:
-        """Be one."""
-        return True
-
-    def write(self, text: str) -> int:  # type: ignore[override]
-        """Keep what is written."""
-        return super().write(text.encode())
-
-
-def test_jobs_done_beforehand_do_not_count_for_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr("digiclay.commands.counted.time.monotonic", lambda: now[0])
-    stream = Terminal()
-    with Counted(stream, "first", "jobs", before=8) as bar:  # type: ignore[arg-type]
-        now[0] += 10.0
-        bar(9, 10)
-    # One job took ten seconds, so the last one will.
-    assert "9 of 10 jobs, 10 s left" in stream.getvalue().decode()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.assembly import assemble
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement, Orders, Truth
+from digiclay.core.places import Truth
 from digiclay.core.scene import Scene
 from digiclay.core.scene_table import resolve
 from digiclay.core.session import run
@@ -20,6 +19,8 @@ from digiclay.core.state import State
 from digiclay.core.system import System
 from numpy.typing import NDArray
 
+from tests.assemble import scripted
+
 Floats = NDArray[np.float64]
 
 #: Control period, s.
@@ -27,30 +28,6 @@ PERIOD = 5e-3
 #: A finger that goes down onto the only pin and stays.
 PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0, 0, 0.036]}]
 AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
-
-
-@dataclass(frozen=True)
-class Played:
-    """A controller without feedback: the command of a period, for every cell."""
-
-    command_in: Callable[[int], float]
-
-    name = "played"
-    rows = 0
-
-    def begin(self) -> int:
-        """Return the number of periods done."""
-        return 0
-
-    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
-        """Ask for the whole bed."""
-        return memory, (0.0, 0.0, 1.0)
-
-    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
-        """Command what is played."""
-        count = seen.height.size
-        orders = Orders(seen.target, np.full(count, Mode.HOLD), np.full(count, self.command_in(memory)))
-        return memory + 1, orders
 
 
 def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
@@ -68,7 +45,8 @@ def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
 
 def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) -> tuple[Floats, Floats]:
     """Simulate; return the true forces of the pin and what the sensors read, N, shape (count + 1,)."""
-    system = replace(assemble(known), controller=Played(command_in))
+    played = scripted(lambda time, x, y: command_in(round(time / PERIOD)))
+    system = replace(assemble(known), controller=played(PERIOD))
     true, read = [0.0], [0.0]
     for state in periods(system, known.trajectory.trajectory(), begin(system), count):
         true.append(float(state.row(system.rows.force)[0]))

@@ -139,6 +139,12 @@ def test_a_missing_file_is_told_as_one() -> None:
         find("nowhere.toml")
 
 
+@pytest.mark.parametrize("word", ["a\0b", 300 * "a", "", 300 * "a" + "/b"])
+def test_a_word_no_file_can_be_called_is_told_as_any_other(word: str) -> None:
+    with pytest.raises(SceneError, match=r"neither a file nor a sample|there is no such file"):
+        find(word)
+
+
 def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
     with pytest.raises(SceneError) as caught:
         find("ridge_mund_valley")

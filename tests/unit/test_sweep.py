@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
+from digiclay.core.accuracy import estimated
 from digiclay.core.errors import ParameterError
 from digiclay.core.metrics import METRICS
 from digiclay.core.scene_file import Setting, find, load
@@ -224,3 +225,38 @@ def test_a_folder_with_other_things_is_refused(here: Path, capsys: pytest.Captur
     assert main([*GAINS, "--out", str(here)]) == 2
     assert "holds other things than a sweep" in capsys.readouterr().err
     assert sorted(path.name for path in here.iterdir()) == ["my.toml"]
+
+
+ERRORS = ["--metric", "rfd,height_error,force_error,total_force_error"]
+
+
+def test_errors_are_estimated_where_they_are_asked_for() -> None:
+    assert main([*GAINS, "--out", "out", *ERRORS]) == 0
+    scene = load(find("my.toml"), [Setting("control.force_gain", "5")])
+    history = run(scene).history
+    assert history is not None
+    expected = estimated(scene, history)
+    assert expected is not None
+    assert rows("out")[1]["height_error (m)"] == repr(expected.height)
+    assert rows("out")[1]["total_force_error (N)"] == repr(expected.total_force)
+
+
+def test_errors_are_not_estimated_where_nobody_asks_for_them() -> None:
+    main([*GAINS, "--out", "out"])
+    assert not any("height_error" in point["figures"] for point in kept("out").values())
+
+
+def test_errors_can_be_had_of_a_finished_sweep_and_then_stay() -> None:
+    main([*GAINS, "--out", "out"])
+    before = rows("out")
+    assert main([*GAINS, "--out", "out", *ERRORS]) == 0
+    assert all(float(line["height_error (m)"]) > 0.0 for line in rows("out"))
+    judged = kept("out")
+    assert main([*GAINS, "--out", "out"]) == 0
+    assert (rows("out"), kept("out")) == (before, judged)
+
+
+def test_of_rows_that_leave_out_commands_there_are_no_errors() -> None:
+    assert main([*GAINS, "--out", "out", "--set", "recorder.every=2", *ERRORS]) == 0
+    assert [line["height_error (m)"] for line in rows("out")] == ["", ""]
+    assert all(line["rfd (N)"] for line in rows("out"))

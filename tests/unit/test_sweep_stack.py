@@ -88,11 +88,11 @@ def calls(count: int) -> list[int]:
         made[0] += event == "c_call"
 
     coming = fingers(systems, ways, 0, 100)
-    for period in range(100):
+    for _ in range(100):
         made[0] = 0
         sys.setprofile(count_one)
         try:
-            state = advance(stack, state, coming, period)
+            state = advance(stack, state, coming)
         finally:
             sys.setprofile(None)
         counted.append(made[0])
@@ -117,10 +117,23 @@ def test_a_stack_has_no_more_runs_than_pay() -> None:
 
 
 def test_long_sessions_make_smaller_stacks() -> None:
-    long = [Setting("simulation.duration", "200")]
+    long = [Setting("simulation.duration", "1e4")]
     parts = bundles(some("control.force_gain=1:6:20", settings=long))
-    # 40,000 control periods of 121 cells at 25 bytes are 121 MB, and a stack may hold 1 GiB.
-    assert [len(stack) for stack in parts.stacks] == [6, 7, 7]
+    # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB.
+    assert [len(stack) for stack in parts.stacks] == [10, 10]
+
+
+def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
+    # A dead time of half a control period falls on the end of a half step.
+    varied = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
+    assert indices(bundles(some(*varied)).stacks) == [[0, 1, 2, 3, 4, 5, 6, 7]]
+    assert indices(bundles(some(*varied), errors=True).stacks) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+def test_points_whose_steps_cannot_be_halved_are_told_when_they_run() -> None:
+    finest = [*SHORT, Setting("simulation.physics_step", "5e-6")]
+    parts = bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
+    assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
 
 
 def test_points_without_their_like_run_alone_and_it_is_said() -> None:
@@ -129,11 +142,11 @@ def test_points_without_their_like_run_alone_and_it_is_said() -> None:
     assert parts.told() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
 
 
-def test_sessions_of_hours_run_alone_and_it_is_said() -> None:
-    hours = [Setting("simulation.duration", "1e4")]
-    parts = bundles(some("control.force_gain=1:6:5", settings=hours))
+def test_sessions_of_days_run_alone_and_it_is_said() -> None:
+    days = [Setting("simulation.duration", "1e5")]
+    parts = bundles(some("control.force_gain=1:6:5", settings=days))
     assert parts.stacks == ()
-    assert parts.told() == ["5 points one at a time: their histories are too long to keep many at once"]
+    assert parts.told() == ["5 points one at a time: they have too many rows to keep for many at once"]
 
 
 def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
@@ -153,11 +166,12 @@ def test_values_that_do_not_go_together_are_in_no_stack() -> None:
     assert (indices(parts.stacks), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
 
 
-def test_a_bundle_comes_to_the_figures_of_its_points() -> None:
+@pytest.mark.parametrize("errors", [False, True])
+def test_a_bundle_comes_to_the_figures_of_its_points(errors: bool) -> None:
     scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    found = evaluate_all(scenes)
+    found = evaluate_all(scenes, errors=errors)
     for record, scene in zip(found, scenes, strict=True):
-        alone = evaluate(scene)
+        alone = evaluate(scene, errors=errors)
         assert record is not None
         assert alone is not None
         times = ("run_time", "real_time_factor")
@@ -172,7 +186,7 @@ def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest
     def faulty(*given: Any, **known: Any) -> Any:
         raise MemoryError
 
-    monkeypatch.setattr("digiclay.core.sweep_bundles.run_together", faulty)
+    monkeypatch.setattr("digiclay.core.sweep_bundles.judge_together", faulty)
     scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
     assert all(record and "figures" in record for record in evaluate_all(scenes))
 

@@ -18,10 +18,10 @@ from digiclay.core.scene_table import text
 from digiclay.core.simulation import begin
 from digiclay.core.state import State
 from digiclay.core.system import System
-from digiclay.core.take import Take, as_scene, finer, from_bytes, replayed, states, to_bytes
+from digiclay.core.take import Take, as_scene, finer, from_bytes, states, to_bytes
 from numpy.typing import NDArray
 
-from tests.assemble import record, sample
+from tests.assemble import record, replayed, sample
 
 Floats = NDArray[np.float64]
 #: Control periods of the take.
@@ -78,18 +78,6 @@ def test_a_replay_on_another_path_does_not_pass_for_the_take() -> None:
     poses = take.poses.copy()
     poses[COUNT // 2, 2] += 1e-9
     assert not replayed(replace(take, poses=poses))
-
-
-def test_a_replay_can_be_broken_off() -> None:
-    _, take, _ = taken()
-    seen: list[int] = []
-
-    def told(done: int, total: int) -> bool:
-        seen.append(done)
-        return done < 3
-
-    assert not replayed(take, told)
-    assert seen == [1, 2, 3]
 
 
 def test_bytes_bring_a_take_back_as_it_was() -> None:

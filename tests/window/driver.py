@@ -212,9 +212,14 @@ def shot(name: str) -> None:
     bpy.data.images.remove(image)
 
 
+def hand_over() -> None:
+    """Write down what was seen."""
+    (OUT / "seen.json").write_text(json.dumps(SEEN))
+
+
 def finish() -> None:
     """Hand over what was seen, and leave with the extension taken back."""
-    (OUT / "seen.json").write_text(json.dumps(SEEN))
+    hand_over()
     addon_utils.disable(EXTENSION)
     bpy.ops.wm.quit_blender()
 

@@ -44,6 +44,7 @@ def script(blender: Any) -> Iterator[float | None]:
         area, _ = blender.view()
         area.spaces.active.show_region_ui = False
         yield None
+        blender.call(bpy.ops.digiclay.take_record)  # until Blender has saved by itself
         yield from ridge(blender)
         yield from saved(blender)
         blender.key("ESC", blender.middle())
@@ -96,6 +97,10 @@ def saved(blender: Any) -> Iterator[float | None]:
     yield from until(file.is_file, 90.0)
     blender.SEEN["saved by itself"] = [file.is_file(), time.monotonic() - start]
     shutil.copy(file, blender.OUT / "recovered.blend")
+    yield from blender.settle()
+    note(blender, "saved while recording")
+    blender.call(bpy.ops.digiclay.take_keep)
+    blender.call(bpy.ops.digiclay.take_remove)
 
 
 def replayed(blender: Any) -> Iterator[float | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -108,7 +109,16 @@ def windows(blender: Any) -> Iterator[float | None]:
     yield 1.0
     yield from start(blender, bpy.context.window_manager.windows[-1])
     blender.look("started in the second")
+    blender.call(bpy.ops.digiclay.take_record)
+    yield from blender.settle()
     yield from closed(blender, "its own window closed")
+    kept = blender.part("recorded.takes").entries
+    blender.SEEN["kept when its window was closed"] = [entry.name for entry in kept(blender.beds()[0])]
+    bpy.ops.ed.undo()
+    yield 0.5
+    bpy.ops.ed.redo()
+    yield 0.5
+    blender.SEEN["kept after undo and redo"] = [entry.name for entry in kept(blender.beds()[0])]
 
 
 def closed(blender: Any, name: str) -> Iterator[float | None]:
@@ -144,7 +154,7 @@ def render(blender: Any) -> Iterator[float | None]:
 
 
 def views(blender: Any) -> Iterator[float | None]:
-    """Press in an orthographic view, and in the top view of a quad view."""
+    """Press in an orthographic view, and in the top view of a quad view, and see what is written there."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     area, region = blender.view()
     area.spaces.active.region_3d.view_perspective = "ORTHO"
@@ -152,15 +162,44 @@ def views(blender: Any) -> Iterator[float | None]:
     yield from until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
     yield from tapped(blender, region, area.spaces.active.region_3d, (-15.0, 9.0), "orthographic")
     blender.shot("play_orthographic")
+    blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
+    yield 1.0
+    blender.part("device.display").pick(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield 1.0
     area, _ = blender.view()
     for region in (one for one in area.regions if one.type == "WINDOW"):
         if region.data.view_matrix.to_quaternion().angle < 1e-3:  # seen from straight above
             yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
+    with drawn(blender) as marks:
+        yield from until(lambda: len(marks) == 4)
+    blender.SEEN["drawn in the quarters"] = sorted(marks.values())
+    area, _ = blender.view()
+    turned = area.spaces.active.region_3d
+    own = next(one.as_pointer() for one in area.regions if one.type == "WINDOW" and one.data == turned)
+    blender.SEEN["drawn where the view can be turned"] = marks[own]
     blender.shot("play_quad")
     blender.call(bpy.ops.screen.region_quadview)
     yield None
+    blender.call(bpy.ops.screen.screen_full_area)
+    yield None
+
+
+@contextmanager
+def drawn(blender: Any) -> Iterator[dict[int, tuple[bool, bool]]]:
+    """Write down of every region the overlay draws into whether it writes words and whether it marks pins."""
+    module = blender.part("overlay.draw")
+    draw, seen = module.draw, {}
+
+    def noted(picture: Any, width: float, height: float) -> None:
+        seen[bpy.context.region.as_pointer()] = bool(picture.words), bool(picture.dots)
+        draw(picture, width, height)
+
+    module.draw = noted
+    try:
+        yield seen
+    finally:
+        module.draw = draw
 
 
 def tapped(

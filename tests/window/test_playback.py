@@ -49,6 +49,12 @@ def test_closing_the_sessions_own_window_ends_it_with_the_reason(seen: dict[str,
     assert "its window was closed" in closed["said"]
 
 
+def test_what_was_recorded_in_a_window_that_is_closed_is_a_take_in_an_undo_step(seen: dict[str, Any]) -> None:
+    assert seen["kept when its window was closed"] == ["Take 1"]
+    assert "kept as Take 1" in seen["its own window closed"]["said"]
+    assert seen["kept after undo and redo"] == ["Take 1"]
+
+
 def test_a_session_waits_while_a_picture_is_rendered(seen: dict[str, Any]) -> None:
     assert "a render is under way" in seen["waits in a render"]
     assert (seen["rendered"]["sessions"], seen["rendered"]["waits"]) == (1, "")
@@ -61,6 +67,16 @@ def test_the_press_tool_presses_under_the_mouse_in_every_view(
     # A pixel of the small views is up to 1 mm of the bed.
     np.testing.assert_allclose(seen[name]["pose"][:2], place, rtol=0, atol=1.5e-3)
     assert seen[name]["pose"][2] < REST - 3e-3
+
+
+def test_the_overlay_writes_into_one_quarter_of_a_quad_view_and_marks_picked_pins_in_all(
+    seen: dict[str, Any],
+) -> None:
+    # Where two pictures of the same pins stand side by side, one text is enough.
+    writes = [words for words, _ in seen["drawn in the quarters"]]
+    assert sorted(writes) == [False, False, False, True]
+    assert seen["drawn where the view can be turned"] == [True, True]
+    assert [marks for _, marks in seen["drawn in the quarters"]] == [True] * 4
 
 
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:

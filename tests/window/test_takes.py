@@ -45,13 +45,18 @@ def test_blender_saves_by_itself_in_mid_session_and_the_state_is_in_the_file(see
     assert found
     recovered = seen["recovered"]
     assert recovered["kept"] > 0
-    assert recovered["takes"] == seen["kept"]["takes"]
+    assert recovered["takes"][:1] == seen["kept"]["takes"]
     assert (recovered["sessions"], recovered["replay can be pressed"]) == (0, True)
 
 
 def test_replaying_waits_for_the_session_to_be_stopped(seen: dict[str, Any]) -> None:
     assert not seen["kept"]["replay can be pressed"]
     assert seen["stopped"]["replay can be pressed"]
+
+
+def test_what_blender_saves_by_itself_has_the_recording_under_way_as_a_take(seen: dict[str, Any]) -> None:
+    assert [name for _, name, _ in seen["recovered"]["takes"]] == ["A press", "Take 2"]
+    assert [name for _, name, _ in seen["saved while recording"]["takes"]] == ["A press"]
 
 
 def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were(seen: dict[str, Any]) -> None:
@@ -89,3 +94,31 @@ def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> 
         "guide_ridge", *(f"takes_{name}" for name in ("recording", "replaying", "baking", "played"))
     }  # fmt: skip
     assert min(seen["colours"].values()) > 1000
+
+
+@pytest.fixture(scope="module")
+def closed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Play the script that closes files in mid-recording; return what it saw, and what quitting left."""
+    out = tmp_path_factory.mktemp("closed")
+    seen = played("quit_while_recording.py", out, (800, 600))
+    left = out / "digiclay_recording.blend"
+    return seen | {"left by quitting": left.read_bytes() if left.is_file() else b""}
+
+
+def test_a_file_left_for_another_one_in_mid_recording_is_recovered_with_the_take(
+    closed: dict[str, Any],
+) -> None:
+    assert "kept as Take 1" in closed["loaded"]["said"]
+    assert "File > Recover > Auto Save" in closed["loaded"]["said"]
+    assert closed["recovered"] == ["Take 1"]
+
+
+def test_a_file_saved_in_mid_recording_has_the_take_and_is_not_left_again(closed: dict[str, Any]) -> None:
+    assert closed["saved before"] == ["Take 1", "Take 2"]
+    assert not closed["left although saved"]
+
+
+def test_quitting_in_mid_recording_leaves_the_file_with_the_take(closed: dict[str, Any]) -> None:
+    # Names of properties stand in a .blend as they are.
+    assert b"digiclay_takes" in closed["left by quitting"]
+    assert b"Take 3" in closed["left by quitting"]

@@ -4,14 +4,28 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import OutputError, ParameterError
 from ..core.quantity import parse
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
 
-__all__ = ["add_run", "add_scene", "length", "scene_of", "seconds", "size"]
+__all__ = [
+    "Help", "add_command", "add_run", "add_scene", "length", "millimetres", "scene_of", "seconds",
+    "settings_of", "size", "told_as_options",
+]  # fmt: skip
+
+
+class Help(argparse.RawDescriptionHelpFormatter):
+    """Help that keeps its paragraphs, with room for the longest command's name beside what it does."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog)
+        self._action_max_length = 13
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
@@ -41,7 +55,13 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
 
 def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
     """Return the scene the arguments name, and its file."""
-    path, settings = find(arguments.scene), list(arguments.settings)
+    path = find(arguments.scene)
+    return load(path, settings_of(arguments)), path
+
+
+def settings_of(arguments: argparse.Namespace) -> list[Setting]:
+    """Return what the options of `add_scene` change of a scene file."""
+    settings = list(arguments.settings)
     for option, key in (("method", "control.method"), ("stepper", "simulation.stepper")):
         if getattr(arguments, option) is not None:
             settings.append(Setting(key, getattr(arguments, option), f"--{option}"))
@@ -49,18 +69,36 @@ def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
         settings.append(Setting("simulation.tolerance", arguments.tolerance, "--tolerance"))
         if arguments.stepper is None:
             settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
-    return load(path, settings), path
+    return settings
+
+
+def add_command(commands: Any, name: str, help: str, epilog: str, said: str = "") -> argparse.ArgumentParser:
+    """Add a command; its own help begins with `said`, or with `help` as a sentence."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=help, description=said or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
+        formatter_class=Help, allow_abbrev=False,
+    )  # fmt: skip
+    return parser
 
 
 def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
     """Add a command that works on a finished run."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=help, description=help, epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(commands, name, help, epilog)
     parser.add_argument("run", metavar="RUN", type=Path, help="the folder 'digiclay run' wrote")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser
+
+
+@contextmanager
+def told_as_options(*owners: str, **names: str) -> Iterator[None]:
+    """Tell of the parameters of some owners as of options, which are called like them or as `names` say."""
+    try:
+        yield
+    except ParameterError as error:
+        if error.owner not in owners:
+            raise
+        option = names.get(error.field, error.field).replace("_", "-")
+        raise OutputError(f"--{option} {error.rule} (got {error.value}).") from None
 
 
 def _setting(text: str) -> Setting:
@@ -73,18 +111,23 @@ def _setting(text: str) -> Setting:
 
 def seconds(text: str) -> float:
     """Read a time: a number of seconds, or a quantity such as ``"300 ms"``."""
-    return _measured(text, "s")
+    return _measured(text, "s", "s")
 
 
 def length(text: str) -> float:
-    """Read a length: a number of metres, or a quantity such as ``"20 um"``."""
-    return _measured(text, "m")
+    """Read a length: a number of metres, or a quantity such as ``"20 um"``; in m."""
+    return _measured(text, "m", "m")
 
 
-def _measured(text: str, unit: str) -> float:
-    """Read a quantity; a bare number is in SI."""
+def millimetres(text: str) -> float:
+    """Read a length: a number of millimetres, or a quantity such as ``"500 um"``; in m."""
+    return _measured(text, "mm", "m")
+
+
+def _measured(text: str, usual: str, unit: str) -> float:
+    """Read a quantity in SI; a bare number is in the usual unit."""
     try:
-        return parse(text if text.strip()[-1:].isalpha() else f"{text} {unit}", unit)
+        return parse(text if text.strip()[-1:].isalpha() else f"{text} {usual}", unit)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{error} (got {text!r})") from None
 

@@ -12,9 +12,11 @@ from typing import Any
 
 from ..core.errors import DigiclayError
 from ..core.jobs import Job, batch, find_jobs
+from .arguments import add_command
 from .batch_folder import Folder, opened
-from .counted import Counted, duration
+from .exit_codes import FAILED, STOPPED
 from .job import check_outputs
+from .progress import Counted, duration
 from .stop import Stop
 from .sweep import workers
 from .worker import Worker, cores
@@ -30,8 +32,6 @@ examples:
 Stopped by Ctrl-C, or killed, it goes on when the same command is given again: finished jobs are kept, and
 done again only if the JOBS file has changed them. Exit code 1: some jobs failed, the others are there.
 """
-#: Exit code when some jobs failed; the same as `cli.STOPPED` when it was stopped.
-FAILED, STOPPED = 1, 130
 #: Seconds between two looks at the processes, and those a process gets to stop by itself.
 LOOK, GRACE = 0.1, 20.0
 
@@ -39,10 +39,7 @@ LOOK, GRACE = 0.1, 20.0
 def add(commands: Any) -> None:
     """Add the command."""
     said = "run many scenes in the background, with exports, pictures and films"
-    parser = commands.add_parser(
-        "batch", help=said, description=said, epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(commands, "batch", said, EXAMPLES)
     parser.add_argument("file", metavar="JOBS", help="a .toml file, or a sample's name")
     parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the file's name, here")
     parser.add_argument("--jobs", metavar="N", type=workers, help="processes; default one a core")

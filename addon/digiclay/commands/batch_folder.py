@@ -18,9 +18,9 @@ from ..core.errors import OutputError
 from ..core.export import write_whole
 from ..core.jobs import JOB, SCENE, Batch, Job
 from ..core.scene_table import text
-from .counted import duration
 from .gallery import Card, page
 from .job import RUNS, TIMING
+from .progress import duration
 from .thumbnail import NAMES
 
 __all__ = ["JOBS", "MARK", "Folder", "opened"]

@@ -5,7 +5,6 @@ One file a benchmark; this one only gathers them.
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 from . import (
@@ -18,6 +17,7 @@ from . import (
     benchmark_terms,
     benchmark_viewport,
 )
+from .arguments import add_command
 from .benchmark_session import PARTS, Clock, measured
 
 __all__ = ["PARTS", "Clock", "add", "measured"]
@@ -37,11 +37,7 @@ examples:
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "benchmark", help="measure cost, error and stability",
-        description="Measure cost, error and stability.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(commands, "benchmark", "measure cost, error and stability", EXAMPLES)
     kinds = parser.add_subparsers(title="benchmarks", metavar="WHAT", required=True)
     for kind in (
         benchmark_session, benchmark_stiff, benchmark_precision, benchmark_terms, benchmark_scale,

@@ -18,7 +18,8 @@ from ..core.export_model import Model, bodies
 from ..core.features import Finding
 from ..core.formed import Formed
 from ..core.layout import Layout, grid
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
+from .tables import table
 
 __all__ = ["Export", "add", "formed", "measured"]
 

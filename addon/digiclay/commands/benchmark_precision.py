@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from ..core.assembly import assemble
 from ..core.simulation import begin, periods
+from ..plots import benchmarks
 from . import benchmark_peers as peers
 from .benchmark_loop import loop
 from .benchmark_problems import PERIOD, PROBLEMS, Measured, Problem, Work, live, ours, problem, solved
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
+from .tables import table
 
 __all__ = ["LEVELS", "OURS", "PEERS", "add", "best_ratio", "cheapest"]
 
@@ -83,9 +85,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     print(text)
     kept(arguments.out, "precision", text, [one.name for one in fields(Work)], [astuple(one) for one in work])
     if arguments.out:
-        from ..plots.benchmarks import precision
-
-        precision(work, arguments.out / "precision.png")
+        benchmarks.precision(work, arguments.out / "precision.png")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""What the benchmarks share: options, aligned tables, progress, and results kept in a folder."""
+"""What the benchmarks share: options, progress, and results kept in a folder."""
 
 from __future__ import annotations
 
@@ -8,86 +8,46 @@ import io
 import os
 import platform
 import sys
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..core.errors import OutputError
+from .arguments import add_command
+from .progress import Steps
+from .refusals import refuse_unwritable
+from .tables import table
 
-__all__ = ["Steps", "add_kind", "kept", "made_with", "number", "table"]
-
-#: Cells of the bar, and seconds between two drawings of it.
-WIDTH, PAUSE = 28, 0.2
-
-
-class Steps:
-    """A progress bar over pieces of work, on a terminal; nothing elsewhere.
-
-    Parameters
-    ----------
-    stream : TextIO
-    label : str
-    total : int
-        Pieces of work.
-    """
-
-    def __init__(self, stream: TextIO, label: str, total: int) -> None:
-        self._stream, self._label, self._total, self._done = stream, label, total, 0
-        self._started = self._drawn = time.monotonic()
-
-    def __enter__(self) -> Steps:
-        return self
-
-    def __call__(self, doing: str = "") -> None:
-        """Count one more piece as done, and draw the bar if it is time to."""
-        self._done += 1
-        now = time.monotonic()
-        if now - self._drawn < PAUSE or not self._stream.isatty():
-            return
-        filled = WIDTH * self._done // self._total
-        left = (now - self._started) * (self._total - self._done) / self._done
-        bar = "#" * filled + "." * (WIDTH - filled)
-        text = f"{self._label} [{bar}] {self._done} of {self._total}, {left:.0f} s left  {doing}"
-        self._stream.write(f"\r{text[:110]}\033[K")
-        self._stream.flush()
-        self._drawn = now
-
-    def __exit__(self, *raised: object) -> None:
-        if self._stream.isatty():
-            self._stream.write("\r\033[K")
-            self._stream.flush()
+__all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
 
 
 def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:
     """Add a benchmark with the options all of them take."""
-    parser: argparse.ArgumentParser = kinds.add_parser(
-        name, help=help, description=help[0].upper() + help[1:] + ".", epilog="examples:\n" + examples,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(kinds, name, help, f"examples:\n{examples}")
     parser.add_argument("--quick", action="store_true", help="fewer and shorter runs")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     if out:
-        parser.add_argument("--out", metavar="DIR", type=Path, help="also write the results into this folder")
+        parser.add_argument(
+            "--out", metavar="DIR", type=_folder, help="also write the results into this folder"
+        )
     return parser
+
+
+def _folder(text: str) -> Path:
+    """Read the name of a folder to write into; it is refused now what is bound to fail after the work."""
+    try:
+        refuse_unwritable(Path(text))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+    return Path(text)
 
 
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
     """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet."""
     return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> Iterator[str]:
-    """Give the lines of an aligned table; the first `left` columns are texts, all others numbers."""
-    widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
-    for line in (head, ["-" * width for width in widths], *rows):
-        cells = (
-            c.ljust(w) if i < left else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True))
-        )
-        yield ("  " + "  ".join(cells)).rstrip()
 
 
 def number(value: float, unit: str = "") -> str:

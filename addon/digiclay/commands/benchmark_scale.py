@@ -18,7 +18,9 @@ from ..core.scene_table import resolve
 from ..core.simulation import begin, periods
 from ..core.state import State
 from ..core.system import System
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from ..plots import benchmarks
+from .benchmark_report import add_kind, kept, made_with, progress
+from .tables import table
 
 __all__ = ["SIDES", "Size", "add", "bytes_of", "gathered_cells", "measured", "scene"]
 
@@ -143,9 +145,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Size)]
     kept(arguments.out, "scale", text, head, [[getattr(one, name) for name in head] for one in sizes])
     if arguments.out:
-        from ..plots.benchmarks import scale
-
-        scale(sizes, arguments.out / "scale.png")
+        benchmarks.scale(sizes, arguments.out / "scale.png")
     return 0
 
 

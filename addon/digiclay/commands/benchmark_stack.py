@@ -11,16 +11,19 @@ from typing import Any
 
 from ..core.scene import Scene
 from ..core.session import run
-from ..core.stack.session import run_together
+from ..core.stack.session import judge_together, run_together
+from ..core.sweep import evaluate
 from .arguments import add_scene, scene_of
 from .benchmark_report import add_kind, kept, made_with, progress, table
 
 __all__ = ["COUNTS", "STUDIES", "Size", "add", "measured", "study"]
 
-#: Runs in one call.
-COUNTS = (1, 4, 16, 64, 256)
+#: Runs in one call; a sweep puts 32 to 63 together.
+COUNTS = (1, 4, 16, 32, 64, 128)
 #: Simulated time of a run, s.
 DURATION = 4.0
+#: Time between two measurements, s: the linear algebra library keeps its threads busy for a while.
+REST = 0.15
 #: What varies from run to run: section, key, and from which to which share of its value. The first leaves the
 #: cells alike, the second does not.
 STUDIES: dict[str, tuple[str, str, float, float]] = {
@@ -31,16 +34,18 @@ STUDIES: dict[str, tuple[str, str, float, float]] = {
 
 @dataclass(frozen=True)
 class Size:
-    """What so many runs cost, each.
+    """What so many runs cost, each: CPU time of a run, one at a time and in one call, s.
 
     Attributes
     ----------
     study : str
     runs : int
     alone, stacked : float
-        CPU time of a run, one at a time and in one call, s.
+        Simulated only.
     judged_alone, judged_stacked : float
-        The same with its history recorded and judged, as in a sweep, s.
+        Recorded and judged, as in a sweep.
+    errors_alone, errors_stacked : float
+        The same with the integration's errors estimated, as in a sweep that is asked for them.
     """
 
     study: str
@@ -49,6 +54,8 @@ class Size:
     stacked: float
     judged_alone: float
     judged_stacked: float
+    errors_alone: float
+    errors_stacked: float
 
 
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
@@ -60,7 +67,8 @@ def study(scene: Scene, name: str, count: int) -> list[Scene]:
 
 
 def _spent(work: Callable[[], Any]) -> float:
-    """Return the CPU time of some work, s."""
+    """Return the CPU time of some work, s, once what was before it has come to rest."""
+    time.sleep(REST)
     started = time.process_time()
     work()
     return time.process_time() - started
@@ -69,17 +77,20 @@ def _spent(work: Callable[[], Any]) -> float:
 def measured(scene: Scene, name: str, count: int, repeats: int) -> Size:
     """Run a study of so many runs; the medians of the repeats count.
 
-    Alone and stacked take turns, so that what else the machine does befalls both alike.
+    One run alone and all in one call take turns, so that what else the machine does befalls both alike.
     """
-    spent: list[tuple[float, ...]] = []
-    for _ in range(repeats):
-        times: list[float] = []
-        for known in (replace(scene, recorder=None), scene):
-            scenes = study(known, name, count)
-            one: Callable[[], Any] = lambda scenes=scenes: run(scenes[len(scenes) // 2])  # noqa: E731
-            every: Callable[[], Any] = lambda scenes=scenes: sum(1 for _ in run_together(scenes))  # noqa: E731
-            times += [_spent(one), _spent(every) / count]
-        spent.append(tuple(times))
+    scenes = study(scene, name, count)
+    plain = study(replace(scene, recorder=None), name, count)
+    one, middle = scenes[count // 2], plain[count // 2]
+    works: list[tuple[Callable[[], Any], int]] = [
+        (lambda: run(middle), 1),
+        (lambda: list(run_together(plain)), count),
+        (lambda: evaluate(one), 1),
+        (lambda: list(judge_together(scenes)), count),
+        (lambda: evaluate(one, errors=True), 1),
+        (lambda: list(judge_together(scenes, errors=True)), count),
+    ]
+    spent = [[_spent(work) / runs for work, runs in works] for _ in range(repeats)]
     return Size(name, count, *(statistics.median(column) for column in zip(*spent, strict=True)))
 
 
@@ -96,7 +107,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     scene, _ = scene_of(arguments)
     lasts = min(scene.simulation.duration, 1.0 if arguments.quick else DURATION)
     scene = replace(scene, simulation=replace(scene.simulation, duration=lasts))
-    counts, repeats = (COUNTS[:4], 1) if arguments.quick else (COUNTS, 3)
+    counts, repeats = (COUNTS[:3], 1) if arguments.quick else (COUNTS, 5)
     with progress(arguments, "stack", len(STUDIES) * len(counts)) as bar:
         sizes = []
         for name in STUDIES:
@@ -118,9 +129,11 @@ def _text(scene: Scene, sizes: Sequence[Size]) -> Iterator[str]:
     """Give the lines of the report."""
     yield made_with()
     yield f"\nThe first {scene.simulation.duration:g} s of {scene.name}: {scene.periods} control periods,"
-    yield f"{scene.cells} cells; CPU time of one core, runs a second. judged: with the history recorded and"
-    yield "judged, as digiclay sweep does."
-    head = ("runs", "alone", "in one call", "times", "judged: alone", "in one call", "times")
+    yield f"{scene.cells} cells; CPU time of one core, runs a second; medians, taken in turns."
+    yield "judged: recorded and judged, as digiclay sweep does;"
+    yield "errors: the integration's errors estimated as well."
+    three = ("alone", "in one call", "times")
+    head = ("runs", *three, "judged: alone", *three[1:], "errors: alone", *three[1:])
     for name, (section, key, _, _) in STUDIES.items():
         yield f"\n{section}.{key} varies"
         yield from table(head, [_row(one) for one in sizes if one.study == name], left=0)
@@ -129,6 +142,10 @@ def _text(scene: Scene, sizes: Sequence[Size]) -> Iterator[str]:
 def _row(one: Size) -> list[str]:
     """Return a line of the table."""
     row = [str(one.runs)]
-    for alone, stacked in ((one.alone, one.stacked), (one.judged_alone, one.judged_stacked)):
+    for alone, stacked in (
+        (one.alone, one.stacked),
+        (one.judged_alone, one.judged_stacked),
+        (one.errors_alone, one.errors_stacked),
+    ):
         row += [f"{1.0 / alone:.3g}", f"{1.0 / stacked:.3g}", f"{alone / stacked:.1f}"]
     return row

@@ -11,7 +11,7 @@ from typing import Any
 from ..core.errors import DivergenceError
 from ..core.scene import STEPPERS
 from .benchmark_cases import CASES, Case
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
 from .benchmark_stiff_runs import (
     FINE,
     PERIOD,
@@ -28,6 +28,7 @@ from .benchmark_stiff_runs import (
     replayed,
     strict,
 )  # fmt: skip
+from .tables import table
 
 __all__ = ["add"]
 

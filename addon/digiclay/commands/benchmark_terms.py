@@ -17,7 +17,8 @@ from ..core.scene import Scene
 from ..core.simulation import begin, periods
 from .arguments import add_scene, scene_of
 from .benchmark_calls import period_calls
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
+from .tables import table
 
 __all__ = ["TERMS", "Effect", "add", "effect", "without"]
 

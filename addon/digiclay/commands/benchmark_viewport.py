@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from .benchmark_report import add_kind, kept, made_with, progress, table
+from .benchmark_report import add_kind, kept, made_with, progress
+from .refusals import refuse_without_blender
+from .tables import table
 
 if TYPE_CHECKING:  # Blender is imported when it is needed
     from ..live.viewport_cost import Cost
@@ -29,7 +30,7 @@ def add(kinds: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Measure every bed, and print the table."""
-    importlib.import_module("..compat", __package__)  # says what to install, before any work is done
+    refuse_without_blender()
     from ..compat import bpy
     from ..live.viewport_cost import PARTS, measured
 

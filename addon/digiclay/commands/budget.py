@@ -9,24 +9,19 @@ from typing import Any
 
 from ..core.budget import Fitted, fitted
 from ..core.scene import Scene
-from .benchmark_report import table
+from .arguments import told_as_options
+from .progress import Line
+from .tables import table
 
 __all__ = ["noted", "report", "within"]
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is."""
-    shows = not quiet and sys.stderr.isatty()
-
-    def told(said: str) -> None:
-        if shows:
-            print(f"\rtrying: {said}\033[K", end="", file=sys.stderr, flush=True)
-
-    try:
-        found = fitted(scene, budget, told=told)
-    finally:
-        if shows:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
+    with Line(sys.stderr) as line:
+        told = None if quiet else lambda said: line.draw(f"trying: {said}")
+        with told_as_options("run"):
+            found = fitted(scene, budget, told=told)
     if not quiet:
         print("\n".join(report(found)))
     return found

@@ -17,10 +17,11 @@ from ..core.quantity import nearest
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
-from .arguments import add_scene
+from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
 from .stop import Stop
+from .tables import table as aligned
 
 __all__ = ["READ", "add", "table"]
 
@@ -43,11 +44,8 @@ Metrics = dict[str, float | None]
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "compare", help="run control methods on the same input",
-        description="Run control methods on the same input, and set their metrics side by side.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Run control methods on the same input, and set their metrics side by side."
+    parser = add_command(commands, "compare", "run control methods on the same input", EXAMPLES, said)
     add_scene(parser)
     parser.add_argument(
         "--methods", metavar="M,...", type=_methods, default=("virtual_master", "cell_states"),
@@ -109,10 +107,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
     """Return the scene with one method, and the settings of the command line."""
-    settings = [*arguments.settings, Setting("control.method", method, "--methods")]
-    if arguments.stepper is not None:
-        settings.append(Setting("simulation.stepper", arguments.stepper, "--stepper"))
-    return load(path, settings)
+    return load(path, [*settings_of(arguments), Setting("control.method", method, "--methods")])
 
 
 def _run(scene: Scene, method: str, stop: Stop, *, quiet: bool) -> Trial:
@@ -136,12 +131,9 @@ def table(found: dict[str, Metrics]) -> Iterator[str]:
     """Give the lines of the table: a metric a line, a method a column, units people read."""
     known, columns = {**TRIAL_METRICS, **SPEEDS}, list(found)
     names = [name for name in known if name in found[columns[0]]]
-    rows = [["", "", *columns]]
+    rows = []
     for name in names:
         factor, unit = READ.get(known[name][0], (1.0, known[name][0]))
         values = (found[method][name] for method in columns)
         rows.append([name, unit, *("–" if value is None else f"{value * factor:.4g}" for value in values)])
-    wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    for name, unit, *cells in rows:
-        right = "  ".join(cell.rjust(size) for cell, size in zip(cells, wide[2:], strict=True))
-        yield f"{name.ljust(wide[0])}  {unit.ljust(wide[1])}  {right}".rstrip()
+    yield from aligned(("metric", "unit", *columns), rows, left=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +14,7 @@ from ..core.recorder import available_memory, bytes_needed
 from ..core.scene import Scene
 from ..core.shape_file import fitted_to
 from ..core.simulation import System
-from .arguments import add_scene, scene_of
+from .arguments import add_command, add_scene, scene_of
 
 __all__ = ["add", "description"]
 
@@ -35,10 +36,7 @@ READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "describe", help="tell what a scene consists of", description="Tell what a scene consists of.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(commands, "describe", "tell what a scene consists of", EXAMPLES)
     add_scene(parser)
     parser.set_defaults(carry_out=carry_out)
 
@@ -76,7 +74,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield f"  {len(points)} waypoints, {scene.trajectory.interpolation}, the last at {points[-1].time:g} s"
     needed, free = bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods), available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
-    yield f"  {kept}; {needed / 1e9:.2g} GB of memory needed, {free / 1e9:.3g} GB free"
+    yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"
 
 
 def _rows(system: System) -> Iterator[tuple[str, int]]:
@@ -111,3 +109,9 @@ def human(value: object, unit: str) -> str:
     """Write a value in the unit people read."""
     factor, name = READ.get(unit, (1.0, unit))
     return f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)
+
+
+def size(count: float) -> str:
+    """Write a number of bytes."""
+    power = min(int(math.log10(max(count, 1.0))) // 3, 4)
+    return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB')[power]}"

@@ -17,7 +17,7 @@ from ..core.features import Finding
 from ..core.finished import read
 from ..core.formed import of_history
 from ..core.scene import Scene
-from .arguments import add_run, seconds
+from .arguments import add_run, millimetres, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
@@ -45,8 +45,9 @@ def add(commands: Any) -> None:
     parser.add_argument("--kind", choices=tuple(KINDS), default="solid", help=f"{shown}; default solid")
     add_surface(parser)
     parser.add_argument(
-        "--base-thickness", metavar="L", help='material under the lowest point, such as "2 mm"; default 3 mm'
-    )
+        "--base-thickness", metavar="L", type=millimetres,
+        help="material under the lowest point, mm, or with a unit; default 3 mm",
+    )  # fmt: skip
     parser.add_argument("--separate", action="store_true", help="a file for each feature")
     parser.add_argument("--unit", choices=tuple(UNITS), default="mm", help="of all but glb; default mm")
     parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the end")

@@ -11,9 +11,9 @@ from ..core.features import summary, table
 from ..core.finished import read
 from ..core.formed import of_history
 from .arguments import add_run, seconds
-from .benchmark_report import table as aligned
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
+from .tables import table as aligned
 
 __all__ = ["add"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import textwrap
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,11 +23,12 @@ from ..core.scene_file import Setting
 from ..core.session import Result, run, save
 from ..core.shape_file import Fitted, find_shape, fitted_to, sample_shapes
 from ..core.shape_text import packed
-from .arguments import add_scene, scene_of
+from .arguments import add_command, add_scene, scene_of
+from .exit_codes import STOPPED
 from .export import exported, formats
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface
-from .stop import Stop
+from .stop import Stop, undisturbed
 
 __all__ = ["add"]
 
@@ -37,7 +39,7 @@ examples:
   digiclay form part.stl --set shape.fit=actual --set shape.unit=inch --out part
   digiclay form letters --finger scene --scene my.toml   the finger goes the scene's own way
 
-sample shapes: {", ".join(sample_shapes())}
+{textwrap.fill("sample shapes: " + ", ".join(sample_shapes()), 100)}
 
 The folder is a run's: scene.toml (the shape's heights are in it), history.npz, metrics.json. Beside the
 formed surface stands the displayed one, in the folder 'displayed'.
@@ -48,11 +50,10 @@ SCENE = "dome_peaked"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "form", help="display a shape, form it with the finger, export it",
-        description="Display a mesh, a picture or an array of heights, form it with the finger, export it.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Display a mesh, a picture or an array of heights, form it with the finger, export it."
+    parser = add_command(
+        commands, "form", "display a shape, form it with the finger, export it", EXAMPLES, said
+    )
     parser.add_argument("shape", metavar="SHAPE", help="a sample shape's name, or a file")
     add_scene(parser, SCENE)
     parser.add_argument(
@@ -71,11 +72,13 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and tell in a few lines what came of it."""
-    out: Path = arguments.out or Path(find_shape(arguments.shape).stem)
+    file = find_shape(arguments.shape)
+    out: Path = arguments.out or Path(file.stem)
     may_be_written(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
-    scene, laid = _laid(scene_of(arguments)[0])
+    with undisturbed():  # what reads meshes is imported there
+        scene, laid = _laid(scene_of(arguments)[0])
     if not arguments.quiet:
         print(laid.told())
     if arguments.finger != "scene":
@@ -91,7 +94,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             _export(result, arguments.export, folder)
     if not arguments.quiet:
         print("\n".join([*lines, result.summary(), f"written to {out}"]))
-    return 130 if stop() else 0
+    return STOPPED if stop() else 0
 
 
 def _laid(scene: Scene) -> tuple[Scene, Fitted]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import sys
 import time
@@ -22,8 +23,10 @@ from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import load
 from ..core.session import Result, run, save
-from .counted import Counted
+from .arguments import add_command
+from .exit_codes import STOPPED, WRONG
 from .export import exported, formats
+from .progress import Counted
 from .refusals import refuse_what_has_no_surface, refuse_without_blender
 from .render import draw_film, draw_still, draw_turntable
 from .stop import Stop
@@ -52,10 +55,7 @@ Tell = Callable[[str, float], None]
 def add(commands: Any) -> None:
     """Add the command."""
     said = "do one job of a batch, from its files alone; for render farms"
-    parser = commands.add_parser(
-        "job", help=said, description=said, epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    parser = add_command(commands, "job", said, EXAMPLES)
     parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
     parser.add_argument("--out", metavar="DIR", type=Path, help="default ../../runs/JOB, as a batch has it")
     parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
@@ -79,13 +79,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
         _done(arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True))
         return 0
     except KeyboardInterrupt:
-        return 130
+        return STOPPED
     except DigiclayError as error:
         print(f"{ERROR}{' '.join(str(error).split())}", flush=True)
-        return 2
+        return WRONG
     except MemoryError:
         print(f"{ERROR}There is not enough memory: use fewer cells, or a higher recorder.every.", flush=True)
-        return 2
+        return WRONG
     except Exception as error:  # the batch goes on, and has to tell what this was
         traceback.print_exc()
         print(f"{ERROR}{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
@@ -109,6 +109,8 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
 def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> Path:
     """Do the job, and return its folder; KeyboardInterrupt when it was stopped."""
     folder: Path = arguments.job
+    if not os.path.isfile(folder / JOB):
+        raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
     scene, outputs = load(folder / SCENE), job_outputs(folder / JOB)
     name = folder.resolve().name
     out: Path = arguments.out or folder.resolve().parents[1] / RUNS / name

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.run_folder import may_be_written, written
+from .arguments import add_command
+from .progress import Line
 from .refusals import refuse_without
 from .stop import Stop
 
@@ -25,11 +27,8 @@ The folder holds paper.md (start there), the figures, and metrics.json with ever
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "paper", help="reproduce the paper's results",
-        description="Reproduce the paper's figures, and set its claims beside what is measured.",
-        epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Reproduce the paper's figures, and set its claims beside what is measured."
+    parser = add_command(commands, "paper", "reproduce the paper's results", EXAMPLES, said)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("paper"), help="default ./paper")
     parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
     parser.add_argument("--quick", action="store_true", help="coarse: few speeds and gains, for a first look")
@@ -56,7 +55,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-class Stages:
+class Stages(Line):
     """Tells on a terminal what is being done, on one line; elsewhere nothing. Stops when asked to.
 
     Parameters
@@ -68,22 +67,12 @@ class Stages:
     """
 
     def __init__(self, stream: TextIO, stop: Stop, *, quiet: bool) -> None:
-        self._stream, self._stop = stream, stop
-        self._shown = stream.isatty() and not quiet
-        self._started = time.monotonic()
-
-    def __enter__(self) -> Stages:
-        return self
+        super().__init__(stream)
+        self._stop, self._quiet = stop, quiet
 
     def __call__(self, stage: str) -> None:
         """Tell the next stage."""
         if self._stop():
             raise KeyboardInterrupt
-        if self._shown:
-            self._stream.write(f"\r{time.monotonic() - self._started:4.0f} s  {stage}\033[K")
-            self._stream.flush()
-
-    def __exit__(self, *raised: object) -> None:
-        if self._shown:
-            self._stream.write("\r\033[K")
-            self._stream.flush()
+        if not self._quiet:
+            self.draw(f"{time.monotonic() - self._started:4.0f} s  {stage}")

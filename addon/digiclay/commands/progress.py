@@ -1,50 +1,141 @@
-"""A progress bar on a terminal; nothing elsewhere."""
+"""Progress on a terminal: one line, drawn over again and again, gone in the end; nothing elsewhere."""
 
 from __future__ import annotations
 
+import shutil
 import time
-from typing import TextIO
+from typing import Self, TextIO
 
-__all__ = ["Bar"]
+__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "Steps", "duration"]
 
-#: Cells of the bar, and seconds between two drawings of it.
+#: Cells of a bar, and seconds between two drawings of it.
 WIDTH, PAUSE = 28, 0.1
 
 
-class Bar:
-    """Shows how much of a session is done; to be told after each control period.
+class Line:
+    """A line of a terminal that is taken away when its block is left.
 
     Parameters
     ----------
     stream : TextIO
         Written to only if it is a terminal.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._shown = stream, False
+        self._started = self._drawn = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def due(self) -> bool:
+        """Tell whether it is time to draw once more: what is drawn costs, and nobody reads that fast."""
+        return time.monotonic() - self._drawn >= PAUSE
+
+    def draw(self, said: str) -> None:
+        """Draw a text in place of what stood there, as much of it as the terminal is wide."""
+        self._drawn = time.monotonic()
+        if not self._stream.isatty():
+            return
+        width = shutil.get_terminal_size().columns - 1  # a longer one goes on below, and would stay there
+        self._stream.write(f"\r{said[:width]}\033[K")
+        self._stream.flush()
+        self._shown = True
+
+    def left(self, share: float) -> str:
+        """Write how long the rest takes when a share from 0 to 1 was done in the time since the beginning."""
+        if share <= 0.0:
+            return ""
+        return f", {duration((time.monotonic() - self._started) * (1.0 - share) / share)} left"
+
+    def __exit__(self, *raised: object) -> None:
+        if self._shown:
+            self._stream.write("\r\033[K")
+            self._stream.flush()
+
+
+class Bar(Line):
+    """Shows how much of a session is done; to be told after each control period.
+
+    Parameters
+    ----------
+    stream : TextIO
     label : str
     period : float
         Simulated time a control period stands for, s.
     """
 
     def __init__(self, stream: TextIO, label: str, period: float) -> None:
-        self._stream, self._label, self._period = stream, label, period
-        self._started = self._drawn = time.monotonic()
-        self._shown = False
-
-    def __enter__(self) -> Bar:
-        return self
+        super().__init__(stream)
+        self._label, self._period = label, period
 
     def __call__(self, done: int, total: int) -> None:
         """Draw the bar, if it is time to."""
-        now = time.monotonic()
-        if now - self._drawn < PAUSE or not self._stream.isatty():
-            return
-        filled = WIDTH * done // total
-        left = (now - self._started) * (total - done) / done
-        bar = "#" * filled + "." * (WIDTH - filled)
-        times = f"{done * self._period:.1f} of {total * self._period:.1f} s simulated, {left:.0f} s left"
-        self._stream.write(f"\r{self._label} [{bar}] {100 * done // total:3d} %  {times}\033[K")
-        self._stream.flush()
-        self._drawn, self._shown = now, True
+        if self.due():
+            times = f"{done * self._period:.1f} of {total * self._period:.1f} s simulated"
+            said = f"{100 * done // total:3d} %{self.left(done / total)}  {times}"
+            self.draw(f"{self._label} {cells(done / total)} {said}")
 
-    def __exit__(self, *raised: object) -> None:
-        if self._shown:
-            self._stream.write("\r\033[K")
-            self._stream.flush()
+
+class Counted(Line):
+    """Shows how many of something are done, such as frames, and how long the others will take.
+
+    Parameters
+    ----------
+    stream : TextIO
+    label, unit : str
+        What is going on, and what is counted.
+    before : int, optional
+        How many were done beforehand: they say nothing about the time the others take.
+    """
+
+    def __init__(self, stream: TextIO, label: str, unit: str, before: int = 0) -> None:
+        super().__init__(stream)
+        self._label, self._unit, self._before = label, unit, before
+
+    def __call__(self, done: float, total: int, note: str = "") -> None:
+        """Draw the bar, if it is time to; `done` may be in the middle of one."""
+        if self.due():
+            here = (done - self._before) / max(total - self._before, 1)
+            said = f"{int(done)} of {total} {self._unit}{self.left(here)}{note}"
+            self.draw(f"{self._label} {cells(done / total)} {said}")
+
+
+class Steps(Line):
+    """Shows how many pieces of a work are done; to be told after each what it was.
+
+    Parameters
+    ----------
+    stream : TextIO
+    label : str
+    total : int
+        Pieces of work.
+    """
+
+    def __init__(self, stream: TextIO, label: str, total: int) -> None:
+        super().__init__(stream)
+        self._label, self._total, self._done = label, total, 0
+
+    def __call__(self, doing: str = "") -> None:
+        """Count one more piece as done, and draw the bar if it is time to."""
+        self._done += 1
+        if self.due():
+            share = self._done / self._total
+            said = f"{self._done} of {self._total}{self.left(share)}  {doing}"
+            self.draw(f"{self._label} {cells(share)} {said}")
+
+
+def cells(share: float) -> str:
+    """Draw a share from 0 to 1."""
+    filled = int(WIDTH * share)
+    return f"[{'#' * filled}{'.' * (WIDTH - filled)}]"
+
+
+def duration(seconds: float) -> str:
+    """Write a time left or taken: 8 s, 3 min 20 s, 2 h 5 min."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
+from pathlib import Path
 
 from ..core.errors import OutputError
 from ..core.scene import Scene
+from .stop import undisturbed
 
-__all__ = ["refuse_what_has_no_surface", "refuse_without", "refuse_without_blender"]
+__all__ = [
+    "refuse_file", "refuse_unwritable", "refuse_what_has_no_surface", "refuse_without",
+    "refuse_without_blender",
+]  # fmt: skip
 
 
 def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
@@ -27,4 +33,23 @@ def refuse_without(module: str, option: str, remedy: str) -> None:
 
 def refuse_without_blender() -> None:
     """Say what to install where Blender's module is missing."""
-    importlib.import_module("..compat", __package__)
+    with undisturbed():
+        importlib.import_module("..compat", __package__)
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """Refuse a folder that is none, or that cannot be made or written to."""
+    above = next(path for path in (folder, *folder.resolve().parents) if os.path.lexists(path))
+    if not os.path.isdir(above):
+        raise OutputError(f"{folder} cannot be a folder: {above.name} is a file.")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise OutputError(f"{folder} cannot be written to.")
+
+
+def refuse_file(out: Path, ending: str) -> None:
+    """Refuse a file that cannot be written, or whose name promises another format."""
+    if out.suffix.lower() != ending:
+        raise OutputError(f"--out must end with {ending} (got {out}).")
+    if os.path.isdir(out):
+        raise OutputError(f"--out must be a file ({out} is a folder).")
+    refuse_unwritable(out.parent)

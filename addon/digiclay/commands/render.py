@@ -15,9 +15,10 @@ from ..core.fingertip import Fingertip
 from ..core.finished import last_touch, read, row_at
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
-from .arguments import add_run, seconds, size
-from .counted import Counted
-from .refusals import refuse_without_blender
+from .arguments import add_run, seconds, size, told_as_options
+from .exit_codes import STOPPED
+from .progress import Counted
+from .refusals import refuse_file, refuse_without_blender
 from .stop import Stop
 
 __all__ = ["ARRAYS", "add", "draw_film", "draw_still", "draw_turntable", "picture"]
@@ -71,29 +72,36 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Render."""
-    looks = _looks(arguments)
+    with told_as_options("Still", "Film", "Turntable", width="size", height="size"):
+        looks = _looks(arguments)
+        return _drawn(arguments, looks)
+
+
+def _drawn(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int:
+    """Draw, and say where it is."""
+    name, ending = ("film" if isinstance(looks, Film) else "turntable"), ".mp4"
+    if isinstance(looks, Still):
+        name, ending = "pins", ".png"
+    out: Path = arguments.out or arguments.run / f"{name}{ending}"
+    refuse_file(out, ending)
     refuse_without_blender()
     run = read(arguments.run, *ARRAYS)
     row = None if arguments.time is None else row_at(run.history, arguments.time, "--time")
     path: Path | None
-    if isinstance(looks, Still):
-        out = arguments.out or arguments.run / "pins.png"
-        path = draw_still(run.scene, run.history, looks, out, row)
-    else:
-        name = "film" if arguments.film else "turntable"
-        out = arguments.out or arguments.run / f"{name}.mp4"
-        with Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
-            told = None if arguments.quiet else bar
-            if isinstance(looks, Film):
-                path = draw_film(run.scene, run.history, looks, out, told, stop)
-            else:
-                path = draw_turntable(run.scene, run.history, looks, out, told, stop, row)
+    with Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
+        told = None if arguments.quiet else bar
+        if isinstance(looks, Film):
+            path = draw_film(run.scene, run.history, looks, out, told, stop)
+        elif isinstance(looks, Turntable):
+            path = draw_turntable(run.scene, run.history, looks, out, told, stop, row)
+        else:  # Blender does not stop within a picture
+            path = draw_still(run.scene, run.history, looks, out, row)
     if path is None:
         print("Stopped; nothing was written.", file=sys.stderr)
-        return 130
+        return STOPPED
     if not arguments.quiet:
         print(path)
-    return 0
+    return STOPPED if stop() else 0
 
 
 def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:

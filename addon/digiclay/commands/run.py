@@ -16,8 +16,9 @@ from ..core.finished import last_touch
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.session import Result, run, save
-from .arguments import add_scene, length, scene_of
+from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
+from .exit_codes import STOPPED
 from .export import exported, formats
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
@@ -40,10 +41,8 @@ add. Ctrl-C keeps what was computed, marked as incomplete.
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "run", help="simulate a scene", description="Simulate a scene and write its folder.", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
-    )  # fmt: skip
+    said = "Simulate a scene and write its folder."
+    parser = add_command(commands, "run", "simulate a scene", EXAMPLES, said)
     add_scene(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the scene's name, here")
     parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
@@ -54,7 +53,7 @@ def add(commands: Any) -> None:
         "--budget",
         metavar="E",
         type=length,
-        help="leave out of the model what changes no height by more than this, such as 20um: tried and told",
+        help="leave out of the model what changes no height by more than this, such as 20um, and say what",
     )
     parser.add_argument("--plots", action="store_true", help="also plots, session.png and surface.png")
     parser.add_argument("--render", action="store_true", help="also a picture, pins.png (needs bpy)")
@@ -96,7 +95,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         print(f"written to {out}")
     if wrong:
         raise wrong[0]
-    return 130 if stop() else 0
+    return STOPPED if stop() else 0
 
 
 def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:

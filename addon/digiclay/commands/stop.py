@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["Stop"]
+__all__ = ["Stop", "undisturbed"]
 
 
 class Stop:
@@ -37,3 +39,18 @@ class Stop:
         for number, former in self._former.items():
             # Python does not know a handler that Blender itself has set, and cannot set it again.
             signal.signal(number, signal.SIG_DFL if former is None else former)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block: libraries take an interrupted import for a broken one.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        At the end, when somebody has asked to stop.
+    """
+    with Stop() as stop:
+        yield
+    if stop():
+        raise KeyboardInterrupt

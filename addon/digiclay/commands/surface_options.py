@@ -9,10 +9,9 @@ from ..core.errors import OutputError
 from ..core.export_model import Model
 from ..core.features import Finding
 from ..core.finished import Run, row_at
-from ..core.quantity import parse
 from ..core.scene import Scene
 from ..core.skins import SKINS
-from .arguments import seconds
+from .arguments import millimetres, seconds, told_as_options
 
 __all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]
 
@@ -26,10 +25,10 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     )
     known = Finding()
     parser.add_argument(
-        "--threshold",
-        metavar="L",
-        help=f"how far off its former place a feature is; default {known.threshold * 1e3:g} mm",
-    )
+        "--threshold", metavar="L", type=millimetres, default=known.threshold,
+        help="how far off its former place a feature is, mm, or with a unit; "
+        f"default {known.threshold * 1e3:g} mm",
+    )  # fmt: skip
     parser.add_argument(
         "--smallest", metavar="N", type=int, default=known.smallest,
         help=f"pins a feature has at least; default {known.smallest}",
@@ -42,18 +41,17 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
 
 def finding_of(arguments: argparse.Namespace) -> Finding:
     """Return what counts as a feature."""
-    told: dict[str, Any] = {"smallest": arguments.smallest}
-    if arguments.threshold is not None:
-        told["threshold"] = _length(arguments.threshold, "--threshold")
-    return Finding(**told)
+    with told_as_options("Finding"):
+        return Finding(threshold=arguments.threshold, smallest=arguments.smallest)
 
 
 def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
     """Return what is to be made."""
     told: dict[str, Any] = {"kind": kind, "skin": arguments.skin, "resolution": arguments.resolution}
     if getattr(arguments, "base_thickness", None) is not None:
-        told["base_thickness"] = _length(arguments.base_thickness, "--base-thickness")
-    return Model(cap=scene.actuator.bore / 2.0, **told)
+        told["base_thickness"] = arguments.base_thickness
+    with told_as_options("Model"):
+        return Model(cap=scene.actuator.bore / 2.0, **told)
 
 
 def row_of(run: Run, time: float | None) -> int:
@@ -70,11 +68,3 @@ def former_of(run: Run, text: str) -> int | float:
     except argparse.ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
     return row_at(run.history, time, "--former")
-
-
-def _length(text: str, option: str) -> float:
-    """Read a length: a number of millimetres, or a quantity such as ``"500 um"``; in m."""
-    try:
-        return parse(text if " " in text.strip() else f"{text.strip()} mm", "m")
-    except ValueError as error:
-        raise OutputError(f"{option} {error} (got {text!r}).") from None

@@ -20,7 +20,7 @@ from ..core.errors import DigiclayError, OutputError, ParameterError
 from ..core.export import write_whole
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find
-from ..core.sweep import Point, Record, figure, finish, points
+from ..core.sweep import ERRORS, Point, Record, figure, finish, points
 from ..core.sweep_axis import Axis, axis
 from ..core.sweep_bundles import Bundles, bundles, evaluate_all
 from ..core.sweep_folder import Folder, columns, grid, opened, table
@@ -30,7 +30,7 @@ from .stop import Stop
 
 __all__ = ["add", "local", "workers"]
 
-Task = Callable[[list[Scene]], list[Record | None]]
+Task = Callable[..., list[Record | None]]
 
 EXAMPLES = """\
 examples:
@@ -41,7 +41,8 @@ examples:
 The folder holds points/, a small file for each finished point; sweep.csv; and for one or two
 axes a picture of each metric. Stopped by Ctrl-C, it goes on when the same command is given again;
 a point that failed is done again if its file is removed. Points of one bed, parts and steps run
-together in stacks, which takes a fraction of the time; it is said which cannot.
+together in stacks, which takes a fraction of the time; it is said which cannot. For the metrics
+height_error, force_error and total_force_error every point is integrated once more.
 """
 
 
@@ -81,9 +82,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if not any(point.scene and point.scene.recorder for point in every):
         raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
     folder = opened(arguments.out, every, axes, __version__)
-    parts = bundles(every)
+    errors = any(name in ERRORS for name in names)
+    parts = bundles(every, errors=errors)
     with Stop() as stop:
-        done = _finished(arguments, folder, parts, axes, stop)
+        done = _finished(arguments, folder, parts, axes, stop, errors=errors)
         if stop() and len(done) < len(every):
             if not arguments.quiet:
                 said = f"Stopped: {len(done)} of {len(every)} points are done and kept in {arguments.out}."
@@ -114,10 +116,23 @@ def _settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setti
 
 
 def _finished(
-    arguments: argparse.Namespace, folder: Folder, parts: Bundles, axes: Sequence[Axis], stop: Stop
+    arguments: argparse.Namespace,
+    folder: Folder,
+    parts: Bundles,
+    axes: Sequence[Axis],
+    stop: Stop,
+    *,
+    errors: bool,
 ) -> dict[int, Record]:
-    """Run the points that are not in the folder yet; return all that are done."""
-    done = folder.done()
+    """Run the points that are not in the folder yet; return all that are done.
+
+    Where errors are asked for, a point without them is not done.
+    """
+    done = {
+        index: record
+        for index, record in folder.done().items()
+        if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys()
+    }
     every = (*parts.stacks, *parts.alone)
     # A stack of which a point is missing is run as a whole, or its results would be others in the last bit.
     todo = [bundle for bundle in every if any(point.index not in done for point in bundle)]
@@ -139,7 +154,7 @@ def _finished(
                 bar.draw(len(done))
                 return stop()
 
-            finish(executor, task, todo, keep, stopped=stopped)
+            finish(executor, partial(task, errors=errors), todo, keep, stopped=stopped)
     return done
 
 
@@ -216,9 +231,9 @@ def _begin(halted: Any) -> None:
 _halted: Callable[[], bool] | None = None
 
 
-def _run(scenes: list[Scene]) -> list[Record | None]:
+def _run(scenes: list[Scene], *, errors: bool) -> list[Record | None]:
     """Run a bundle in a worker."""
-    return evaluate_all(scenes, _halted)
+    return evaluate_all(scenes, _halted, errors=errors)
 
 
 class Points:

@@ -8,13 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NO_PIN", "VALUES", "Body", "pieces", "volume"]
+__all__ = ["NO_PIN", "Body", "pieces", "volume"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
-#: What a vertex of a body may know besides its place: height, m, force, N, and code of the control mode.
-VALUES = ("height", "force", "mode")
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.
 NO_PIN = -1
 #: Triangles, or vertices, that are worked on at once: a few MB, however large the body.
@@ -34,7 +32,7 @@ class Body:
     faces : ndarray of int (f, 3)
         Counter-clockwise seen from outside.
     values : mapping of str to ndarray (v,)
-        None, or all of `VALUES`.
+        What a vertex knows besides its place: nothing, or height, m, force, N, and code of the control mode.
     groups : tuple of str
         Names of groups of faces, such as features.
     group : ndarray of int (f,)

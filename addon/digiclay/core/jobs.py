@@ -7,6 +7,7 @@ made of the run. Whoever has that folder and this package can do the job, on any
 from __future__ import annotations
 
 import itertools
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from .job_outputs import KEYS, Outputs, outputs, word
 from .layout import grid
 from .methods import METHODS
 from .part_table import refuse_unknown, shown
+from .sample_file import found, named
 from .scene import Scene
 from .scene_file import SAMPLES, Setting, find, load, read_table
 from .shape_file import fitted_to
@@ -27,10 +29,10 @@ __all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_ou
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
-#: Where the sample batches are.
-BATCHES = SAMPLES.parent / "batches"
 #: More jobs than this, or a longer name of one, are a slip of the keyboard.
 MOST, LONGEST = 10_000, 120
+#: Where the sample batches are.
+BATCHES = SAMPLES.parent / "batches"
 #: What decides which jobs there are; all other keys say what is made of each.
 WHICH = ("scenes", "methods", "settings")
 
@@ -98,15 +100,7 @@ def find_jobs(said: str) -> Path:
     SceneError
         When there is none.
     """
-    names = sorted(path.stem for path in BATCHES.glob("*.toml"))
-    if said in names:
-        return BATCHES / f"{said}.toml"
-    path = Path(said)
-    if path.is_file():
-        return path
-    if path.suffix == ".toml" or path.name != said:
-        raise SceneError(f"{path}: there is no such file.")
-    raise SceneError(f"{said} is neither a file nor a sample batch ({', '.join(names)}).")
+    return found(said, named(BATCHES, ".toml"), "sample batch")
 
 
 def job_outputs(path: Path) -> Outputs:
@@ -171,7 +165,7 @@ def _flat(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
 def _found(jobs: Path, said: str) -> Path:
     """Return the file of a scene: beside the JOBS file, or as anywhere else."""
     beside = jobs.parent / said
-    return find(str(beside)) if beside.exists() else find(said)
+    return find(str(beside)) if os.path.exists(beside) else find(said)
 
 
 def _job(file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:

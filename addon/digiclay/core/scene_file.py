@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import ParameterError, SceneError
-from .quantity import nearest
+from .sample_file import found, named
 from .scene import Scene
 from .scene_table import resolve
 
@@ -21,7 +22,7 @@ SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "sessions"
 
 def sample_names() -> list[str]:
     """Return the names of the sample scenes."""
-    return sorted(path.stem for path in SAMPLES.glob("*.toml"))
+    return list(named(SAMPLES, ".toml"))
 
 
 def find(word: str) -> Path:
@@ -32,17 +33,10 @@ def find(word: str) -> Path:
     SceneError
         When there is no such file, or sample.
     """
-    if word in sample_names():
-        return SAMPLES / f"{word}.toml"
-    path = Path(word)
-    path = path / "scene.toml" if path.is_dir() else path
-    if path.is_file():
-        return path
-    if path.suffix == ".toml" or path.name != word:
-        raise SceneError(f"{path}: there is no such file.")
-    close = nearest(word, sample_names())
-    asked = f" Did you mean {close}?" if close else ""
-    raise SceneError(f"{word} is neither a file nor a sample ({', '.join(sample_names())}).{asked}")
+    samples = named(SAMPLES, ".toml")
+    if word not in samples and os.path.isdir(word):
+        word = os.path.join(word, "scene.toml")
+    return found(word, samples, "sample")
 
 
 class Setting(NamedTuple):

@@ -13,8 +13,8 @@ from .errors import ParameterError, SceneError
 from .heightmap import HeightMap, height_map
 from .heightmap_picture import PICTURES, pixels
 from .layout import Grid
-from .quantity import nearest
 from .relief import Relief
+from .sample_file import found, named
 from .shape import AUTO, LENGTHS, Shape
 from .shape_fit import Fitted, fitted, given
 from .shape_mesh import ShapeMesh, shape_mesh
@@ -34,7 +34,7 @@ GLTF = (".glb", ".gltf")
 
 def sample_shapes() -> list[str]:
     """Return the names of the sample shapes."""
-    return sorted(path.stem for path in SAMPLES.glob("*") if path.suffix in KINDS)
+    return list(named(SAMPLES, *KINDS))
 
 
 def find_shape(word: str) -> Path:
@@ -45,21 +45,7 @@ def find_shape(word: str) -> Path:
     SceneError
         When there is no such file, or sample.
     """
-    if word in sample_shapes():
-        return next(path for path in SAMPLES.glob(f"{word}.*") if path.suffix in KINDS)
-    path = Path(word)
-    try:
-        there = path.is_file()
-    except ValueError:  # no file's name has a zero byte in it
-        there = False
-    if there:
-        return path
-    if path.suffix or path.name != word:
-        raise SceneError(f"shape.file: there is no file {word}.")
-    close = nearest(word, sample_shapes())
-    asked = f" Did you mean {close}?" if close else ""
-    known = ", ".join(sample_shapes())
-    raise SceneError(f"shape.file: {word} is neither a file nor a sample shape ({known}).{asked}")
+    return found(word, named(SAMPLES, *KINDS), "sample shape")
 
 
 def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
@@ -79,7 +65,10 @@ def read(shape: Shape) -> Relief:
     ParameterError
         When it holds no shape.
     """
-    path = find_shape(shape.file)
+    try:
+        path = find_shape(shape.file)
+    except SceneError as error:
+        raise SceneError(f"shape.file: {error}") from None
     kind = path.suffix.lower()
     if kind == ARRAY:
         return _array(path)

@@ -14,6 +14,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from .accuracy import can_be_estimated, estimated
 from .errors import DigiclayError, OutputError, ParameterError, SceneError
 from .metrics import METRICS
 from .quantity import nearest
@@ -22,16 +23,23 @@ from .scene_file import Setting, load
 from .session import Result, run
 from .sweep_axis import MOST, Axis
 
-__all__ = ["FIGURES", "Point", "Record", "evaluate", "figure", "finish", "points", "recorded"]
+__all__ = ["ERRORS", "FIGURES", "Point", "Record", "evaluate", "figure", "finish", "points", "recorded"]
 
 Record = dict[str, Any]
 
+#: How exact a session is: unit and meaning. It is integrated once more for them, where they are asked for.
+ERRORS: dict[str, tuple[str, str]] = {
+    "height_error": ("m", "largest error of a pin's height, estimated"),
+    "force_error": ("N", "largest error of the force on a cell, estimated"),
+    "total_force_error": ("N", "largest error of the total force, estimated"),
+}
 #: What a session can be judged by: unit and meaning.
 FIGURES: dict[str, tuple[str, str]] = {
     **{name: (known[0], known[1]) for name, known in METRICS.items()},
     "simulated": ("s", "simulated time"),
     "run_time": ("s", "time the simulation took"),
     "real_time_factor": ("1", "simulated time over the time it took"),
+    **ERRORS,
 }
 #: Short names of figures.
 SHORT = {"lag": "lag_mean"}
@@ -111,22 +119,39 @@ def figure(word: str) -> str:
     raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
 
 
-def evaluate(scene: Scene, stopped: Callable[[], bool] | None = None) -> Record | None:
-    """Run one point; return its ``figures``, or the ``error`` it ended in; None when it was stopped."""
+def evaluate(
+    scene: Scene, stopped: Callable[[], bool] | None = None, *, errors: bool = False
+) -> Record | None:
+    """Run one point; return its ``figures``, or the ``error`` it ended in; None when it was stopped.
+
+    Parameters
+    ----------
+    scene : Scene
+    stopped : callable, optional
+        Asked after each control period.
+    errors : bool, optional
+        Estimate `ERRORS` too.
+    """
     try:
         result = run(scene, stopped=stopped)
+        if errors and result.history is not None and not result.incomplete and can_be_estimated(scene):
+            found = estimated(scene, result.history, stopped=stopped)
+            if found is None:
+                return None
+            result = result.with_errors(found)
     except DigiclayError as error:
         return {"error": " ".join(str(error).split())}
     except MemoryError:
         return {"error": "There is not enough memory."}
     except Exception as error:  # whatever is wrong with one point, the others are worth having
         return {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
-    return None if result.incomplete else recorded(result)
+    return None if result.incomplete else recorded(result, errors=errors)
 
 
-def recorded(result: Result) -> Record:
-    """Return what is kept of a session that came to its end."""
-    return {"figures": {name: result.metrics.get(name) for name in FIGURES}}
+def recorded(result: Result, *, errors: bool = False) -> Record:
+    """Return what is kept of a session that came to its end; `ERRORS` only where they were asked for."""
+    names = [name for name in FIGURES if errors or name not in ERRORS]
+    return {"figures": {name: result.metrics.get(name) for name in names}}
 
 
 def finish(

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from .errors import DigiclayError
+from .errors import DigiclayError, ParameterError
 from .scene import Scene
 from .stack.assembly import structure, why_not
-from .stack.session import run_together
+from .stack.session import judge_of, judge_together
 from .sweep import Point, Record, evaluate, recorded
 
 __all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
@@ -18,10 +18,9 @@ __all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
 LEAST = 4
 #: From twice as many points on there are two stacks: a larger one gains little, and busies one core only.
 RUNS = 32
-#: Bytes the histories of a stack may take before they are judged, and bytes a cell takes in a control period.
-BUDGET, BYTES_A_CELL = 2**30, 25
-#: Cells that take part at a time with a method that looks after a blister only; else it may be all.
-FEW = 200
+#: Bytes a stack may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
+#: by unseen.
+BUDGET, BYTES_A_ROW = 2**30, 41
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,12 @@ class Bundles:
         return [*lines, *self.why]
 
 
-def bundles(points: Sequence[Point]) -> Bundles:
+def bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     """Put points of one structure together, as many as make a stack; in the order of the points.
 
     Which stand together depends on the points alone, not on what is done already or how many
-    workers there are: the same sweep comes to the same results to the last bit.
+    workers there are: the same sweep comes to the same results to the last bit. Where their errors
+    are to be estimated, those that judge them must be of one structure too.
     """
     alike: dict[object, list[Point]] = {}
     alone: list[Point] = []
@@ -67,7 +67,12 @@ def bundles(points: Sequence[Point]) -> Bundles:
             if reason:
                 why[reason] = why.get(reason, 0) + 1
         else:
-            alike.setdefault(structure(point.scene), []).append(point)
+            try:
+                judge = structure(judge_of(point.scene)) if errors else None
+            except ParameterError:  # it is told when the point is run
+                alone.append(point)
+                continue
+            alike.setdefault((structure(point.scene), judge), []).append(point)
     stacks = []
     for group in alike.values():
         most = _most(group[0].scene)
@@ -76,7 +81,7 @@ def bundles(points: Sequence[Point]) -> Bundles:
             reason = (
                 f"fewer than {LEAST} have the same bed, parts and steps"
                 if len(group) < LEAST
-                else "their histories are too long to keep many at once"
+                else "they have too many rows to keep for many at once"
             )
             why[reason] = why.get(reason, 0) + len(group)
             continue
@@ -91,9 +96,8 @@ def bundles(points: Sequence[Point]) -> Bundles:
 def _most(scene: Scene | None) -> int:
     """Return how many runs like this one may be in a stack."""
     assert scene is not None
-    cells = scene.cells if scene.blister is None else min(scene.cells, FEW)
-    periods = scene.periods // scene.recorder.every if scene.recorder else 1
-    return BUDGET // max(1, periods * cells * BYTES_A_CELL)
+    rows = scene.recorder.rows(scene.periods) if scene.recorder else 1
+    return BUDGET // (rows * BYTES_A_ROW)
 
 
 def _some(count: int, what: str) -> str:
@@ -101,22 +105,24 @@ def _some(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def evaluate_all(scenes: Sequence[Scene], stopped: Callable[[], bool] | None = None) -> list[Record | None]:
+def evaluate_all(
+    scenes: Sequence[Scene], stopped: Callable[[], bool] | None = None, *, errors: bool = False
+) -> list[Record | None]:
     """Run a bundle; return the record of each of its points, None for one that was stopped.
 
-    What goes wrong with a stack as a whole is found out with its points one by one.
+    What goes wrong with a stack as a whole is found out with its points one by one. See `sweep.evaluate`.
     """
     records: list[Record | None] = [None] * len(scenes)
     if len(scenes) > 1:
         try:
-            for number, result in run_together(scenes, stopped=stopped):
+            for number, result in judge_together(scenes, errors=errors, stopped=stopped):
                 if isinstance(result, DigiclayError):
                     records[number] = {"error": " ".join(str(result).split())}
                 else:
-                    records[number] = recorded(result)
+                    records[number] = recorded(result, errors=errors)
         except Exception:  # each point meets it again by itself, and says what it is
             records = [None] * len(scenes)
     for number, scene in enumerate(scenes):
         if records[number] is None and not (stopped and stopped()):
-            records[number] = evaluate(scene, stopped)
+            records[number] = evaluate(scene, stopped, errors=errors)
     return records

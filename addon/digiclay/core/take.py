@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import tomllib
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from .simulation import begin
 from .state import State
 from .system import System
 
-__all__ = ["Take", "as_scene", "finer", "from_bytes", "replayed", "states", "to_bytes"]
+__all__ = ["Take", "as_scene", "finer", "from_bytes", "states", "to_bytes"]
 
 Floats = NDArray[np.float64]
 
@@ -98,24 +98,6 @@ def states(take: Take, scene: Scene | None = None) -> Iterator[State]:
     """
     system = assemble(scene or take.scene)
     yield from lived(system, unpacked(system, take.start), take.poses)
-
-
-def replayed(take: Take, told: Callable[[int, int], bool] | None = None) -> bool:
-    """Play a take again; tell whether it ends in the very same state, bit for bit.
-
-    Parameters
-    ----------
-    take : Take
-    told : callable, optional
-        Told after each period how many are done, and of how many; False ends the replay.
-    """
-    system = assemble(take.scene)
-    state = unpacked(system, take.start)
-    for done, later in enumerate(lived(system, state, take.poses), 1):
-        state = later
-        if told and not told(done, take.periods):
-            return False
-    return packed(system, state) == take.end
 
 
 def finer(scene: Scene, parts: int) -> Scene:

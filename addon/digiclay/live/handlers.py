@@ -1,4 +1,4 @@
-"""What Blender tells the running sessions: undo, redo, and that another file is loaded.
+"""What Blender tells the running sessions: undo, redo, saving, and that their file or the extension goes.
 
 The handlers are there only while a session runs.
 """
@@ -10,12 +10,15 @@ from typing import Any
 
 from ..compat import bpy
 from ..overlay import views
-from . import keys, loop, running
+from . import keys, loop, recovery, running, tick
+from .running import Running
 
-__all__ = ["ended", "register", "unregister", "watch"]
+__all__ = ["STOPPED", "abandoned", "end_all", "ended", "register", "unregister", "watch"]
 
 #: Ticks until the state undo has put into a bed is taken up, that one included.
 STALE = 2
+#: What is told of a session the user has ended.
+STOPPED = "was stopped; the bed keeps its state"
 
 
 @bpy.app.handlers.persistent
@@ -26,9 +29,27 @@ def take_up(*_: Any) -> None:
 
 
 @bpy.app.handlers.persistent
+def saving(*_: Any) -> None:
+    """Have the file that is about to be saved hold what is being recorded."""
+    recovery.lend()
+
+
+@bpy.app.handlers.persistent
+def saved(path: str, *_: Any) -> None:
+    """Go on recording after the file was saved."""
+    recovery.take_back(path)
+
+
+@bpy.app.handlers.persistent
+def not_saved(*_: Any) -> None:
+    """Go on recording after the file could not be saved."""
+    recovery.take_back()
+
+
+@bpy.app.handlers.persistent
 def leave(*_: Any) -> None:
     """End all sessions: the file they are of is about to be closed."""
-    ended("another file was loaded")
+    abandoned("ended: another file was loaded")
 
 
 def watch() -> None:
@@ -38,16 +59,42 @@ def watch() -> None:
             handler.append(function)
 
 
-def ended(why: str) -> None:
-    """End all sessions at once, without touching their beds, which keep the states of the last tick."""
-    names = ", ".join(session.name for session in running.all())
-    for session in running.all():
-        running.drop(session.uid)
-    if names:
-        running.say(f"The session of {names} ended: {why}")
-    loop.end()
-    unwatch()
+def ended(how: str, *sessions: Running) -> None:
+    """End sessions at once; their beds keep the states of the last tick, and takes of what was recorded.
+
+    Parameters
+    ----------
+    how : str
+        What is told of them, after their names.
+    *sessions : Running
+        All that run if none is given. The last one takes loop and handlers along.
+    """
+    recovery.take_back()
+    sessions = sessions or running.all()
+    words = [f"The session of {', '.join(session.name for session in sessions)} {how}"]
+    words += filter(None, [tick.stop(session.uid) for session in sessions])
+    if sessions:
+        running.say(". ".join(words))
+    if not running.all():
+        loop.end()
+        unwatch()
     views.follow()
+
+
+def end_all(how: str) -> None:
+    """End all sessions; one undo step holds what they came to."""
+    some = bool(running.all())
+    ended(how)
+    if some:
+        bpy.ops.ed.undo_push(message="Stop Session")
+
+
+def abandoned(how: str) -> None:
+    """End all sessions since their file goes away; what it does not have of a recording can be recovered."""
+    unsaved = recovery.unsaved()
+    ended(how)
+    if unsaved:
+        running.say(f"{running.said()}. {recovery.leave()}")
 
 
 def unwatch() -> None:
@@ -60,7 +107,14 @@ def unwatch() -> None:
 def _pairs() -> list[tuple[Any, Any]]:
     """Return Blender's lists of handlers with what belongs into them."""
     lists = bpy.app.handlers
-    return [(lists.undo_post, take_up), (lists.redo_post, take_up), (lists.load_pre, leave)]
+    return [
+        (lists.undo_post, take_up),
+        (lists.redo_post, take_up),
+        (lists.save_pre, saving),
+        (lists.save_post, saved),
+        (lists.save_post_fail, not_saved),
+        (lists.load_pre, leave),
+    ]
 
 
 def register() -> None:
@@ -70,5 +124,5 @@ def register() -> None:
 
 def unregister() -> None:
     """End what runs, and take back all that was registered."""
-    ended("the extension was disabled")
+    end_all("ended: the extension was disabled")
     keys.unregister()

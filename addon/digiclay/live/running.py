@@ -43,12 +43,15 @@ class Recording:
         Pose at the end of each period and the moment it was simulated in; row 0: the start.
     count : int
         How many of the rows are in use. Those behind belong to nobody.
+    saved : int
+        How many of those the file has, as a take.
     """
 
     start: bytes
     first: int
     rows: Floats
     count: int
+    saved: int = 0
 
     @classmethod
     def begun(cls, kept: bytes, period: int, pose: Floats, moment: int) -> Recording:
@@ -61,6 +64,11 @@ class Recording:
     def path(self) -> Floats:
         """Poses, shape (t + 1, 7): `core.live.lived` simulates them again bit for bit."""
         return self.rows[: self.count, :7]
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something was recorded that the file does not have."""
+        return self.count > max(self.saved, 1)
 
     def extended(self, path: Floats, moment: int) -> Recording:
         """Return the recording with the poses of some more periods, shape (k, 7)."""
@@ -76,12 +84,16 @@ class Recording:
     def at(self, moment: int, period: int) -> Recording | None:
         """Return the recording as it was at a moment undo came back to; None when it did not lead there."""
         count = int(np.searchsorted(self.rows[: self.count, 7], moment, side="right"))
-        return replace(self, count=count) if count and count - 1 == period - self.first else None
+        return self._first(count) if count and count - 1 == period - self.first else None
 
     def until(self, period: int) -> Recording | None:
         """Return the recording up to a period of its own; None when that is before its start."""
         count = period - self.first + 1
-        return replace(self, count=count) if 0 < count <= self.count else None
+        return self._first(count) if 0 < count <= self.count else None
+
+    def _first(self, count: int) -> Recording:
+        """Return the recording with its first rows alone."""
+        return replace(self, count=count, saved=min(self.saved, count))
 
 
 @dataclass(frozen=True, eq=False)

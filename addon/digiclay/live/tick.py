@@ -66,13 +66,11 @@ def start(context: Any, bed: Any) -> list[Note]:
     return [*notes, Note("WARNING", f"{bed.name}: {said}")] if said else notes
 
 
-def stop(uid: int) -> Any | None:
-    """End a session; return its bed, which keeps the state and a take, or None when that was deleted."""
+def stop(uid: int) -> str:
+    """End a session: its bed keeps the state, and what was recorded as a take; return words about that."""
     ended = running.drop(uid)
     bed = found(uid, ended.name) if ended else None
-    if ended is not None and bed is not None:
-        takes.keep_recorded(bed, ended)
-    return bed
+    return takes.keep_recorded(bed, ended) if ended is not None and bed is not None else ""
 
 
 def show(bed: Any, session: Running) -> None:

@@ -19,6 +19,7 @@ from ..settings.declared import title
 from ..settings.devices import device
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import SHOWN, si
+from .reasons import allowed, edited
 
 __all__ = ["AddBed", "add", "add_shown", "entry", "select_only", "stand_at_cursor"]
 
@@ -91,10 +92,7 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is an object: it cannot be added inside another object's edit mode."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first: the device is an object of its own")
-            return False
-        return True
+        return allowed(cls, edited(context, "Leave Edit Mode first: the device is an object of its own"))
 
     def execute(self, context: Any) -> set[str]:
         """Build the device at the 3D cursor."""

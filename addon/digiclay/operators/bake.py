@@ -13,24 +13,12 @@ from ..core.keeping import packed
 from ..core.simulation import begin
 from ..core.take import Take
 from ..device.view import bed_of
-from ..live import running
 from ..recorded import bake, takes
 from ..settings import properties
 from .long_work import LongWork
+from .reasons import allowed, no_bed, session_runs
 
 __all__ = ["Bake", "FreeBake"]
-
-
-def needs_idle_bed(operator: Any, context: Any) -> bool:
-    """Tell whether a bed is active that no session runs on; if not, the operator says why."""
-    bed = bed_of(context)
-    if bed is None:
-        operator.poll_message_set("Select a bed or its fingertip first")
-        return False
-    if running.of(bed) is not None:
-        operator.poll_message_set("Stop the session on this bed first")
-        return False
-    return True
 
 
 class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
@@ -64,7 +52,7 @@ class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed without a running session is needed."""
-        return needs_idle_bed(cls, context)
+        return allowed(cls, no_bed(context) or session_runs(context, "Stop the session on this bed first"))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Take the scene's frames where none are asked for, and begin."""
@@ -114,14 +102,8 @@ class FreeBake(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed with a bake is needed."""
-        bed = bed_of(context)
-        if bed is None:
-            cls.poll_message_set("Select a bed or its fingertip first")
-            return False
-        if not bake.is_baked(bed):
-            cls.poll_message_set("The bed has no bake")
-            return False
-        return True
+        why = no_bed(context) or ("" if bake.is_baked(bed_of(context)) else "The bed has no bake")
+        return allowed(cls, why)
 
     def execute(self, context: Any) -> set[str]:
         """Free it."""

@@ -10,7 +10,8 @@ from ..core.export import FORMATS, UNITS, suffix, write
 from ..core.export_model import bodies
 from ..device.view import bed_of
 from ..exchange import formed_bed
-from .surface_options import SurfaceOptions, chosen, needs_surface, sentence
+from .reasons import allowed, no_surface
+from .surface_options import SurfaceOptions, chosen, sentence
 
 __all__ = ["ExportMenu", "ExportMesh", "entry"]
 
@@ -60,7 +61,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed."""
-        return needs_surface(cls, context)
+        return allowed(cls, no_surface(context))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the file, named after the bed."""

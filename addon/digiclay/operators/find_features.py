@@ -9,7 +9,8 @@ from ..core.export_model import features
 from ..core.features import summary
 from ..exchange import formed_bed
 from ..panels.export import LISTED
-from .surface_options import FindingOptions, chosen, needs_surface
+from .reasons import allowed, no_surface
+from .surface_options import FindingOptions, chosen
 
 __all__ = ["FindFeatures", "ForgetSurface", "KeepSurface"]
 
@@ -24,7 +25,7 @@ class FindFeatures(FindingOptions, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed."""
-        return needs_surface(cls, context)
+        return allowed(cls, no_surface(context))
 
     def execute(self, context: Any) -> set[str]:
         """Find them."""
@@ -55,7 +56,7 @@ class KeepSurface(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed."""
-        return needs_surface(cls, context)
+        return allowed(cls, no_surface(context))
 
     def execute(self, context: Any) -> set[str]:
         """Keep the surface."""
@@ -77,14 +78,15 @@ class ForgetSurface(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed whose surface was kept."""
-        if not needs_surface(cls, context):
-            return False
-        if not formed_bed.is_kept(chosen(context)):
-            cls.poll_message_set("Features are measured from the bed at rest already")
-            return False
-        return True
+        return allowed(cls, no_surface(context) or _from_rest(context))
 
     def execute(self, context: Any) -> set[str]:
         """Forget the surface."""
         formed_bed.forget(chosen(context))
         return {"FINISHED"}
+
+
+def _from_rest(context: Any) -> str:
+    """No surface was kept to measure features from."""
+    kept = formed_bed.is_kept(chosen(context))
+    return "" if kept else "Features are measured from the bed at rest already"

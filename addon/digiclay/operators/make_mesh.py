@@ -11,7 +11,8 @@ from ..core.errors import DigiclayError
 from ..core.export_model import bodies
 from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
-from .surface_options import SurfaceOptions, chosen, needs_surface
+from .reasons import allowed, edited, no_surface
+from .surface_options import SurfaceOptions, chosen
 
 __all__ = ["MakeMesh"]
 
@@ -35,10 +36,8 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed, and no edit mode of another object."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first: the mesh is an object of its own")
-            return False
-        return needs_surface(cls, context)
+        why = edited(context, "Leave Edit Mode first: the mesh is an object of its own")
+        return allowed(cls, why or no_surface(context))
 
     def draw(self, context: Any) -> None:
         """Draw the redo panel."""

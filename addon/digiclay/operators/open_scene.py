@@ -19,6 +19,7 @@ from ..exchange import shape_show
 from ..recorded import sample_take, takes
 from ..settings.declared import title
 from .add_bed import add, select_only, stand_at_cursor
+from .reasons import allowed, edited
 
 __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]
 
@@ -37,10 +38,7 @@ class Opened:
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is an object: it cannot be added inside another object's edit mode."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first: the device is an object of its own")
-            return False
-        return True
+        return allowed(cls, edited(context, "Leave Edit Mode first: the device is an object of its own"))
 
     def opened(self, context: Any, scene: Scene) -> Any:
         """Add the bed of a scene, its finger where its path begins; return it."""

@@ -8,9 +8,11 @@ from ..core.errors import DigiclayError
 from ..device import display
 from ..device.view import bed_of
 from ..press import aim
+from .reasons import allowed, no_bed
 
 __all__ = ["ClearPins", "PickPins"]
 
+NO_BED = "Select a bed of pins first"
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
 
@@ -24,13 +26,8 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """There must be a bed to pick pins of, in a view to click into."""
-        if bed_of(context) is None:
-            cls.poll_message_set("Select a bed of pins first")
-            return False
-        if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Pins are picked in a 3D view")
-            return False
-        return True
+        in_view = context.area is not None and context.area.type == "VIEW_3D"
+        return allowed(cls, no_bed(context, NO_BED) or ("" if in_view else "Pins are picked in a 3D view"))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
@@ -93,14 +90,8 @@ class ClearPins(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """There must be picked pins."""
-        bed = bed_of(context)
-        if bed is None:
-            cls.poll_message_set("Select a bed of pins first")
-            return False
-        if not display.picked(bed):
-            cls.poll_message_set("No pins are picked")
-            return False
-        return True
+        why = no_bed(context, NO_BED) or ("" if display.picked(bed_of(context)) else "No pins are picked")
+        return allowed(cls, why)
 
     def execute(self, context: Any) -> set[str]:
         """Drop them."""

@@ -12,6 +12,7 @@ from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.devices import laid_out
 from ..settings.groups import PRESET_WORDS
+from .reasons import allowed, no_bed
 
 __all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
 
@@ -33,7 +34,7 @@ class ApplyPreset(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed; a session that runs on it goes on with the new parameters."""
-        return _on_a_bed(cls, context)
+        return allowed(cls, no_bed(context))
 
     def execute(self, context: Any) -> set[str]:
         """Set the parameters."""
@@ -67,7 +68,7 @@ class SavePreset(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed."""
-        return _on_a_bed(cls, context)
+        return allowed(cls, no_bed(context))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the name."""
@@ -96,13 +97,7 @@ class RemovePreset(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A preset of the user's own must be the bed's: the core's cannot be removed."""
-        if not _on_a_bed(cls, context):
-            return False
-        name = bed_of(context).digiclay.own_preset
-        if name not in own_presets.names():
-            cls.poll_message_set("Apply a preset of your own first: those that come along cannot be removed")
-            return False
-        return True
+        return allowed(cls, no_bed(context) or _no_own_preset(context))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Make sure."""
@@ -121,9 +116,7 @@ class RemovePreset(bpy.types.Operator):  # type: ignore[misc]
         return {"FINISHED"}
 
 
-def _on_a_bed(operator: Any, context: Any) -> bool:
-    """Tell whether a bed is active; say so when none is."""
-    if bed_of(context) is None:
-        operator.poll_message_set("Select a bed or its fingertip first")
-        return False
-    return True
+def _no_own_preset(context: Any) -> str:
+    """The bed's parameters are of no preset of the user's own."""
+    own = bed_of(context).digiclay.own_preset in own_presets.names()
+    return "" if own else "Apply a preset of your own first: those that come along cannot be removed"

@@ -12,6 +12,7 @@ from ..device import view
 from ..live import running, sculpting, tick, waiting
 from ..press import aim
 from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged
+from .reasons import allowed
 
 __all__ = ["Press"]
 
@@ -48,12 +49,9 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
     def poll(cls, context: Any) -> bool:
         """A view is needed, in object mode, with a bed in it."""
         if context.area is None or context.area.type != "VIEW_3D" or context.mode != "OBJECT":
-            cls.poll_message_set("Pins are pressed in a 3D view, in Object Mode")
-            return False
-        if not any(view.is_bed(thing) for thing in context.visible_objects):
-            cls.poll_message_set("Add a bed first: Add > Mesh > Digital Clay")
-            return False
-        return True
+            return allowed(cls, "Pins are pressed in a 3D view, in Object Mode")
+        seen = any(view.is_bed(thing) for thing in context.visible_objects)
+        return allowed(cls, "" if seen else "Add a bed first: Add > Mesh > Digital Clay")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""

@@ -7,8 +7,7 @@ from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device import rebuild
 from ..device.view import bed_of
-from ..live import running
-from ..recorded.bake import is_baked
+from .reasons import allowed, baked, edited, no_bed, session_runs
 
 __all__ = ["Rebuild"]
 
@@ -23,18 +22,13 @@ class Rebuild(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed, and no session on it."""
-        bed = bed_of(context)
-        if bed is None:
-            cls.poll_message_set("Select a bed or its fingertip first")
-        elif running.of(bed) is not None:
-            cls.poll_message_set("Stop the session first: its pins cannot be exchanged")
-        elif is_baked(bed):
-            cls.poll_message_set("Free the bake in the Takes panel first: it moves the pins there are now")
-        elif context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first")
-        else:
-            return True
-        return False
+        why = (
+            no_bed(context)
+            or session_runs(context, "Stop the session first: its pins cannot be exchanged")
+            or baked(context, "Free the bake in the Takes panel first: it moves the pins there are now")
+            or edited(context, "Leave Edit Mode first")
+        )
+        return allowed(cls, why)
 
     def execute(self, context: Any) -> set[str]:
         """Make it anew."""

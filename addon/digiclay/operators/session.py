@@ -6,9 +6,9 @@ from typing import Any
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device.view import bed_of
-from ..live import handlers, loop, running, tick
+from ..live import handlers, loop, tick
 from ..overlay import views
-from ..recorded.bake import is_baked
+from .reasons import allowed, baked, edited, linked, no_bed, session_runs
 from .session_loop import Looping
 
 __all__ = ["Session"]
@@ -23,23 +23,16 @@ class Session(Looping, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed in object mode is needed, with no session yet, and a window."""
-        bed = bed_of(context)
-        if bed is None:
-            why = "Select a bed or its fingertip first"
-        elif running.of(bed) is not None:
-            why = "A session runs on this bed already: Esc stops it"
-        elif context.mode != "OBJECT":
-            why = "Go back to Object Mode first"
-        elif bed.library is not None or bed.data.library is not None:
-            why = "The bed is linked from another file: make it local first (Object > Relations)"
-        elif is_baked(bed):
-            why = "The bed plays a baked session: free the bake in the Takes panel first"
-        elif bpy.app.background or context.window is None:
-            why = "A live session needs a window; takes can be baked without"
-        else:
-            return True
-        cls.poll_message_set(why)
-        return False
+        in_window = not bpy.app.background and context.window is not None
+        why = (
+            no_bed(context)
+            or session_runs(context, "A session runs on this bed already: Esc stops it")
+            or edited(context)
+            or linked(context)
+            or baked(context)
+            or ("" if in_window else "A live session needs a window; takes can be baked without")
+        )
+        return allowed(cls, why)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Start as `execute` does."""

@@ -1,4 +1,4 @@
-"""Which session an operator is about, and how it says why it declines."""
+"""Which session an operator is about."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..device.view import bed_of
 from ..live import running, waiting
 from ..live.running import Running
 
-__all__ = ["decline_while_waiting", "decline_without", "session_of"]
+__all__ = ["session_of"]
 
 
 def session_of(context: Any) -> tuple[Any, Running] | None:
@@ -19,22 +19,3 @@ def session_of(context: Any) -> tuple[Any, Running] | None:
         (session,) = running.all()
         bed = waiting.found(session.uid, session.name)
     return (bed, session) if bed is not None and session is not None else None
-
-
-def decline_while_waiting(operator: Any, context: Any) -> bool:
-    """Tell, for a poll, whether there is a session whose bed can be written; the operator says why if not."""
-    if not decline_without(operator, context):
-        return False
-    bed, session = session_of(context)
-    why = waiting.obstacle(context, bed, session.system.grid.count)
-    if why:
-        operator.poll_message_set(f"The session waits: {why}")
-    return not why
-
-
-def decline_without(operator: Any, context: Any) -> bool:
-    """Tell, for a poll, whether there is a session to act on; the operator says why if not."""
-    if session_of(context) is not None:
-        return True
-    operator.poll_message_set("No session runs on the active bed: start one first")
-    return False

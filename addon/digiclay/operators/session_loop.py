@@ -10,13 +10,15 @@ import time
 from typing import Any
 
 from ..compat import bpy
-from ..live import handlers, loop, running, tick
-from ..overlay import views
+from ..live import handlers, loop, recovery, running, tick
+from .reasons import allowed
 
-__all__ = ["GoOn", "Looping", "end_all"]
+__all__ = ["GoOn", "Looping"]
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
+#: What is told of sessions whose window is gone.
+CLOSED = "ended: its window was closed"
 
 
 class Looping:
@@ -34,7 +36,7 @@ class Looping:
         if self.token != loop.token():
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS" and not self.newer & _others(context):
-            end_all()
+            handlers.end_all(handlers.STOPPED)
             return {"FINISHED"}
         now = time.perf_counter()
         if event.type != "TIMER" or not loop.due(context, now):
@@ -42,7 +44,7 @@ class Looping:
         self.tell(tick.tick(context, now))
         loop.drawn(context, now)
         if not running.all():
-            end_all()
+            handlers.end_all(handlers.STOPPED)
             return {"FINISHED"}
         if now - self.since > EVERY and _saves(context) and not _others(context):
             _go_on_later(self.token, context.window)
@@ -50,9 +52,14 @@ class Looping:
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
-        """End with the window the loop was started in."""
-        if self.token == loop.token():
-            handlers.ended("its window was closed")
+        """End with the window the loop was started in, or with Blender."""
+        if self.token != loop.token():
+            return
+        # A window that was closed is listed no more; when Blender quits, all still are.
+        if context.window in context.window_manager.windows[:]:
+            handlers.abandoned("ended: Blender quits")
+        else:
+            handlers.end_all(CLOSED)
 
     def tell(self, notes: list[tick.Note]) -> None:
         """Report what there is to tell, and keep it for the panel."""
@@ -71,23 +78,11 @@ class GoOn(Looping, bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """Sessions without an operator that drives them are needed."""
-        if running.all() and context.window is not None:
-            return True
-        cls.poll_message_set("No session runs")
-        return False
+        return allowed(cls, "" if running.all() and context.window is not None else "No session runs")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Drive the loop again."""
         return self.begun(context)
-
-
-def end_all() -> None:
-    """End all sessions; one undo step holds what they came to."""
-    beds = [tick.stop(session.uid) for session in running.all()]
-    if any(bed is not None for bed in beds):
-        running.say("The session was stopped; the bed keeps its state")
-        bpy.ops.ed.undo_push(message="Stop Session")
-    handlers.ended("")
 
 
 def _saves(context: Any) -> bool:
@@ -104,17 +99,21 @@ def _others(context: Any) -> frozenset[int]:
 
 
 def _go_on_later(token: int, window: Any) -> None:
-    """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile."""
+    """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile.
+
+    Until then the file has what is being recorded, in case Blender saves it.
+    """
+    recovery.lend()
     pointer = window.as_pointer()
 
     def go_on() -> None:
         if token != loop.token():
             return
+        recovery.take_back()
         windows = bpy.context.window_manager.windows
         found = next((one for one in windows if one.as_pointer() == pointer), None)
         if found is None:
-            handlers.ended("its window was closed")
-            views.follow()
+            handlers.end_all(CLOSED)
             return
         with bpy.context.temp_override(window=found):
             bpy.ops.digiclay.session_go_on("INVOKE_DEFAULT")

@@ -7,7 +7,8 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import loop, running
-from .session_context import decline_without, session_of
+from .reasons import allowed, no_session
+from .session_context import session_of
 
 __all__ = ["PauseSession"]
 
@@ -21,7 +22,7 @@ class PauseSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A session is needed."""
-        return decline_without(cls, context)
+        return allowed(cls, no_session(context))
 
     def execute(self, context: Any) -> set[str]:
         """Turn it over."""

@@ -15,7 +15,8 @@ from ..device.view import bed_of
 from ..live import bed_state, sculpting, tick
 from ..recorded import takes
 from ..settings import properties
-from .session_context import decline_while_waiting, session_of
+from .reasons import allowed, edited, no_bed, session_waits
+from .session_context import session_of
 
 __all__ = ["ResetSession"]
 
@@ -36,18 +37,9 @@ class ResetSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed that has left its rest is needed."""
-        bed = bed_of(context)
         if session_of(context) is not None:
-            return decline_while_waiting(cls, context)
-        if bed is None:
-            cls.poll_message_set("Select a bed or its fingertip first")
-        elif bed_state.kept(bed) is None:
-            cls.poll_message_set("The bed is at rest already")
-        elif bed.mode != "OBJECT":
-            cls.poll_message_set("Go back to Object Mode first")
-        else:
-            return True
-        return False
+            return allowed(cls, session_waits(context))
+        return allowed(cls, no_bed(context) or _at_rest_already(context) or edited(context))
 
     def execute(self, context: Any) -> set[str]:
         """Begin anew; what the session has done can be taken back."""
@@ -69,6 +61,11 @@ class ResetSession(bpy.types.Operator):  # type: ignore[misc]
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+def _at_rest_already(context: Any) -> str:
+    """There is nothing to bring back."""
+    return "The bed is at rest already" if bed_state.kept(bed_of(context)) is None else ""
 
 
 def _at_rest(context: Any, bed: Any) -> None:

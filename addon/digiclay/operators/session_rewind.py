@@ -7,7 +7,8 @@ from typing import Any
 from ..compat import bpy
 from ..live import sculpting, tick
 from ..recorded import takes
-from .session_context import decline_while_waiting, session_of
+from .reasons import allowed, session_waits
+from .session_context import session_of
 
 __all__ = ["RewindSession"]
 
@@ -22,12 +23,7 @@ class RewindSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A session with a gesture is needed."""
-        if not decline_while_waiting(cls, context):
-            return False
-        if session_of(context)[1].gestures:
-            return True
-        cls.poll_message_set("There is no gesture to take back: the fingertip has not touched since")
-        return False
+        return allowed(cls, session_waits(context) or _no_gesture(context))
 
     def execute(self, context: Any) -> set[str]:
         """Go back, the fingertip along with the bed."""
@@ -39,3 +35,10 @@ class RewindSession(bpy.types.Operator):  # type: ignore[misc]
         tick.show(bed, back)
         tick.place(context, bed, back)
         return {"FINISHED"}
+
+
+def _no_gesture(context: Any) -> str:
+    """The fingertip has formed nothing yet."""
+    _, session = session_of(context)
+    said = "There is no gesture to take back: the fingertip has not touched since"
+    return "" if session.gestures else said

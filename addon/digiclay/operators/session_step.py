@@ -6,7 +6,8 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import loop, running, sculpting
-from .session_context import decline_without, session_of
+from .reasons import allowed, no_session
+from .session_context import session_of
 
 __all__ = ["StepSession"]
 
@@ -20,7 +21,7 @@ class StepSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A session is needed."""
-        return decline_without(cls, context)
+        return allowed(cls, no_session(context))
 
     def execute(self, context: Any) -> set[str]:
         """Ask for one more; the next tick does it."""

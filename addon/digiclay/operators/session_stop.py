@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..live import handlers, running, tick
-from ..overlay import views
-from .session_context import decline_without, session_of
+from ..live import handlers
+from .reasons import allowed, no_session
+from .session_context import session_of
 
 __all__ = ["StopSession"]
 
@@ -22,15 +22,10 @@ class StopSession(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A session is needed."""
-        return decline_without(cls, context)
+        return allowed(cls, no_session(context))
 
     def execute(self, context: Any) -> set[str]:
-        """Stop it; the last one takes the loop along."""
+        """Stop it."""
         _, session = session_of(context)
-        tick.stop(session.uid)
-        running.say(f"The session of {session.name} was stopped; the bed keeps its state")
-        if running.all():
-            views.follow()
-        else:
-            handlers.ended("")
+        handlers.ended(handlers.STOPPED, session)
         return {"FINISHED"}

@@ -11,9 +11,9 @@ from ..core.shape_file import KINDS, sample_shapes
 from ..device.view import bed_of
 from ..exchange import shape_show
 from ..live import running
-from ..recorded.bake import is_baked
 from ..settings.declared import title
 from ..settings.shown_units import SHOWN, si
+from .reasons import allowed, baked, edited, linked, no_bed, session_runs
 
 __all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
 
@@ -62,22 +62,15 @@ class Shaped:
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed is needed that stands still and is nobody else's."""
-        bed = bed_of(context)
-        if bed is None:
-            why = "Select a bed or its fingertip first"
-        elif running.of(bed) is not None:
-            why = "Stop the session first: the bed is going to be shaped anew"
-        elif context.mode != "OBJECT":
-            why = "Go back to Object Mode first"
-        elif is_baked(bed):
-            why = "The bed plays a baked session: free the bake in the Takes panel first"
-        elif bed.library is not None or bed.data.library is not None:
-            why = "The bed is linked from another file: make it local first (Object > Relations)"
-        else:
-            why = cls.missing(context, bed)
-        if why:
-            cls.poll_message_set(why)
-        return not why
+        why = (
+            no_bed(context)
+            or session_runs(context, "Stop the session first: the bed is going to be shaped anew")
+            or edited(context)
+            or baked(context)
+            or linked(context)
+            or cls.missing(context, bed_of(context))
+        )
+        return allowed(cls, why)
 
     @classmethod
     def missing(cls, context: Any, bed: Any) -> str:

@@ -10,17 +10,10 @@ from ..core.errors import DigiclayError
 from ..core.shape import Shape
 from ..core.shape_text import packed
 from ..device.view import bed_of
-from ..live import running
 from ..settings import properties
+from .reasons import allowed, no_bed, session_runs
 
 __all__ = ["KeepShape", "RemoveShape"]
-
-
-def declined(operator: Any, why: str) -> bool:
-    """Say why an operator declines; tell whether it need not."""
-    if why:
-        operator.poll_message_set(why)
-    return not why
 
 
 class KeepShape(bpy.types.Operator):  # type: ignore[misc]
@@ -33,10 +26,7 @@ class KeepShape(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed without a running session is needed."""
-        bed = bed_of(context)
-        if bed is None:
-            return declined(cls, "Select a bed or its fingertip first")
-        return declined(cls, "Stop the session first" if running.of(bed) is not None else "")
+        return allowed(cls, no_bed(context) or session_runs(context))
 
     def execute(self, context: Any) -> set[str]:
         """Keep the heights."""
@@ -64,12 +54,7 @@ class RemoveShape(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed with a shape is needed, and no running session."""
-        bed = bed_of(context)
-        if bed is None:
-            return declined(cls, "Select a bed or its fingertip first")
-        if running.of(bed) is not None:
-            return declined(cls, "Stop the session first")
-        return declined(cls, "" if bed.digiclay.use_shape else "The bed has no shape")
+        return allowed(cls, no_bed(context) or session_runs(context) or _no_shape(context))
 
     def execute(self, context: Any) -> set[str]:
         """Forget it."""
@@ -78,3 +63,8 @@ class RemoveShape(bpy.types.Operator):  # type: ignore[misc]
         settings.shape.heights = ""
         settings.shape.file = Shape().file
         return {"FINISHED"}
+
+
+def _no_shape(context: Any) -> str:
+    """The bed displays nothing."""
+    return "" if bed_of(context).digiclay.use_shape else "The bed has no shape"

@@ -12,21 +12,9 @@ from ..core.skins import SKINS
 from ..device.view import bed_of
 from ..exchange import formed_bed
 
-__all__ = ["FindingOptions", "SurfaceOptions", "needs_surface"]
+__all__ = ["FindingOptions", "SurfaceOptions", "chosen", "sentence"]
 
 MODEL, FINDING = quantities(Model), quantities(Finding)
-
-
-def needs_surface(operator: Any, context: Any) -> bool:
-    """Tell whether there is a bed with a surface; if not, the operator says why."""
-    bed = bed_of(context)
-    if bed is None:
-        operator.poll_message_set("Select a bed of Digital Clay, or its fingertip")
-        return False
-    if len(bed.data.vertices) < 4:
-        operator.poll_message_set("A bed needs at least 2 x 2 pins to have a surface")
-        return False
-    return True
 
 
 def sentence(text: str) -> str:

@@ -11,20 +11,9 @@ from ..core.scene_table import text
 from ..core.take import as_scene
 from ..device.view import bed_of
 from ..recorded import takes
+from .reasons import allowed, no_bed, no_take
 
-__all__ = ["ExportTake", "RemoveTake", "needs_take"]
-
-
-def needs_take(operator: Any, context: Any) -> bool:
-    """Tell whether the active bed has a take; if not, the operator says why."""
-    bed = bed_of(context)
-    if bed is None:
-        operator.poll_message_set("Select a bed or its fingertip first")
-        return False
-    if not takes.entries(bed):
-        operator.poll_message_set("The bed has no take: record one in a session first")
-        return False
-    return True
+__all__ = ["ExportTake", "RemoveTake"]
 
 
 class ExportTake(bpy.types.Operator):  # type: ignore[misc]
@@ -43,7 +32,7 @@ class ExportTake(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed with a take is needed."""
-        return needs_take(cls, context)
+        return allowed(cls, no_bed(context) or no_take(context))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the file, named after the take."""
@@ -84,7 +73,7 @@ class RemoveTake(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed with a take is needed."""
-        return needs_take(cls, context)
+        return allowed(cls, no_bed(context) or no_take(context))
 
     def execute(self, context: Any) -> set[str]:
         """Remove it."""

@@ -5,8 +5,9 @@ from typing import Any
 
 from ..compat import bpy
 from ..device.view import bed_of
-from ..live import running, sculpting
+from ..live import recovery, running, sculpting
 from ..recorded import takes
+from .reasons import allowed
 
 __all__ = ["KeepTake", "RecordTake"]
 
@@ -16,19 +17,15 @@ class RecordTake(bpy.types.Operator):  # type: ignore[misc]
 
     bl_idname = "digiclay.take_record"
     bl_label = "Record Take"
-    bl_options = {"REGISTER"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A running session that does not record yet is needed."""
         session = running.of(bed_of(context))
         if session is None:
-            cls.poll_message_set("Start a session first")
-            return False
-        if session.recording is not None:
-            cls.poll_message_set("A take is being recorded already")
-            return False
-        return True
+            return allowed(cls, "Start a session first")
+        return allowed(cls, "A take is being recorded already" if session.recording is not None else "")
 
     def execute(self, context: Any) -> set[str]:
         """Begin to record."""
@@ -51,13 +48,12 @@ class KeepTake(bpy.types.Operator):  # type: ignore[misc]
     def poll(cls, context: Any) -> bool:
         """A session that records is needed."""
         session = running.of(bed_of(context))
-        if session is None or session.recording is None:
-            cls.poll_message_set("Record a take first")
-            return False
-        return True
+        records = session is not None and session.recording is not None
+        return allowed(cls, "" if records else "Record a take first")
 
     def execute(self, context: Any) -> set[str]:
         """Keep it."""
+        recovery.take_back()
         bed = bed_of(context)
         session = running.of(bed)
         take = takes.recorded(session)

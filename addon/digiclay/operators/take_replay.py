@@ -20,8 +20,7 @@ from ..live import bed_state, sculpting, tick
 from ..live.running import Running
 from ..recorded import takes
 from ..settings import properties
-from .bake import needs_idle_bed
-from .take_export import needs_take
+from .reasons import allowed, no_bed, no_take, session_runs
 
 __all__ = ["ReplayTake"]
 
@@ -47,7 +46,8 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
     @classmethod
     def poll(cls, context: Any) -> bool:
         """A bed with a take and without a session is needed."""
-        return needs_idle_bed(cls, context) and needs_take(cls, context)
+        why = no_bed(context) or session_runs(context, "Stop the session on this bed first")
+        return allowed(cls, why or no_take(context))
 
     def execute(self, context: Any) -> set[str]:
         """Play it without showing anything but its end."""

@@ -130,7 +130,10 @@ def _room(area: Any, region: Any) -> Room:
 
 
 def _draw() -> None:
-    """Draw the overlay into the region Blender is drawing."""
+    """Draw the overlay into the region Blender is drawing.
+
+    A quad view has four; what is written stands in the one that can be turned, picked pins are marked in all.
+    """
     from .draw import draw  # needs a graphics card: not there in the background
 
     context = bpy.context
@@ -143,7 +146,9 @@ def _draw() -> None:
     colours = palettes.PALETTES[preferences.of(context).palette]
     chosen = look(tuple(theme.inner[:3]), tuple(theme.text))
     scale = settings.system.ui_scale
-    picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
+    picture = Picture()
+    if context.region_data == context.space_data.region_3d:
+        picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 from ..device.view import bed_of
 
-__all__ = ["CATEGORY", "Panel", "bed_of"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "lines"]
 
 CATEGORY = "Digital Clay"
+#: Letters a line of the sidebar holds at its usual width.
+LINE = 36
 
 
 class Panel:
@@ -26,3 +29,11 @@ class Panel:
     def poll(cls, context: Any) -> bool:
         """Show the panel when there is a bed it can be about."""
         return bed_of(context) is not None
+
+
+def lines(layout: Any, words: str, icon: str) -> None:
+    """Draw words on as many lines as they need."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(words, LINE)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")

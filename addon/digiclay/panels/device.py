@@ -6,9 +6,10 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.scene_table import PRESETS
+from ..live import running
 from ..settings import own_presets, properties
 from ..settings.declared import title
-from .base import Panel, bed_of
+from .base import Panel, bed_of, lines
 from .section import section_panel
 
 __all__ = ["CLASSES", "Device", "Presets", "Start"]
@@ -27,11 +28,12 @@ class Start(Panel, bpy.types.Panel):  # type: ignore[misc]
         return bed_of(context) is None
 
     def draw(self, context: Any) -> None:
-        """Draw the hint."""
+        """Draw the hint, and what was told last: a session may have ended with the file it was of."""
         column = self.layout.column()
         column.label(text="Select a bed or its fingertip,")
         column.label(text="or add a new device:")
         column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
+        lines(self.layout, running.said(), "INFO")
 
 
 class Presets(bpy.types.Menu):  # type: ignore[misc]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import Any
 
 from ..compat import bpy
 from ..live import bed_state, running
 from ..live.running import Running
-from .base import Panel, bed_of
+from .base import Panel, bed_of, lines
 
 __all__ = ["CLASSES", "Session"]
-
-#: Letters a line of the sidebar holds at its usual width.
-LINE = 42
 
 
 class Session(Panel, bpy.types.Panel):  # type: ignore[misc]
@@ -39,7 +35,7 @@ class Session(Panel, bpy.types.Panel):  # type: ignore[misc]
             _numbers(self.layout, session)
         said = session.waits and f"Waits: {session.waits}" if session else running.said()
         if said:
-            _lines(self.layout, said, "ERROR" if session else "INFO")
+            lines(self.layout, said, "ERROR" if session else "INFO")
 
 
 def _buttons(column: Any, session: Running) -> None:
@@ -73,14 +69,6 @@ def _numbers(layout: Any, session: Running) -> None:
         column.label(text=f"Solver error: {height:.2g} µm, {force:.2g} mN")
     if session.path is not None:
         column.label(text=f"Recording: {(len(session.path) - 1) * period:.1f} s", icon="REC")
-
-
-def _lines(layout: Any, words: str, icon: str) -> None:
-    """Draw words on as many lines as they need."""
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(words, LINE)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
 CLASSES = (Session,)

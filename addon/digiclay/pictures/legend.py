@@ -24,6 +24,10 @@ Colour = tuple[float, float, float]
 INK, FADED = (0.10, 0.12, 0.15), (0.30, 0.33, 0.37)
 #: Where the left edge of what is written is, in half widths.
 LEFT = -0.94
+#: How low the legend may reach, in half heights: below it a film has its strip.
+LOWEST = -0.50
+#: Sizes of letters that can still be read, pixels: ordinary ones, what must be read beside them, and notes.
+READ, READ_BESIDE, READ_NOTE = 11.0, 10.0, 9.0
 #: What Workbench's studio light leaves of a colour that looks straight at the camera, measured.
 STUDIO = 0.48
 #: How much farther away the next layer behind is, as a part of the distance.
@@ -57,9 +61,29 @@ class Front:
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
 
     @property
+    def pixel(self) -> float:
+        """Size of a pixel of the picture, Blender units."""
+        return 2.0 * self.width / self.scene.render.resolution_x
+
+    @property
     def letter(self) -> float:
-        """Size of ordinary letters."""
-        return min(0.056 * self.height, 0.040 * self.width)
+        """Size of ordinary letters; in a small picture large enough to be read, as far as it has room."""
+        usual = min(0.056 * self.height, 0.040 * self.width)
+        return max(usual, min(READ * self.pixel, 0.11 * self.height, 0.07 * self.width))
+
+    @property
+    def note(self) -> float:
+        """Size of what explains ordinary letters."""
+        return 0.70 * self.letter
+
+    def readable(self, size: float) -> float:
+        """Return a size of letters below the ordinary one, enlarged as far as it must be to be read."""
+        return max(size, min(READ_BESIDE * self.pixel, self.letter))
+
+    @property
+    def explains(self) -> bool:
+        """Whether notes could be read."""
+        return self.note >= READ_NOTE * self.pixel
 
     def put(self, part: Any, x: float, y: float, colour: Colour, layer: int = 0) -> Any:
         """Hang an object at a place of the plane; layers with a higher number lie behind."""
@@ -90,27 +114,31 @@ class Front:
 
 
 def of_modes(front: Front, modes: Sequence[Mode]) -> None:
-    """List modes down the picture's left side, each with a dot of its colour."""
-    size = front.letter
+    """List modes down the picture's left side, each with a dot of its colour; small pictures explain none."""
+    size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
     disc = shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
     left, y = LEFT * front.width, 0.86 * front.height
     for mode in modes:
-        name, lines = mode.name.lower().replace("_", " "), textwrap.wrap(MEANINGS[mode], 26)
+        name = mode.name.lower().replace("_", " ")
+        lines = textwrap.wrap(MEANINGS[mode], 26) if front.explains else []
         for radius, colour, layer in ((0.42, palettes.shown(mode), 0), (0.47, FADED, 1)):
             dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
             dot.scale = (radius * size,) * 3
             front.put(dot, left, y + 0.33 * size, colour, layer)
-        x, small = left + 0.95 * size, 0.70 * size
+        x = left + 0.95 * size
         front.write(name, size, x, y, INK)
-        front.write("\n".join(lines), small, x, y - 1.25 * small, FADED)
-        y -= (1.25 + len(lines)) * small + 1.25 * size
+        if lines:
+            front.write("\n".join(lines), small, x, y - 1.25 * small, FADED)
+            y -= (1.25 + len(lines)) * small
+        y -= 1.25 * size
 
 
 def of_forces(front: Front) -> None:
     """Draw the levels of force as a bar of colours down the picture's left side, their forces beside it."""
     size, count = front.letter, 1 + len(heat.COLOURS)
-    left, top, step = LEFT * front.width, 0.78 * front.height, 0.95 * size
+    left, top = LEFT * front.width, 0.78 * front.height
+    step = min(0.95 * size, (top - LOWEST * front.height) / count)
     front.write("force on a pin", size, left - 0.4 * size, top + 0.7 * size, INK)
     low = top - step * count
     edge = 0.05 * size
@@ -118,7 +146,7 @@ def of_forces(front: Front) -> None:
     for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS)):
         y = low + step * level
         front.box(f"level {level}", (left, y), (left + size, y + step), colour, 0)
-    x, small = left + 1.5 * size, 0.70 * size
+    x, small = left + 1.5 * size, front.readable(front.note)
     for level in range(0, count, 3):
         force = 1e3 * heat.TOP * level / len(heat.COLOURS)
         said = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")

@@ -90,8 +90,8 @@ def strip(front: Front, time: Floats, force: Floats, set_point: float | None) ->
         faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(len(place) - 1)]
         area = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, height), faces)))
         areas.append(front.put(area, left, bottom, colour, layer))
-    thick = 0.010 * full
-    size = 0.80 * front.letter
+    thick = max(0.010 * full, 0.5 * front.pixel)
+    size = front.readable(0.80 * front.letter)
     above = bottom + rise + 0.35 * size
     if set_point is not None:
         at = bottom + set_point * rise / top

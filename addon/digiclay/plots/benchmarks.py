@@ -5,15 +5,11 @@ Colours are Okabe and Ito's palette; markers and line styles say the same once m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from .figure import empty, save
-
-if TYPE_CHECKING:  # only named in annotations
-    from ..commands.benchmark_problems import Work
-    from ..commands.benchmark_scale import Size
-    from ..commands.benchmark_stack import Size as StackSize
 
 __all__ = ["precision", "scale", "stack"]
 
@@ -31,7 +27,35 @@ STYLE: dict[str, Any] = {
 }  # fmt: skip
 
 
-def precision(work: list[Work], out: Path) -> Path:
+class Work(Protocol):
+    """A run of `precision`: its largest error of height, m, and its CPU time, s."""
+
+    problem: str
+    method: str
+    height_error: float
+    seconds: float
+
+
+class Cost(Protocol):
+    """A bed of `scale`: the median and the mean of a control period, s."""
+
+    pins: int
+    period: float
+    mean: float
+
+
+class Gain(Protocol):
+    """A study of `stack`: CPU times of a run, s, each alone and of many in one call."""
+
+    study: str
+    runs: int
+    alone: float
+    stacked: float
+    judged_alone: float
+    judged_stacked: float
+
+
+def precision(work: Sequence[Work], out: Path) -> Path:
     """Draw the work-precision plot, one panel a problem, and return its path."""
     names = list(dict.fromkeys(one.problem for one in work))
     columns = min(3, len(names))
@@ -54,7 +78,7 @@ def precision(work: list[Work], out: Path) -> Path:
         return _written(figure, out)
 
 
-def _panel(panel: Any, work: list[Work]) -> None:
+def _panel(panel: Any, work: Sequence[Work]) -> None:
     """Draw one problem: error of height over CPU time."""
     for method, (colour, marker, line) in LOOKS.items():
         own = [one for one in work if one.method == method and 0.0 < one.height_error < 2e-3]
@@ -69,7 +93,7 @@ def _panel(panel: Any, work: list[Work]) -> None:
     panel.set_ylabel("largest height error, µm")
 
 
-def scale(sizes: list[Size], out: Path) -> Path:
+def scale(sizes: Sequence[Cost], out: Path) -> Path:
     """Draw a control period's cost over the number of pins, and return the path."""
     with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
@@ -87,7 +111,7 @@ def scale(sizes: list[Size], out: Path) -> Path:
         return _written(figure, out)
 
 
-def stack(sizes: list[StackSize], out: Path) -> Path:
+def stack(sizes: Sequence[Gain], out: Path) -> Path:
     """Draw how many times the runs a second a stack comes to, over its runs, and return the path."""
     with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()

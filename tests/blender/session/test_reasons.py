@@ -7,12 +7,38 @@ from typing import Any
 import bpy
 import pytest
 from digiclay import operators
+from digiclay.device import view
+from digiclay.live import tick
 
 from tests.blender.session.live import Clock, press, started
 
 NAMES = sorted(kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator))
 #: What Blender says of an operator that says nothing.
 NOTHING = "failed, context is incorrect"
+#: What is said of a bed at rest in the background, and of one with a session that has formed something.
+AT_REST = {
+    "digiclay.bake_free": "The bed has no bake",
+    "digiclay.clear_pins": "No pins are picked",
+    "digiclay.forget_surface": "Features are measured from the bed at rest already",
+    "digiclay.session": "A live session needs a window; takes can be baked without",
+    "digiclay.session_pause": "No session runs on the active bed: start one first",
+    "digiclay.session_reset": "The bed is at rest already",
+    "digiclay.shape_from_object": (
+        "Select the object first, then the bed with Shift: its upper side is displayed"
+    ),
+    "digiclay.shape_remove": "The bed has no shape",
+    "digiclay.take_keep": "Record a take first",
+    "digiclay.take_record": "Start a session first",
+    "digiclay.take_replay": "The bed has no take: record one in a session first",
+}
+IN_A_SESSION = {
+    "digiclay.bake": "Stop the session on this bed first",
+    "digiclay.rebuild": "Stop the session first: its pins cannot be exchanged",
+    "digiclay.session": "A session runs on this bed already: Esc stops it",
+    "digiclay.shape_from_file": "Stop the session first: the bed is going to be shaped anew",
+    "digiclay.shape_keep": "Stop the session first",
+    "digiclay.take_replay": "Stop the session on this bed first",
+}
 
 
 def refused(name: str) -> str:
@@ -49,6 +75,28 @@ def test_in_a_session_what_must_wait_for_its_end_says_so(bed: Any, clock: Clock)
     started(bed)
     press(bed, clock)
     check(declining(), 5)
+
+
+def test_the_reasons_at_rest_name_what_is_missing(bed: Any) -> None:
+    assert AT_REST.items() <= declining().items()
+
+
+def test_the_reasons_in_a_session_name_the_session(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    assert IN_A_SESSION.items() <= declining().items()
+
+
+def test_a_bed_being_edited_is_not_reset_though_its_fingertip_is_active(bed: Any, clock: Clock) -> None:
+    started(bed)
+    press(bed, clock)
+    tick.stop(bed.session_uid)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.objects.active = view.fingertip_of(bed)
+    assert bpy.context.mode == "OBJECT"
+    assert refused("digiclay.session_reset") == "Go back to Object Mode first"
+    bpy.context.view_layer.objects.active = bed
+    bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def test_in_edit_mode_what_needs_object_mode_says_so(bed: Any) -> None:

@@ -11,17 +11,18 @@ import numpy as np
 from ..assembly import assemble
 from ..physics import Cell
 from ..scene import Scene
+from ..steppers.bernoulli_plan import BernoulliPlan
 from ..system import System
 from .columns import kind, numbers
 from .control import RunByRun, StackedController
 from .gathering import Gathering
-from .physics import Alike, Movement, cell_of_all, touches
+from .physics import Alike, Extrapolated, Movement, cell_of_all, touches
 from .simulation import Stack
 
 __all__ = ["STACKED", "put_together", "structure", "why_not"]
 
-#: The stepper that knows how to move cells whose numbers differ from run to run.
-CLOSED_FORM = "bernoulli"
+#: The steppers that know how to move cells whose numbers differ from run to run.
+CLOSED_FORM = ("bernoulli", "richardson")
 
 #: Parts that decide how cells move.
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
@@ -46,8 +47,8 @@ def why_not(scene: Scene) -> str:
 def structure(scene: Scene) -> Any:
     """Return what scenes must have in common to stand in one stack; see also `why_not`.
 
-    With the closed-form step it is the kinds of the parts, not their numbers. The other steppers know
-    no runs, so for them all cells must be alike.
+    With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
+    The other steppers know no runs, so for them all cells must be alike.
 
     Raises
     ------
@@ -62,11 +63,21 @@ def structure(scene: Scene) -> Any:
         scene.recorder,
         scene.simulation.stepper,
     )
-    if scene.simulation.stepper != CLOSED_FORM:
+    if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
     system = assemble(scene)
-    nodes = tuple((part.start, part.stop) for part in system.plan.nodes)
+    nodes = tuple((part.start, part.stop) for plan in _plans(system) for part in plan.nodes)
     return (*common, kind(physics), system.rows, nodes, system.instants.size, _laminar(system))
+
+
+def _plans(system: System) -> tuple[BernoulliPlan, ...]:
+    """Return the plans of closed-form steps, the coarse one first; none with another stepper."""
+    match system.stepper.name:
+        case "bernoulli":
+            return (system.plan,)
+        case "richardson":
+            return system.plan.coarse, system.plan.fine
+    return ()
 
 
 def put_together(systems: Sequence[System]) -> Stack:
@@ -95,11 +106,13 @@ def _laminar(system: System) -> bool:
 def _movement(systems: Sequence[System], cell: Cell) -> Movement:
     """Return how the cells of all runs are moved."""
     first = systems[0]
-    if first.stepper.name != CLOSED_FORM or all(_as(first, system) for system in systems):
+    plans = tuple(zip(*(_plans(system) for system in systems), strict=True))
+    if not plans or (len(plans) == 1 and all(_as(first, system) for system in systems)):
         return Alike(first.stepper, first.plan)
     from .bernoulli import unlike
 
-    return unlike(cell, [system.plan for system in systems])
+    coarse, *fine = (unlike(cell, of_all) for of_all in plans)
+    return Extrapolated(cell, coarse, *fine) if fine else coarse
 
 
 def _as(first: System, system: System) -> bool:
@@ -108,7 +121,8 @@ def _as(first: System, system: System) -> bool:
     if own.touch and other.touch:
         own = replace(own, touch=replace(own.touch, fingertip=other.touch.fingertip))
     alike = own == other and system.period == first.period
-    return alike and np.array_equal(system.plan.response, first.plan.response)
+    plans = zip(_plans(system), _plans(first), strict=True)
+    return alike and all(np.array_equal(one.response, another.response) for one, another in plans)
 
 
 def _controller(systems: Sequence[System], cell: Cell) -> StackedController | None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,9 +14,9 @@ from ..closed_form import TINY, careful, crossed, pressed
 from ..contact import LARGEST_EXPONENT
 from ..physics import Cell
 from ..steppers.bernoulli_plan import BernoulliPlan
-from .columns import Floats, numbers
+from .columns import Floats, mapped, numbers
 
-__all__ = ["Unlike", "mapped", "unlike"]
+__all__ = ["Unlike", "unlike"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,9 @@ class Unlike:
     ----------
     cell : Cell
         Of all runs.
-    response, moves, path : ndarray (.., b), or without the last axis where all runs have the same
+    response, path : ndarray (.., b), or without the last axis where all runs have the same
+    moves : tuple of ndarray (4, 2 g, b)
+        One a step, from its own Gauss points alone.
     nodes : tuple of slice
     weights : ndarray (g, 1, b)
         Divided by the area, s/m².
@@ -43,7 +44,7 @@ class Unlike:
 
     cell: Cell
     response: Floats
-    moves: Floats
+    moves: tuple[Floats, ...]
     path: Floats
     nodes: tuple[slice, ...]
     weights: Floats
@@ -57,26 +58,38 @@ class Unlike:
     hard: Floats
 
     def advance(self, driven: Floats, under: Floats) -> None:
-        """Move a block of cells on, in place; see `physics.Movement`."""
-        cell, k, count = self.cell, under.shape[1], len(self.nodes)
-        openings = mapped(self.response, driven[cell.lag_rows.start :])
-        lag = driven[cell.lag_rows]
-        lag[:] = openings[len(openings) - len(lag) :]
-        openings = openings[:-1]
-        # Below the openings' own conductances those with the openings' signs: the sign picks the reservoir.
-        conductance = np.empty((2 * len(openings), *openings.shape[1:]))
-        size, signed = conductance[: len(openings)], conductance[len(openings) :]
-        size[:] = self._unloaded(openings)
-        np.copysign(size, openings, signed)
-        free = mapped(self.moves[:count], conductance)
-        if k:
-            loaded = mapped(self.moves[count:], conductance[:, :k])
-            self._under_fingers(driven, under, openings[:, :k], free, loaded)
-        height = driven[0, k:]
-        for rise in free[:, k:]:
-            rise += height
-            np.maximum(rise, 0.0, height)
-            np.minimum(height, cell.actuator.stroke, height)
+        """Move a block of cells on, in place; see `physics.Movement`.
+
+        Step by step from opening to height: what a step needs of all cells fits into a core's cache.
+        """
+        cell, k = self.cell, under.shape[1]
+        lag, begun = driven[cell.lag_rows], driven[cell.lag_rows.start :].copy()
+        lag[:] = mapped(self.response[len(self.response) - len(lag) :], begun)
+        height, path, work = (
+            driven[0],
+            mapped(self.path, under),
+            np.empty((cell.pulp_rows.stop + 2, *under.shape[1:])),
+        )
+        exponent = height[:k] * self.exponent
+        exponent -= self.offset
+        exponent -= path[2 * len(self.nodes)]
+        work[:-3] = driven[cell.pulp_rows, :k]
+        _tension(exponent, work[-1])
+        for s, own in enumerate(self.nodes):
+            openings = mapped(self.response[own], begun)
+            # Below the openings' own conductances those with their signs: the sign picks the reservoir.
+            conductance = np.empty((2 * len(openings), *openings.shape[1:]))
+            size, signed = conductance[: len(openings)], conductance[len(openings) :]
+            size[:] = self._unloaded(openings)
+            np.copysign(size, openings, signed)
+            moves, free = self.moves[s], height[k:]
+            if k:
+                moved = mapped(moves, conductance[:, :k])
+                exponent = self._pressed(s, openings[:, :k], moved, path, exponent, height[:k], work)
+            free += mapped(moves[:1], conductance[:, k:])[0]
+            np.maximum(free, 0.0, free)
+            np.minimum(free, cell.actuator.stroke, free)
+        driven[cell.pulp_rows, :k] = work[:-3]
 
     def _unloaded(self, openings: Floats) -> Floats:
         """Return the conductance of a valve without load, m³/(s Pa)."""
@@ -86,89 +99,101 @@ class Unlike:
             return conductance
         return flow.conductance(openings, self.cell.supply.pressure(openings))
 
-    def _under_fingers(
-        self, driven: Floats, under: Floats, openings: Floats, free: Floats, loaded: Floats
-    ) -> None:
-        """Move the cells under the fingers on step by step, and their pulp with them."""
-        k, rows, count, m = under.shape[1], self.cell.pulp_rows, len(free), self.exponent
-        path = mapped(self.path, under)
-        height = driven[0, :k].copy()
-        exponent = height * m
-        exponent -= self.offset
-        exponent -= path[2 * count]
-        # The filters, then the tension at the start of a step, on average and at its end.
-        work = np.empty((rows.stop + 2, *height.shape))
+    def _pressed(
+        self,
+        s: int,
+        openings: Floats,
+        moved: Floats,
+        path: Floats,
+        exponent: Floats,
+        height: Floats,
+        work: Floats,
+    ) -> Floats:
+        """Move the cells under the fingers on by step s, and their pulp with them; return the new exponent.
+
+        Parameters
+        ----------
+        s : int
+        openings : ndarray (g, k, b)
+            At the step's Gauss points.
+        moved : ndarray (4, k, b)
+            What `moves` makes of them.
+        path : ndarray (3 s + 1, k, b)
+            See `steppers.bernoulli_plan`.
+        exponent, height : ndarray (k, b)
+            At the step's start, 1 and m; the height is brought up to date.
+        work : ndarray (f + 3, k, b)
+            The filters, then the tension at the start of a step, on average and at its end; brought up
+            to date.
+        """
+        m, count, (rise, slip, bow, decay) = self.exponent, len(self.nodes), moved
         filters, first, mean, last = work[:-3], work[-3], work[-2], work[-1]
-        filters[:] = driven[rows, :k]
-        _tension(exponent, last)
-        for s in range(count):
-            rise, lift = free[s, :k], path[s]
-            first[:] = last
-            slip = loaded[s] - lift
-            bow = loaded[count + s] - path[count + s]
-            decay = loaded[2 * count + s] + TINY
-            lost = mapped(self.lost[s], work[:-2])[0]
-            relaxed = lost + 1.0
-            idle = first <= lost
-            stiffness = decay.copy()
-            np.putmask(stiffness, idle, TINY)
+        lift = path[s]
+        first[:] = last
+        slip -= lift
+        bow -= path[count + s]
+        decay += TINY
+        lost = mapped(self.lost[s], work[:-2])[0]
+        relaxed = lost + 1.0
+        idle = first <= lost
+        stiffness = decay.copy()
+        np.putmask(stiffness, idle, TINY)
+        push = stiffness * relaxed
+        growth = push + slip
+        growth += TINY
+        end: Floats = exponent + slip
+        bent = exponent + bow
+        strained = np.maximum(bent, end) >= self.hard
+        if not np.count_nonzero(strained):
+            relief = pressed(np.exp(bent, bent), growth, stiffness)
+            np.divide(relief, stiffness, mean)
+        else:
+            decay, rise[:] = self._loaded_valve(s, openings, exponent, relaxed, lift)
+            slip = m * rise - lift
+            stiffness = np.where(idle, TINY, decay)
             push = stiffness * relaxed
-            growth = push + slip
-            growth += TINY
-            end, bent = exponent + slip, exponent + bow
-            strained = np.maximum(bent, end) >= self.hard
-            if not np.count_nonzero(strained):
-                relief = pressed(np.exp(bent), growth, stiffness)
-                np.divide(relief, stiffness, mean)
-            else:
-                decay, rise[:] = self._loaded_valve(s, openings, exponent, relaxed, lift)
-                slip = m * rise - lift
-                stiffness = np.where(idle, TINY, decay)
-                push = stiffness * relaxed
-                np.putmask(bow, strained, 0.0)
-                relief, mean[:] = careful(exponent + bow, push + slip + TINY, stiffness)
-                end = exponent + slip
-            push -= relief
-            mean -= 1.0
-            end += push
+            np.putmask(bow, strained, 0.0)
+            relief, mean[:] = careful(exponent + bow, push + slip + TINY, stiffness)
+            end = exponent + slip
+        push -= relief
+        mean -= 1.0
+        end += push
+        _tension(end, last)
+        crossing = (last <= lost) != idle
+        if np.count_nonzero(crossing):
+            parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+            push[crossing], mean[crossing] = crossed(*parts)
+            end = exponent + slip + push
             _tension(end, last)
-            crossing = (last <= lost) != idle
-            if np.count_nonzero(crossing):
-                parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
-                push[crossing], mean[crossing] = crossed(*parts)
-                end = exponent + slip + push
-                _tension(end, last)
-            push /= m
-            rise += push
-            rise += height
-            np.maximum(rise, 0.0, height)
-            np.minimum(height, self.cell.actuator.stroke, height)
-            stopped = rise != height
-            if np.count_nonzero(stopped):
-                # The mean found above is that of a pin that no end stop holds.
-                end = m * height - self.offset - path[2 * count + s + 1]
-                _tension(end, last)
-                np.putmask(mean, stopped, 0.5 * (first + last))
-            # Where the finger is not touched all through the step the mean is that of no tension.
-            np.maximum(mean, 0.0, mean)
-            # Of a tension that falls steeply a straight line would make a filter that pulls. The last row
-            # is the force.
-            np.maximum(mapped(self.transition[s], work)[:-1], 0.0, filters)
-            exponent = end
-        driven[0, :k] = height
-        driven[rows, :k] = filters
+        push /= m
+        rise += push
+        rise += height
+        np.maximum(rise, 0.0, height)
+        np.minimum(height, self.cell.actuator.stroke, height)
+        stopped = rise != height
+        if np.count_nonzero(stopped):
+            # The mean found above is that of a pin that no end stop holds.
+            end = m * height - self.offset - path[2 * count + s + 1]
+            _tension(end, last)
+            np.putmask(mean, stopped, 0.5 * (first + last))
+        # Where the finger is not touched all through the step the mean is that of no tension.
+        np.maximum(mean, 0.0, mean)
+        # Of a tension that falls steeply a straight line would make a filter that pulls. The last row
+        # is the force.
+        np.maximum(mapped(self.transition[s], work)[:-1], 0.0, filters)
+        return end
 
     def _loaded_valve(
         self, s: int, openings: Floats, exponent: Floats, relaxed: Floats, lift: Floats
     ) -> tuple[Floats, Floats]:
         """Return decay and free rise of step s where the load decides on the valve's branch."""
-        m, opening, weights = self.exponent, openings[self.nodes[s]], self.weights[self.nodes[s]]
+        m, weights = self.exponent, self.weights[self.nodes[s]]
         to_load = self.to_load * self.shares[s]
-        pressure = self.cell.supply.pressure(opening)
+        pressure = self.cell.supply.pressure(openings)
         grown = middle = _grown(exponent)
         for _ in range(2):
             load = to_load * np.maximum(middle - relaxed, 0.0)
-            conductance = self.cell.flow.conductance(opening, pressure - load)
+            conductance = self.cell.flow.conductance(openings, pressure - load)
             decay = m * to_load * (weights * conductance).sum(axis=0) + TINY
             free = (weights * conductance * pressure).sum(axis=0)
             slip = m * free - lift
@@ -182,11 +207,11 @@ class Unlike:
 def unlike(cell: Cell, plans: Sequence[BernoulliPlan]) -> Unlike:
     """Put the closed-form steps of some runs together: of the same nodes, and laminar all or none of them."""
     first, steps = plans[0], range(len(plans[0].nodes))
-    maps: dict[str, Any] = {
-        name: _of_all([getattr(plan, name) for plan in plans]) for name in ("response", "moves", "path")
-    }
     return Unlike(
         cell=cell,
+        response=_of_all([plan.response for plan in plans]),
+        moves=tuple(_of_all([_own_moves(plan, s) for plan in plans]) for s in steps),
+        path=_of_all([plan.path for plan in plans]),
         nodes=first.nodes,
         weights=np.stack([plan.weights[:, None] / plan.cell.actuator.area for plan in plans], axis=-1),
         lost=tuple(_of_all([plan.lost[s][None] for plan in plans]) for s in steps),
@@ -197,8 +222,14 @@ def unlike(cell: Cell, plans: Sequence[BernoulliPlan]) -> Unlike:
         offset=numbers([plan.numbers[1] for plan in plans]),
         to_load=numbers([plan.to_load for plan in plans]),
         hard=numbers([plan.numbers[-1] for plan in plans]),
-        **maps,
     )
+
+
+def _own_moves(plan: BernoulliPlan, step: int) -> Floats:
+    """Return what one step makes of its own Gauss points, shape (4, 2 g); see `BernoulliPlan.moves`."""
+    rows, both = plan.moves[step :: len(plan.nodes)], len(plan.weights)
+    own = np.arange(both)[plan.nodes[step]]
+    return rows[:, [*own, *(own + both)]]
 
 
 def _of_all(maps: Sequence[Floats]) -> Floats:
@@ -206,15 +237,6 @@ def _of_all(maps: Sequence[Floats]) -> Floats:
     if all(np.array_equal(one, maps[0]) for one in maps):
         return maps[0]
     return np.stack(maps, axis=-1)
-
-
-def mapped(maps: Floats, rows: Floats) -> Floats:
-    """Return rows (o, n, b) that a linear map, (o, i) or one a run (o, i, b), makes of rows (i, n, b)."""
-    if maps.ndim == 2:
-        flat: Floats = np.dot(maps, rows.reshape(len(rows), -1))
-        return flat.reshape(-1, *rows.shape[1:])
-    made: Floats = np.einsum("oib,inb->onb", maps, rows)
-    return made
 
 
 def _tension(exponent: Floats, out: Floats) -> None:

@@ -1,4 +1,4 @@
-"""The fingers of many runs: how they come, and their undersides."""
+"""The fingers of many runs: how they come, their undersides, and which cells they pass over."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..layout import Grid
 from ..system import System
 from ..touch import approach
 from ..trajectory import Trajectory
-from .columns import Floats
+from .columns import Floats, mapped
 
-__all__ = ["Fingers", "fingers", "undersides"]
+__all__ = ["Fingers", "Way", "fingers", "still_coming", "undersides", "way_over"]
+
+#: Control periods that are worked out at a time.
+CHUNK = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +28,14 @@ class Fingers:
 
     Attributes
     ----------
+    first : int
+        The first of these periods.
     forms : ndarray (t, 2 p, 6, b)
     join : ndarray (t, 2, p, 1, b)
     window : ndarray (t, 6, b)
     """
 
+    first: int
     forms: Floats
     join: Floats
     window: Floats
@@ -48,7 +56,16 @@ def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, c
     runs = list(zip(systems, ways, strict=True))
     alike = all(_same(run, runs[0]) for run in runs)
     known = [_approaches(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
-    return Fingers(*(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+    return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+
+
+def still_coming(
+    coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+) -> Fingers | None:
+    """Return how the fingers come in a period and some more: what is known, or worked out anew."""
+    if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
+        return coming
+    return fingers(systems, ways, period, CHUNK)
 
 
 def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
@@ -84,15 +101,11 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     ----------
     coming : Fingers
     period : int
-        Which of its periods.
+        One of these.
     place : ndarray (6, k, b)
     """
-    forms, (least, root) = coming.forms[period], coming.join[period]
-    if forms.shape[-1] == 1:
-        flat = np.dot(forms[..., 0], place.reshape(6, -1))
-        rows = flat.reshape(-1, *place.shape[1:])
-    else:
-        rows = np.einsum("pcb,ckb->pkb", forms, place)
+    forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
+    rows = mapped(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
     under: Floats = rows[: len(least)]
     np.maximum(under, least, under)
     np.sqrt(under, under)
@@ -100,3 +113,30 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     under *= under
     under += rows[len(least) :]
     return under
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A finger's way over a bed, at some times.
+
+    Attributes
+    ----------
+    time : ndarray (t,)
+        s.
+    fingertip : ndarray (t, 7)
+        Lowest point, m, and quaternion.
+    cells : ndarray of int (m,)
+        Those that are the nearest to it at some time, ascending.
+    """
+
+    time: Floats
+    fingertip: Floats
+    cells: NDArray[np.intp]
+
+
+def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
+    """Work out a finger's way at times (t,), s."""
+    tip = trajectory.poses(time)
+    places = np.unique(tip[:, :2], axis=0)
+    nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+    return Way(time, tip, np.unique(nearest))

@@ -5,7 +5,7 @@ The set is made anew for all runs together, as soon as it no longer does for one
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from .beds import NO_DISC, Beds, Cells, Disc, Gathered
 from .columns import Floats
 from .physics import Touches
 
-__all__ = ["Gathering", "reach", "taking_part"]
+__all__ = ["Gathering", "reach", "taken_along", "taking_part"]
 
 Flags = NDArray[np.bool_]
 #: Control periods after which the set is made anew, without the cells that have come to rest.
@@ -80,7 +80,7 @@ def taking_part(known: Gathering, beds: Beds, window: Floats | None, control: Di
     control : Disc
         What the controllers will command.
     """
-    held, grid, force = beds.gathered, known.grid, known.rows.force
+    held, grid = beds.gathered, known.grid
     near = NO_DISC if window is None else reach(window, held.peak)
     if beds.period < held.until and _inside(near, held.reach) and _inside(control, held.control):
         return held
@@ -92,15 +92,29 @@ def taking_part(known: Gathering, beds: Beds, window: Floats | None, control: Di
     touched, wanted = _cells(grid, near), moving
     wanted |= _cells(grid, control)
     cells, count = _ordered(np.broadcast_to(touched, wanted.shape), wanted)
-    taken = cells * moving.shape[1] + np.arange(moving.shape[1])
-    block = beds.rows.reshape(known.rows.count, -1).take(taken, axis=1)
-    block[force, count:] = 0.0
-    if count and known.touch:
-        waited = beds.period * known.period - beds.aged.take(taken[:count])
-        known.touch.age(block[known.cell.pulp_rows, :count], waited)
     place = grid.place(cells.ravel()).reshape(6, *cells.shape)
-    until = beds.period + KEPT
-    return Gathered(cells, count, block, beds.modes.take(taken), place, near, control, peak, until)
+    return _taken(
+        known,
+        beds,
+        Gathered(cells, count, held.block, held.mode, place, near, control, peak, beds.period + KEPT),
+    )
+
+
+def taken_along(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
+    """Return the cells that other beds have chosen, taken out of these; their arrays are used up."""
+    _put_back(known, beds)
+    return _taken(known, beds, chosen)
+
+
+def _taken(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
+    """Return a set with the rows and modes that these beds have there; the pulp over it is aged."""
+    near, taken = chosen.near, chosen.flat
+    block = beds.rows.reshape(known.rows.count, -1).take(taken, axis=1)
+    block[known.rows.force, near:] = 0.0
+    if near and known.touch:
+        waited = beds.period * known.period - beds.aged.take(taken[:near])
+        known.touch.age(block[known.cell.pulp_rows, :near], waited)
+    return replace(chosen, block=block, mode=beds.modes.take(taken))
 
 
 def _put_back(known: Gathering, beds: Beds) -> Flags:

@@ -14,7 +14,7 @@ from ..places import Stepper
 from ..touch import Touch
 from .columns import Floats, together
 
-__all__ = ["Alike", "Movement", "Touches", "cell_of_all", "touches"]
+__all__ = ["Alike", "Extrapolated", "Movement", "Touches", "cell_of_all", "touches"]
 
 
 #: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
@@ -59,6 +59,31 @@ def _pieces(first: int, end: int) -> Iterator[slice]:
     count = -(-(end - first) // PIECE)
     for i in range(count):
         yield slice(first + (end - first) * i // count, first + (end - first) * (i + 1) // count)
+
+
+@dataclass(frozen=True, eq=False)
+class Extrapolated:
+    """Richardson's form of a movement: whole steps against halves, see `steppers.richardson`.
+
+    Attributes
+    ----------
+    cell : Cell
+        Of all runs.
+    coarse, fine : Movement
+    """
+
+    cell: Cell
+    coarse: Movement
+    fine: Movement
+
+    def advance(self, driven: Floats, under: Floats) -> None:
+        """Move a block of cells on, in place; see `Movement`."""
+        coarse, y = driven.copy(), driven[: self.cell.rows]
+        self.coarse.advance(coarse, under)
+        self.fine.advance(driven, under)
+        y += (y - coarse[: self.cell.rows]) / 3.0
+        np.minimum(np.maximum(y[0], 0.0), self.cell.actuator.stroke, y[0])
+        np.maximum(y[self.cell.pulp_rows], 0.0, y[self.cell.pulp_rows])
 
 
 @dataclass(frozen=True, eq=False)

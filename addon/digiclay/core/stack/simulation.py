@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,10 +20,10 @@ from .beds import NO_DISC, Beds, Disc, Gathered
 from .columns import Floats, numbers
 from .control import StackedController
 from .fingers import Fingers, undersides
-from .gathering import Gathering, taking_part
+from .gathering import Gathering, taken_along, taking_part
 from .physics import Movement, Touches
 
-__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "kept"]
+__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "differences", "follow", "kept"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ def begin(stack: Stack) -> Beds:
     return beds.at_rest(stack.rows, stack.systems[0].grid.count, heights, memory)
 
 
-def advance(stack: Stack, state: Beds, coming: Fingers | None, at: int) -> Beds:
+def advance(stack: Stack, state: Beds, coming: Fingers | None) -> Beds:
     """Simulate one control period of all runs in the arrays of `state`, which is used up.
 
     Parameters
@@ -67,22 +68,68 @@ def advance(stack: Stack, state: Beds, coming: Fingers | None, at: int) -> Beds:
     stack : Stack
     state : Beds
     coming : Fingers or None
-        How the fingers come in some periods.
-    at : int
-        Which of these is to be simulated.
+        How the fingers come in some periods, this one among them.
     """
     memory, control = _attend(stack, state)
-    held = taking_part(stack.gathering, state, coming.window[at] if coming else None, control)
-    after = state.period + 1
-    if not held.cells.size:
-        return Beds(after, state.rows, state.modes, state.aged, held, memory)
-    instants, runs = stack.systems[0].instants.size, held.cells.shape[1]
-    near = held.place[:, : held.near]
-    under = undersides(coming, at, near) if coming and held.near else np.empty((instants, 0, runs))
-    memory = _command(stack, held, memory)
-    stack.movement.advance(held.block[stack.rows.driven], under)
-    _feel(stack, held, under)
-    return Beds(after, state.rows, state.modes, state.aged, held, memory)
+    window = coming.window[state.period - coming.first] if coming else None
+    held = taking_part(stack.gathering, state, window, control)
+    if held.cells.size:
+        memory = _command(stack, held, memory)
+        _move(stack, held, coming, state.period)
+    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, memory)
+
+
+def _move(stack: Stack, held: Gathered, coming: Fingers | None, period: int) -> None:
+    """Move the gathered cells on by a control period, and work out the forces at its end."""
+    count, driven = held.near, held.block[stack.rows.driven]
+    none = np.empty((stack.systems[0].instants.size, 0, held.cells.shape[1]))
+    under = undersides(coming, period, held.place[:, :count]) if coming and count else none
+    # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
+    valves = driven[stack.systems[0].cell.lag_rows.start :, count:]
+    awake = np.einsum("rwb,rwb->w", valves, valves)
+    chosen = np.concatenate([np.arange(count), count + np.flatnonzero(awake)])
+    moved = driven.take(chosen, axis=1)
+    stack.movement.advance(moved, under)
+    driven[:, chosen] = moved
+    if stack.touch and count:
+        near = held.block[:, :count]
+        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
+
+
+def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> Beds:
+    """Simulate the control period that other beds of the same runs have just done, under their commands.
+
+    Parameters
+    ----------
+    stack : Stack
+        Without a controller.
+    state : Beds
+        Used up.
+    coming : Fingers or None
+    leader : Beds
+        After the period. The cells that took part there do so here: the two differ by errors of the
+        integration, and a set of cells has room for far more.
+    """
+    held, rows = state.gathered, stack.rows
+    if held.cells is not leader.gathered.cells:
+        held = taken_along(stack.gathering, state, leader.gathered)
+    if held.cells.size:
+        _queue(held.block[rows.commands], leader.gathered.block[rows.command])
+        _move(stack, held, coming, state.period)
+    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, None)
+
+
+def differences(state: Beds, leader: Beds, rows: Rows) -> Floats:
+    """Return how far beds are from those they follow, shape (3, b).
+
+    Largest differences over the cells of height, m, and force, N; and that of the total force, N.
+    """
+    held = state.gathered
+    away = np.abs(held.block[0] - leader.gathered.block[0])
+    force = held.block[rows.force, : held.near] - leader.gathered.block[rows.force, : held.near]
+    total = np.abs(np.add.reduce(force))
+    largest = (np.maximum.reduce(part, initial=0.0) for part in (away, np.abs(force)))
+    return np.stack([*largest, total])
 
 
 def _attend(stack: Stack, state: Beds) -> tuple[Any, Disc]:
@@ -109,23 +156,24 @@ def _command(stack: Stack, held: Gathered, memory: Any) -> Any:
     memory, orders = stack.controller.command(memory, _measured(stack, held, len(held.cells)))
     held.block[rows.target] = orders.target
     held.mode[:] = orders.mode
-    commands = held.block[rows.commands]
-    for older, newer in pairwise(commands):
-        older[:] = newer
-    commands[-1] = orders.command
+    _queue(held.block[rows.commands], orders.command)
     return memory
 
 
-def _feel(stack: Stack, held: Gathered, under: Floats) -> None:
-    """Work out the forces at the end of the period."""
-    if stack.touch and held.near:
-        near = held.block[:, : held.near]
-        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
+def _queue(commands: Floats, newest: Floats) -> None:
+    """Put the newest commands behind those on their way, (q, w, b), in place."""
+    for older, newer in pairwise(commands):
+        older[:] = newer
+    commands[-1] = newest
 
 
 def broken(state: Beds) -> NDArray[np.bool_]:
     """Tell which runs, (b,), hold numbers that are not finite."""
-    finite: NDArray[np.bool_] = np.isfinite(state.gathered.block.sum(axis=(0, 1)))
+    block = state.gathered.block
+    # One sum tells that all is well, as it nearly always is.
+    if math.isfinite(np.add.reduce(block, axis=None)):
+        return np.zeros(block.shape[2], np.bool_)
+    finite: NDArray[np.bool_] = np.isfinite(block.sum(axis=(0, 1)))
     return ~finite
 
 

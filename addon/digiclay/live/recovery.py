@@ -1,0 +1,71 @@
+"""What is recorded stands in the file when that is saved, and is left for recovery when the file goes away.
+
+A recording under way is a value of this Blender, not of the file, until it ends: then it is a take. So a
+file that is saved meanwhile, also by Blender itself, has it as a take for the moment of saving. And a file
+that is closed with a recording it does not have is left, whole, in the folder in which *File > Recover >
+Auto Save* looks, as Blender does with what would be lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..compat import bpy
+from ..recorded import takes
+from . import running
+from .waiting import found
+
+__all__ = ["file", "leave", "lend", "take_back", "unsaved"]
+
+#: Takes that stand in beds for the moment of saving: uid and name of the bed, number of the take.
+_LENT: list[tuple[int, str, str]] = []
+
+
+def lend() -> None:
+    """Put what is being recorded into the beds, as takes: the file is about to be saved."""
+    take_back()
+    for session in running.all():
+        bed, take = found(session.uid, session.name), takes.recorded(session)
+        if bed is not None and take is not None:
+            _LENT.append((session.uid, session.name, takes.keep(bed, take).number))
+
+
+def take_back(path: str = "") -> None:
+    """Take it out of the beds again, since the recordings go on.
+
+    Parameters
+    ----------
+    path : str
+        The file that has been saved; empty when that has failed, or is not known.
+    """
+    while _LENT:
+        uid, name, number = _LENT.pop()
+        bed = found(uid, name)
+        if bed is None or number not in [entry.number for entry in takes.entries(bed)]:
+            continue  # undone in the meantime
+        takes.remove(bed, number)
+        session = running.of(bed)
+        # A copy saved elsewhere is not the file Blender asks about before it closes it.
+        if path and path == bpy.data.filepath:
+            keep = replace(session.recording, saved=session.recording.count)
+            running.put(replace(session, recording=keep))
+
+
+def unsaved() -> bool:
+    """Tell whether something was recorded that the file does not have."""
+    return any(session.recording is not None and session.recording.unsaved for session in running.all())
+
+
+def file() -> Path:
+    """Return the file that is left; the next one replaces it."""
+    return Path(bpy.app.tempdir).parent / "digiclay_recording.blend"
+
+
+def leave() -> str:
+    """Leave the open file, as it is now, for recovery; return words about it."""
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(file()), copy=True, check_existing=False)
+    except RuntimeError as error:
+        return f"It could not be left for recovery: {str(error).removeprefix('Error: ').strip()}"
+    return f"It can be had back with File > Recover > Auto Save: {file().name}"

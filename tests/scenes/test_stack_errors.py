@@ -1,0 +1,115 @@
+"""The errors a stack estimates of its runs are those that each run's own estimate comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import pytest
+from digiclay.core.accuracy import estimated
+from digiclay.core.scene import Scene
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.session import Result, run
+from digiclay.core.stack.assembly import STACKED, structure
+from digiclay.core.stack.session import judge_of, judge_together
+
+#: An estimate is the difference of two integrations under the same commands. Alone and in a stack both end in
+#: other last bits (sums in another order), some 1e-17 m and 1e-14 N, of heights of 4 cm and forces of 0.4 N.
+RELATIVE, ABSOLUTE = 1e-9, {"height": 1e-15, "force": 1e-12, "total_force": 1e-12}
+#: A sample of each method that stands in stacks.
+SAMPLES = {
+    "virtual_master": "ridge_mound_valley",
+    "cell_states": "ridge_mound_valley",
+    "elastic": "elastic_press",
+    "plastic": "plastic_press",
+    "force_display": "force_display",
+    "shape_display": "shape_display",
+}
+
+
+def scene(name: str, *settings: str) -> Scene:
+    """Return a sample with some settings, ``key=value``."""
+    return load(find(name), [Setting(*setting.split("=")) for setting in settings])
+
+
+def judged(scenes: Sequence[Scene]) -> list[Result]:
+    """Run scenes in a stack with their errors."""
+    assert len({structure(judge_of(one)) for one in scenes}) == 1
+    done = dict(judge_together(scenes, errors=True))
+    results = [done[number] for number in range(len(scenes))]
+    return [one for one in results if isinstance(one, Result)]
+
+
+def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
+    """Check the errors of every run against what is estimated of the run alone."""
+    for found, one in zip(judged(scenes), scenes, strict=True):
+        history = run(one).history
+        assert history is not None
+        alone = estimated(one, history)
+        assert alone is not None
+        assert alone.height > 1e-12  # there is something to estimate
+        for name, value in asdict(alone).items():
+            expected = pytest.approx(value, rel=RELATIVE, abs=ABSOLUTE[name])
+            assert found.metrics[f"{name}_error"] == expected, name
+
+
+@pytest.mark.parametrize("method", STACKED)
+def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
+    known = scene(SAMPLES[method], f"control.method={method}", "simulation.duration=1.5")
+    first, *others = known.trajectory.waypoints
+    scenes = []
+    for i in range(3):
+        x, y, z = first.position
+        way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
+        lasting = replace(known.simulation, duration=1.1 + 0.2 * i)
+        scenes.append(replace(known, trajectory=replace(known.trajectory, waypoints=way), simulation=lasting))
+    assert_estimated_as_alone(scenes)
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("control.force_gain", ("2", "8")),
+        ("fingertip.length", ("8e-3", "12e-3")),
+        ("contact.stiffness", ("150", "400")),
+        ("relaxation.times", ("[2e-3, 0.1, 1.0]", "[4e-3, 0.07, 1.4]")),
+        ("actuator.bore", ("1.8e-3", "2e-3")),
+        ("actuator.bore", ("0.2e-3", "0.3e-3")),  # the load makes the flow turbulent
+        ("supply.high", ("0.4e5", "0.6e5")),
+        ("valve.stroke", ("25e-6", "40e-6")),
+        ("valve_lag.time_constant", ("1e-3", "3e-3")),
+        ("delay.dead_time", ("1e-3", "2e-3")),
+        ("fluid.viscosity", ("1e-6", "3e-6")),
+        ("simulation.control_period", ("4e-3", "5e-3")),
+    ],
+)
+def test_runs_with_parameters_of_their_own_are_as_exact_as_alone(key: str, values: Sequence[str]) -> None:
+    assert_estimated_as_alone([scene("tap", f"{key}={value}") for value in values])
+
+
+@pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
+def test_runs_of_any_stepper_are_as_exact_as_alone(stepper: str) -> None:
+    settings = (f"simulation.stepper={stepper}", "simulation.physics_step=1e-3", "simulation.duration=0.4")
+    assert_estimated_as_alone([scene("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)])
+
+
+def test_pins_on_their_end_stops_are_as_exact_as_alone() -> None:
+    settings = ("control.method=elastic", "control.stiffness=5")
+    known = scene("tap", "actuator.rest_height=1.5e-3", *settings)
+    points = tuple(
+        replace(point, position=(*point.position[:2], point.position[2] - 39e-3))
+        for point in known.trajectory.waypoints
+    )
+    low = replace(known, trajectory=replace(known.trajectory, waypoints=points))
+    assert_estimated_as_alone([low, replace(low, actuator=replace(low.actuator, rest_height=1e-3))])
+
+
+def test_where_commands_are_left_out_no_errors_are_told() -> None:
+    (found,) = judged([scene("tap", "recorder.every=2", "simulation.duration=0.1")])
+    assert "height_error" not in found.metrics
+
+
+def test_without_being_asked_no_errors_are_told() -> None:
+    ((_, found),) = judge_together([scene("tap", "simulation.duration=0.1")])
+    assert isinstance(found, Result)
+    assert "height_error" not in found.metrics

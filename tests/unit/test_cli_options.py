@@ -1,0 +1,155 @@
+"""Options of the command line: what they reach, and what is refused before any work is done."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands import describe, export
+from digiclay.commands.describe import size
+
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+
+ADDON = Path(__file__).parents[2] / "addon"
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(SCENE, tmp_path, monkeypatch)
+
+
+MISTAKES: dict[str, tuple[list[str], str]] = {
+    "picture": (["render", "my", "--out", "my.jpg"], "--out must end with .png (got my.jpg)."),
+    "film": (["render", "my", "--film", "--out", "my.avi"], "--out must end with .mp4 (got my.avi)."),
+    "folder": (["render", "my", "--out", "d.png"], "--out must be a file (d.png is a folder)."),
+    "no folder": (
+        ["render", "my", "--out", "my.toml/a.png"],
+        "my.toml cannot be a folder: my.toml is a file.",
+    ),
+    "width": (["render", "my", "--size", "1x1"], "--size must be at least 16 (got 1)."),
+    "benchmark": (
+        ["benchmark", "scale", "--out", "my.toml/new"],
+        "digiclay benchmark scale: argument --out: my.toml/new cannot be a folder: my.toml is a file. "
+        "See 'digiclay benchmark scale --help'.",
+    ),
+    "budget": (["run", "my.toml", "--budget", "0"], "--budget must be above 0 m (got 0 m)."),
+    "option": (
+        ["run", "my.toml", "--fast"],
+        "digiclay run: unrecognized arguments: --fast. See 'digiclay run --help'.",
+    ),
+    "job": (["job", "."], ". is no job's folder: it has no job.toml."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "said"), MISTAKES.values(), ids=MISTAKES.keys())
+def test_a_mistake_is_one_line_before_any_work(
+    arguments: list[str], said: str, here: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (here / "d.png").mkdir()
+    code = main(arguments)
+    assert (code, capfd.readouterr(), left(here)) == (2, ("", f"{said}\n"), ["d.png"])
+
+
+def test_compare_keeps_to_the_tolerance(here: Path) -> None:
+    coarse = ["compare", "my.toml", "--quiet", "--set", "simulation.physics_step=5 ms"]
+    found = []
+    for name, more in (("plain", []), ("exact", ["--tolerance", "0.1 um"])):
+        assert main([*coarse, *more, "--out", name]) == 0
+        known = json.loads((here / name / "metrics.json").read_text(encoding="utf-8"))
+        found.append(known["methods"]["virtual_master"]["max_total_force"])
+    # Other steps, other forces: by a part in a thousand or so here.
+    assert found[0] != found[1]
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [(72, "72 bytes"), (329e3, "329 kB"), (2.5e9, "2.5 GB"), (0, "0 bytes"), (1e18, "1e+06 TB")],
+)
+def test_memory_is_told_in_units_people_read(count: float, said: str) -> None:
+    assert size(count) == said
+
+
+def test_a_file_that_fails_half_way_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def full(*given: Any) -> None:
+        raise OSError(28, "No space left on device", "a file")
+
+    monkeypatch.setattr(describe, "description", full)
+    assert main(["describe", "my.toml"]) == 2
+    assert capfd.readouterr().err == "a file cannot be used: No space left on device.\n"
+
+
+def test_the_list_of_commands_has_a_line_for_each(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
+    main(["--help"])
+    listed = capsys.readouterr().out.partition("COMMAND\n")[2].partition("\n\n")[0].splitlines()
+    assert [line for line in listed if len(line.split()) < 3 or not line.startswith("    ")] == []
+
+
+@pytest.mark.parametrize("command", ["export", "features", "render", "batch", "job"])
+def test_a_commands_help_begins_with_a_sentence(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main([command, "--help"])
+    said = capsys.readouterr().out.split("\n\n")[1]
+    assert (said[0].isupper(), said[-1]) == (True, ".")
+
+
+def test_a_terminal_that_does_not_know_a_letter_gets_another(here: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "digiclay", "run", "my.toml"], capture_output=True, text=True, timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ADDON), "PYTHONIOENCODING": "ascii"}, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr, "height error <= " in done.stdout) == (0, "", True)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_signal_while_the_program_starts_stops_it_in_one_line(here: Path) -> None:
+    # As numpy and trimesh do: what an import is interrupted by passes for a library that is broken.
+    script = (
+        "import os, signal, sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'numpy' and self in sys.meta_path:\n"
+        "            sys.meta_path.remove(self)\n"
+        "            try:\n"
+        f"                os.kill(os.getpid(), {int(signal.SIGINT)})\n"
+        "            except KeyboardInterrupt:\n"
+        "                raise ImportError('numpy is broken')\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "from digiclay.cli import console; console()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "run", "my.toml"], capture_output=True, text=True, timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ADDON)}, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr, left(here)) == (130, "Stopped; no file is half-written.\n", [])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_what_is_written_before_a_signal_is_not_denied(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    main(["run", "my.toml", "--quiet", "--no-errors"])
+    write = export.write
+
+    def interrupted(*given: Any) -> Path:
+        if given[3] == "ply":
+            raise KeyboardInterrupt
+        return write(*given)
+
+    monkeypatch.setattr(export, "write", interrupted)
+    code = main(["export", "my", "--format", "obj,ply"])
+    assert (code, capfd.readouterr()) == (
+        130, (f"{Path('my', 'surface.obj')}\n", "Stopped; no file is half-written.\n"),
+    )  # fmt: skip

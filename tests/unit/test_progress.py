@@ -1,0 +1,107 @@
+"""Progress on a terminal: one line that tells how much is done, and is gone afterwards."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import pytest
+from digiclay.commands.progress import PAUSE, Bar, Counted, Line, Steps, duration
+
+#: Each kind of progress, and one step of it of three.
+KINDS: dict[str, Callable[[io.StringIO], Line]] = {
+    "session": lambda stream: Bar(stream, "tap", 5e-3),
+    "counted": lambda stream: Counted(stream, "film", "frames"),
+    "steps": lambda stream: Steps(stream, "stiff", 3),
+}
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        """Be one."""
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Give a clock that stands still until its only number is changed, s."""
+    now = [100.0]
+    monkeypatch.setattr("digiclay.commands.progress.time.monotonic", lambda: now[0])
+    return now
+
+
+def told(bar: Line) -> None:
+    """Tell one step of three."""
+    bar() if isinstance(bar, Steps) else bar(1, 3)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_drawn_where_there_is_no_terminal(kind: str, clock: list[float]) -> None:
+    stream = io.StringIO()
+    with KINDS[kind](stream) as bar:
+        clock[0] += 10.0
+        told(bar)
+    assert stream.getvalue() == ""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_terminal_is_told_the_share_done_and_the_time_left(kind: str, clock: list[float]) -> None:
+    stream = Terminal()
+    with KINDS[kind](stream) as bar:
+        clock[0] += 10.0
+        told(bar)
+        # A third took ten seconds: of 28 cells 9 are full, and 20 s are left.
+        assert f"[{'#' * 9}{'.' * 19}]" in stream.getvalue()
+        assert ", 20 s left" in stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_line_is_gone_in_the_end(kind: str, clock: list[float]) -> None:
+    stream = Terminal()
+    with KINDS[kind](stream) as bar:
+        clock[0] += 10.0
+        told(bar)
+    assert stream.getvalue().endswith("\r\033[K")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_line_is_not_drawn_again_before_anybody_could_read_it(kind: str, clock: list[float]) -> None:
+    stream = Terminal()
+    with KINDS[kind](stream) as bar:
+        clock[0] += 10.0
+        told(bar)
+        drawn = stream.getvalue()
+        clock[0] += 0.9 * PAUSE
+        told(bar)
+        assert stream.getvalue() == drawn
+
+
+def test_a_line_is_cut_to_the_width_of_the_terminal(
+    clock: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    stream = Terminal()
+    with Counted(stream, "a name that is rather long", "frames") as bar:
+        clock[0] += 10.0
+        bar(1, 3)
+        line = stream.getvalue().removeprefix("\r").removesuffix("\033[K")
+    # A character in the last column would already begin the next line on some terminals.
+    assert len(line) == 39
+
+
+def test_things_done_beforehand_do_not_count_for_the_time_left(clock: list[float]) -> None:
+    stream = Terminal()
+    with Counted(stream, "first", "jobs", before=8) as bar:
+        clock[0] += 10.0
+        bar(9, 10)
+    # One job took ten seconds, so the last one will.
+    assert "9 of 10 jobs, 10 s left" in stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
+)
+def test_times_are_written_as_people_say_them(seconds: float, said: str) -> None:
+    assert duration(seconds) == said

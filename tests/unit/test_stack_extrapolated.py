@@ -1,0 +1,49 @@
+"""Richardson's form for a stack keeps to what a cell can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from digiclay.core.assembly import assemble
+from digiclay.core.scene_file import find, load
+from digiclay.core.stack.columns import Floats
+from digiclay.core.stack.physics import Extrapolated
+
+CELL = assemble(load(find("tap"))).cell
+
+
+@dataclass(frozen=True)
+class Set:
+    """A movement that sets all rows of all cells to one value."""
+
+    value: float
+
+    def advance(self, driven: Floats, under: Floats) -> None:
+        """Set them."""
+        driven[:] = self.value
+
+
+def extrapolated(coarse: float, fine: float) -> Floats:
+    """Return the rows of one cell in one run that two movements set to these values come to."""
+    driven = np.ones((CELL.rows + 1, 1, 1))
+    Extrapolated(CELL, Set(coarse), Set(fine)).advance(driven, np.empty((3, 1, 1)))
+    return driven[:, 0, 0]
+
+
+def test_a_third_of_what_the_halves_changed_is_added() -> None:
+    np.testing.assert_allclose(extrapolated(0.010, 0.013)[: CELL.rows], 0.014, rtol=1e-12)
+
+
+def test_commands_on_their_way_are_not_extrapolated() -> None:
+    assert extrapolated(0.010, 0.013)[CELL.rows] == 0.013
+
+
+def test_no_pin_goes_beyond_an_end_stop() -> None:
+    stroke = CELL.actuator.stroke
+    assert extrapolated(3e-3, 0.0)[0] == 0.0
+    assert extrapolated(stroke - 3e-3, stroke)[0] == stroke
+
+
+def test_no_filter_of_the_pulp_pulls() -> None:
+    assert (extrapolated(3e-3, 0.0)[CELL.pulp_rows] == 0.0).all()
