@@ -31,3 +31,10 @@ def test_the_command_prints_a_row_for_every_bed(
     assert main(["benchmark", "viewport", "--quick", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines[-2:]] == ["144", "168"]
+
+
+@pytest.mark.usefixtures("extension")
+def test_the_costs_are_measured_with_the_extension_enabled_too() -> None:
+    # As in `blender --command digiclay benchmark viewport`: there everything is registered already.
+    assert viewport_cost.measured(12, 12, 8).whole > 0.0
+    assert hasattr(bpy.types.Object, "digiclay")

@@ -160,6 +160,30 @@ def test_core_imports_go_strictly_down_a_level() -> None:
     assert wrong == []
 
 
+def package_imports() -> dict[str, set[str]]:
+    """Return what each module of the package imports of it, also inside functions."""
+    parts = {path: path.relative_to(PACKAGE).with_suffix("").parts for path in PACKAGE.rglob("*.py")}
+    names = {".".join(own).removesuffix(".__init__"): path for path, own in parts.items()}
+    found: dict[str, set[str]] = {}
+    for name, path in names.items():
+        found[name] = set()
+        for _, target, imported in imports(path):
+            dots = len(target) - len(target.lstrip("."))
+            if dots:
+                base = [*parts[path][: len(parts[path]) - dots], *filter(None, target[dots:].split("."))]
+                known = [".".join([*base, one]) for one in imported]
+                found[name] |= {one if one in names else ".".join(base) for one in known} & names.keys()
+    return found
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    left = package_imports()
+    while free := {name for name, others in left.items() if not others & left.keys() - {name}}:
+        left = {name: others for name, others in left.items() if name not in free}
+    # What is left imports, or is imported by, a circle.
+    assert sorted(left) == []
+
+
 def test_core_needs_numpy_alone_at_import() -> None:
     allowed = {*sys.stdlib_module_names, "numpy"}
     wrong = [

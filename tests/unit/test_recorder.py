@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +29,7 @@ def after(start: State, period: int) -> State:
     """Return a state in which every number tells the period it was made in."""
     rows = np.zeros_like(start.rows)
     rows[0], rows[ROWS.force], rows[ROWS.command] = 100 + period, 200 + period, 300 + period
-    return replace(start, period=period, rows=rows, modes=np.full(CELLS, period, np.int8))
+    return start._replace(period=period, rows=rows, modes=np.full(CELLS, period, np.int8))
 
 
 def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:

@@ -13,9 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import bridge, registration
+from .. import bridge
 from ..compat import bpy, scratch
-from ..device import view
+from ..core.layout import Layout
+from ..device import display, view
+from ..operators.add_bed import add, select_only
+from ..settings import properties
+from ..settings.devices import device
 from . import bed_state, running, sculpting, tick
 from .waiting import obstacle
 
@@ -80,18 +84,29 @@ def measured(rows: int, columns: int, ticks: int) -> Cost:
 @contextmanager
 def _session(rows: int, columns: int) -> Iterator[Any]:
     """Give a bed with a session in the open file, and take both away again."""
-    registration.register()
+    with _settings(), scratch():
+        bed = add(bpy.context, device("paper", Layout(rows=rows, columns=columns), "virtual_master"))
+        select_only(bpy.context, bed)
+        tick.start(bpy.context, bed)
+        try:
+            yield bed
+        finally:
+            tick.stop(bed.session_uid)
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
+    """Let beds have settings: for the while, where the extension is not enabled anyway."""
+    if hasattr(bpy.types.Object, "digiclay"):
+        yield
+        return
+    properties.register()
+    display.register()
     try:
-        with scratch():
-            bpy.ops.mesh.digital_clay_add(rows=rows, columns=columns)
-            bed = bpy.context.object
-            tick.start(bpy.context, bed)
-            try:
-                yield bed
-            finally:
-                tick.stop(bed.session_uid)
+        yield
     finally:
-        registration.unregister()
+        display.unregister()
+        properties.unregister()
 
 
 def _move(bed: Any, count: int) -> None:
