@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -181,7 +182,7 @@ def test_nothing_is_left_where_nothing_is_recorded(bed: Any, clock: Clock) -> No
 
 
 def test_what_cannot_be_left_is_told(recording: Any, tmp_path: Path) -> None:
-    recovery.file().mkdir()  # a folder in the place of the file
+    shutil.rmtree(tmp_path / "temporary")
     bpy.ops.wm.read_homefile(use_empty=True)
     assert "It could not be left for recovery: " in running.said()
 
