@@ -151,7 +151,7 @@ def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
     # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
     rows = np.matmul(forms, place)
     inner: Floats = rows[..., :count, :]
-    np.maximum(inner, join[..., 0, :, :], inner)
+    np.maximum(inner, join[..., 0, :, :], out=inner)
     np.sqrt(inner, inner)
     inner -= join[..., 1, :, :]
     inner *= inner

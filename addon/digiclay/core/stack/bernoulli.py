@@ -87,8 +87,8 @@ class Unlike:
                 moved = mapped(moves, conductance[:, :k])
                 exponent = self._pressed(s, openings[:, :k], moved, path, exponent, height[:k], work)
             free += mapped(moves[:1], conductance[:, k:])[0]
-            np.maximum(free, 0.0, free)
-            np.minimum(free, cell.actuator.stroke, free)
+            np.maximum(free, 0.0, out=free)
+            np.minimum(free, cell.actuator.stroke, out=free)
         driven[cell.pulp_rows, :k] = work[:-3]
 
     def _unloaded(self, openings: Floats) -> Floats:
@@ -168,8 +168,8 @@ class Unlike:
         push /= m
         rise += push
         rise += height
-        np.maximum(rise, 0.0, height)
-        np.minimum(height, self.cell.actuator.stroke, height)
+        np.maximum(rise, 0.0, out=height)
+        np.minimum(height, self.cell.actuator.stroke, out=height)
         stopped = rise != height
         if np.count_nonzero(stopped):
             # The mean found above is that of a pin that no end stop holds.
@@ -177,10 +177,10 @@ class Unlike:
             _tension(end, last)
             np.putmask(mean, stopped, 0.5 * (first + last))
         # Where the finger is not touched all through the step the mean is that of no tension.
-        np.maximum(mean, 0.0, mean)
+        np.maximum(mean, 0.0, out=mean)
         # Of a tension that falls steeply a straight line would make a filter that pulls. The last row
         # is the force.
-        np.maximum(mapped(self.transition[s], work)[:-1], 0.0, filters)
+        np.maximum(mapped(self.transition[s], work)[:-1], 0.0, out=filters)
         return end
 
     def _loaded_valve(
@@ -241,8 +241,8 @@ def _of_all(maps: Sequence[Floats]) -> Floats:
 
 def _tension(exponent: Floats, out: Floats) -> None:
     """Work out the elastic force in units of b/m, into `out`; 0 where there is a gap."""
-    np.maximum(exponent, 0.0, out)
-    np.minimum(out, LARGEST_EXPONENT, out)
+    np.maximum(exponent, 0.0, out=out)
+    np.minimum(out, LARGEST_EXPONENT, out=out)
     np.expm1(out, out)
 
 

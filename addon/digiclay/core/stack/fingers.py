@@ -107,7 +107,7 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
     rows = mapped(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
     under: Floats = rows[: len(least)]
-    np.maximum(under, least, under)
+    np.maximum(under, least, out=under)
     np.sqrt(under, under)
     under -= root
     under *= under

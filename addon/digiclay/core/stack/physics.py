@@ -82,8 +82,8 @@ class Extrapolated:
         self.coarse.advance(coarse, under)
         self.fine.advance(driven, under)
         y += (y - coarse[: self.cell.rows]) / 3.0
-        np.minimum(np.maximum(y[0], 0.0), self.cell.actuator.stroke, y[0])
-        np.maximum(y[self.cell.pulp_rows], 0.0, y[self.cell.pulp_rows])
+        np.minimum(np.maximum(y[0], 0.0), self.cell.actuator.stroke, out=y[0])
+        np.maximum(y[self.cell.pulp_rows], 0.0, out=y[self.cell.pulp_rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +110,12 @@ class Touches:
         tension = height - under
         tension -= self.offset
         tension *= self.exponent
-        np.maximum(tension, 0.0, tension)
-        np.minimum(tension, LARGEST_EXPONENT, tension)
+        np.maximum(tension, 0.0, out=tension)
+        np.minimum(tension, LARGEST_EXPONENT, out=tension)
         np.expm1(tension, tension)
         tension *= self.unit
         tension -= np.add.reduce(self.shares * filters)
-        np.maximum(tension, 0.0, tension)
+        np.maximum(tension, 0.0, out=tension)
         tension *= self.share
         return tension
 

@@ -188,7 +188,7 @@ class _Judges:
         ways = [self._ways[run] for run in runs]
         self._coming = still_coming(self._coming, self._stack.systems, ways, self._state.period)
         self._state = follow(self._stack, self._state, self._coming, state)
-        np.maximum(self._largest, differences(self._state, state, self._stack.rows), self._largest)
+        np.maximum(self._largest, differences(self._state, state, self._stack.rows), out=self._largest)
 
     def of(self, place: int) -> Errors:
         """Return the estimated errors so far of the run at a place on the last axis."""

@@ -249,7 +249,7 @@ class VirtualMasters:
             return bell
         cone: Floats = blister.radius - distance
         cone *= 1.0 / (blister.radius - blister.flat_radius)
-        np.minimum(cone, 1.0, cone)
+        np.minimum(cone, 1.0, out=cone)
         return cone
 
     def kept(self, memory: Masters, runs: NDArray[np.intp]) -> Masters:

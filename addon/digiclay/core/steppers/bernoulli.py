@@ -115,8 +115,8 @@ class Block:
         height, (lowest, highest) = self.height, self.stops
         for rise in self.free:
             rise += height
-            np.maximum(rise, lowest, height)
-            np.minimum(height, highest, height)
+            np.maximum(rise, lowest, out=height)
+            np.minimum(height, highest, out=height)
         return self.force
 
     def _under_finger(self) -> None:
@@ -168,8 +168,8 @@ class Block:
             push *= per_m
             rise += height
             risen += push
-            np.maximum(rise, lowest, height)
-            np.minimum(height, highest, height)
+            np.maximum(rise, lowest, out=height)
+            np.minimum(height, highest, out=height)
             stopped = risen != near
             if np.count_nonzero(stopped):
                 # The mean found above is that of a pin that no end stop holds.
@@ -177,9 +177,9 @@ class Block:
                 _tension(end, zero, most, last)
                 np.putmask(mean, stopped, half * (first + last))
             # Where the finger is not touched all through the step the mean is that of no tension.
-            np.maximum(mean, zero, mean)
+            np.maximum(mean, zero, out=mean)
             # Of a tension that falls steeply a straight line would make a filter that pulls.
-            np.maximum(plan.finish[s].dot(self.work), self.none, self.moved)
+            np.maximum(plan.finish[s].dot(self.work), self.none, out=self.moved)
             exponent = end
         self.pulp[:] = self.filters
 
@@ -210,8 +210,8 @@ class Block:
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:
     """Work out the elastic force in units of b/m, into `out`; 0 where there is a gap."""
-    np.maximum(exponent, zero, out)
-    np.minimum(out, most, out)
+    np.maximum(exponent, zero, out=out)
+    np.minimum(out, most, out=out)
     np.expm1(out, out)
 
 
