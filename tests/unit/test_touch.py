@@ -10,7 +10,7 @@ from digiclay.core.fingertip import LEVEL, Fingertip
 from digiclay.core.layout import Layout, grid
 from digiclay.core.relaxation import Relaxation
 from digiclay.core.simulation import begin, step
-from digiclay.core.touch import Touch, approach, force, reached
+from digiclay.core.touch import MOST, Touch, approach, force, reached
 
 from tests.assemble import AWAY, make_system, path, record
 
@@ -53,6 +53,44 @@ def test_a_finger_on_a_pin_may_touch_it_and_not_the_whole_bed() -> None:
     cells = near((0, 0, 38), (0, 0, 38))
     assert 312 in cells
     assert cells.size < 150
+
+
+def dragged(periods: int) -> np.ndarray:
+    """Return poses (t, 3, 7) of a finger that is dragged and tilted, a period of 5 ms each."""
+    moments = np.linspace(0.0, 1.0, 2 * periods + 1)
+    turn = 0.2 * moments
+    whole = np.column_stack(
+        [
+            20e-3 * moments,
+            5e-3 * moments**2,
+            38e-3 - 1e-3 * moments,
+            np.cos(turn),
+            np.sin(turn),
+            *np.zeros((2, len(turn))),
+        ]
+    )
+    return np.stack([whole[2 * i : 2 * i + 3] for i in range(periods)])
+
+
+def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
+    poses, places = dragged(70), grid(Layout()).place(np.arange(100, 400))
+    together = [one.under(places) for one in approach(Fingertip(), poses)]
+    alone = [approach(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
+    assert np.array_equal(np.array(together), np.array(alone))
+
+
+def test_other_places_in_mid_way_have_their_own_undersides() -> None:
+    bed, coming = grid(Layout()), approach(Fingertip(), dragged(8))
+    first, second = bed.place(np.arange(50)), bed.place(np.arange(300, 350))
+    coming[0].under(first)
+    fresh = approach(Fingertip(), dragged(8))[1].under(second)
+    assert np.array_equal(coming[1].under(second), fresh)
+
+
+def test_a_finger_over_a_large_bed_is_worked_out_for_few_periods_at_a_time() -> None:
+    coming = approach(Fingertip(), dragged(8))
+    many = np.zeros((6, MOST // 6))  # three instants a period: twice as many cells would be all of `MOST`
+    assert coming[0].under(many).base.size <= 2 * 2 * MOST  # R and the tangent of two periods
 
 
 def pressed(x: float, y: float, depth: float) -> np.ndarray:
