@@ -23,8 +23,8 @@ LEVELS = (
     "stack.columns",
     "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods export metrics control.servo control.blister",
-    "feature_crest pins_solid skin_membrane "
+    "formed methods export metrics_force metrics_trace control.servo control.blister",
+    "feature_crest pins_solid skin_membrane metrics "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene stack.control",
@@ -36,7 +36,7 @@ LEVELS = (
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "
     "control.push_pull control.force_display control.shape_display "
-    "stack.recording stack.simulation",
+    "stack.recording stack.traces stack.simulation",
     "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
     "jobs accuracy keeping live stack.assembly",

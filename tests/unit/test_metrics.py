@@ -15,10 +15,10 @@ from digiclay.core.metrics import (
     first_touch,
     lag,
     rfd,
-    shaping,
     summary,
     weights,
 )
+from digiclay.core.metrics_trace import trace_of
 from digiclay.core.modes import Mode
 
 TIME = np.linspace(0.0, 10.0, 2001)
@@ -84,8 +84,10 @@ def test_the_rfd_while_shaping_leaves_out_touching_down():
 
 
 def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
-    mode = [[Mode.REST, Mode.FORCE_FOLLOW], [Mode.REST, Mode.SPRING], [Mode.REST, Mode.FORCE_FOLLOW]]
-    np.testing.assert_array_equal(shaping([0.4, 0.4, 0.0], mode), [True, False, False])
+    case = history(np.array([0.4, 0.4, 0.0]), np.arange(3.0))
+    case["mode"][:] = Mode.REST
+    case["mode"][:, 4] = Mode.FORCE_FOLLOW, Mode.SPRING, Mode.FORCE_FOLLOW
+    np.testing.assert_array_equal(trace_of(case).shaping, [True, False, False])
 
 
 def test_the_weights_add_up_to_the_duration():

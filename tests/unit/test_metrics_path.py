@@ -69,9 +69,9 @@ def test_many_rows_are_looked_at_in_parts_alike() -> None:
 
 
 def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
-    height, force = np.array([[52e-3, 56e-3]]), np.array([[0.3, 0.1]])
-    assert surface_under(height, force, TIP[:1]) * 1e3 == pytest.approx([3.0], rel=1e-9)
+    total, height = np.array([0.3 + 0.1]), np.array([0.3 * 52e-3 + 0.1 * 56e-3])
+    assert surface_under(total, height, TIP[:1]) * 1e3 == pytest.approx([3.0], rel=1e-9)
 
 
 def test_rows_without_contact_have_no_surface_under_the_finger() -> None:
-    assert surface_under(np.ones((2, 2)), np.zeros((2, 2)), TIP[:2]).size == 0
+    assert surface_under(np.zeros(2), np.zeros(2), TIP[:2]).size == 0

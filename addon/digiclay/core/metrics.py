@@ -14,28 +14,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
-from .metrics_path import Rows, in_contact, lag, ridge_errors, shaping, surface_under
-from .metrics_signal import deviation, mean, overshoot, settling_time, weights
+from .metrics_force import contact_loss_share, first_touch, rfd, touchdown
+from .metrics_path import in_contact, lag, lag_of_sums, ridge_errors, surface_under
+from .metrics_signal import deviation, mean, weights
+from .metrics_trace import Trace, trace_of
 from .surface import grid_shape
 
 __all__ = [
-    "BAND",
     "METRICS",
     "cell_area",
+    "composed",
     "contact_loss_share",
     "first_touch",
     "in_contact",
     "lag",
     "rfd",
-    "shaping",
     "summary",
     "weights",
 ]
 
 Floats = NDArray[np.float64]
 
-#: Settled is a force this near to its set point, as a share of it.
-BAND = 0.1
+#: All cells.
+ALL = slice(None)
 
 #: Every key of `summary`: its unit and its meaning.
 METRICS: dict[str, tuple[str, str]] = {
@@ -69,78 +70,6 @@ METRICS: dict[str, tuple[str, str]] = {
     "raised_volume": ("m3", "volume formed above the initial surface"),
     "sunk_volume": ("m3", "volume formed below the initial surface"),
 }
-
-
-def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | None = None) -> float | None:
-    """Return the reference force deviation, N.
-
-    ``RFD = sqrt(sum w_i (F_i - F_ref)² / sum w_i)`` with the `weights` of the rows.
-
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        s.
-    total_force : array_like, shape (t,)
-        N.
-    set_point : float
-        Force the finger should feel, N.
-    rows : ndarray of bool, shape (t,), optional
-        Rows to judge; those in contact by default. They include touching down, and leave out
-        the gaps when the finger is lost: read it next to `contact_loss_share`.
-
-    Returns
-    -------
-    float or None
-        None when there is no such row.
-    """
-    force = np.asarray(total_force, dtype=np.float64)
-    chosen = in_contact(force) if rows is None else rows
-    square = mean(((force - set_point) ** 2)[chosen], weights(time)[chosen])
-    return None if square is None else float(np.sqrt(square))
-
-
-def contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
-    """Return the share of the time from first to last contact without contact.
-
-    A pause the session makes on purpose, with the finger lifted, counts as well.
-
-    Parameters
-    ----------
-    time : array_like, shape (t,)
-        s.
-    total_force : array_like, shape (t,)
-        N.
-
-    Returns
-    -------
-    float or None
-        In [0, 1); None when the finger never touches.
-    """
-    touching = in_contact(total_force)
-    if not np.any(touching):
-        return None
-    first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
-    return mean(1.0 - touching[first:after], weights(time)[first:after])
-
-
-def first_touch(total_force: ArrayLike) -> slice:
-    """Return the rows from the last one before the first contact to the last one of that contact."""
-    touching = in_contact(total_force)
-    if not np.any(touching):
-        return slice(0, 0)
-    start = int(np.argmax(touching))
-    gone = np.flatnonzero(~touching[start:])
-    return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
-
-
-def _followed(
-    time: Floats, total: Floats, set_point: float, first: slice
-) -> tuple[float | None, float | None]:
-    """Return overshoot and settling time of the force at first touch; None at a set point of 0."""
-    if first.stop == first.start:
-        return None, None
-    beyond = overshoot(np.concatenate([[0.0], total[first]]), set_point)
-    return beyond, settling_time(time[first], total[first], set_point, BAND * set_point)
 
 
 def cell_area(position: ArrayLike) -> float | None:
@@ -185,46 +114,74 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
     ParameterError
         When the history has no rows.
     """
-    time, total, height, force, position = (
-        np.asarray(history[name], dtype=np.float64)
-        for name in ("time", "total_force", "height", "force", "position")
-    )
+    time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")
-    touching = in_contact(total)
+    fingertip, position = (np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position"))
+    return composed(trace_of(history), time, fingertip, position, set_point)
+
+
+def composed(
+    trace: Trace,
+    time: Floats,
+    fingertip: Floats,
+    position: Floats,
+    set_point: float,
+    near: NDArray[np.intp] | slice = ALL,
+) -> dict[str, float | None]:
+    """Return every metric of the session a trace is of.
+
+    Parameters
+    ----------
+    trace : Trace
+        Of t rows of n cells.
+    time : ndarray, shape (t,)
+        s.
+    fingertip : ndarray, shape (t, 7)
+        Lowest point, m, and quaternion.
+    position : ndarray, shape (n, 2)
+        m; ordered row by row.
+    set_point : float
+        Force the finger should feel, N.
+    near : ndarray of int or slice, optional
+        The cells that are the nearest to the finger at some time, where they are known: only they can
+        be left behind in a ridge.
+
+    Returns
+    -------
+    dict
+        See `summary`.
+    """
+    total, weight, felt, rows = trace.total, weights(time), trace.touching, trace.shaping
     # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
-    pressed = force.sum(axis=1)
-    behind = np.round(lag(position, force, history["fingertip"], pressed), 12)
-    felt = in_contact(pressed)
-    weight = weights(time)[felt]
-    formed, area = height[-1] - height[0], cell_area(position)
-    rows = shaping(total, history["mode"])
-    beyond, settled = _followed(time, total, float(set_point), first_touch(total))
-    above = surface_under(height, force, history["fingertip"], pressed)
-    ridge = ridge_errors(position, height[-1], history["fingertip"], rows)
+    behind = np.round(lag_of_sums(total, trace.x, trace.y, fingertip), 12)
+    above = surface_under(total, trace.height, fingertip)
+    ridge = ridge_errors(position[near], trace.last[near], fingertip, rows)
     each = np.ones(len(ridge))
+    beyond, settled = touchdown(time, total, float(set_point))
+    formed, area = trace.last - trace.first, cell_area(position)
     found: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
         "set_point": float(set_point),
         "rfd": rfd(time, total, set_point),
         "rfd_shaping": rfd(time, total, set_point, rows),
         "rfd_session": rfd(time, total, set_point, np.ones(len(time), dtype=bool)),
-        "contact_share": mean(touching.astype(np.float64), weights(time)),
+        "contact_share": mean(felt.astype(np.float64), weight),
         "contact_loss_share": contact_loss_share(time, total),
-        "lag_mean": mean(behind, weight),
+        "lag_mean": mean(behind, weight[felt]),
         "lag_max": float(behind.max()) if len(behind) else None,
-        "force_deviation": deviation(total[rows], weights(time)[rows]),
+        "force_deviation": deviation(total[rows], weight[rows]),
         "force_overshoot": beyond,
         "settling_time": settled,
-        "height_deviation": deviation(above[rows[felt]], weights(time)[felt][rows[felt]]),
+        "height_deviation": deviation(above[rows[felt]], weight[rows]),
         "ridge_offset": mean(ridge, each),
         "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
         "ridge_unevenness": deviation(ridge, each),
-        "max_cell_force": float(force.max()),
+        "max_cell_force": float(trace.strongest.max()),
         "max_total_force": float(total.max()),
-        "lowest": float(height[-1].min()),
-        "highest": float(height[-1].max()),
-        "height_range": float(np.ptp(height[-1])),
+        "lowest": float(trace.last.min()),
+        "highest": float(trace.last.max()),
+        "height_range": float(np.ptp(trace.last)),
         "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
         "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
     }

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .modes import Mode
-
-__all__ = ["AWAY", "in_contact", "lag", "ridge_errors", "shaping", "surface_under"]
+__all__ = ["AWAY", "in_contact", "lag", "lag_of_sums", "ridge_errors", "surface_under"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -24,25 +22,7 @@ def in_contact(total_force: ArrayLike) -> Rows:
     return touching
 
 
-def shaping(total_force: ArrayLike, mode: ArrayLike) -> Rows:
-    """Return which rows shape the clay: in contact, and a cell under the finger follows the force.
-
-    Parameters
-    ----------
-    total_force : array_like, shape (t,)
-        N.
-    mode : array_like of int, shape (t, n)
-        Codes of `Mode`.
-
-    Returns
-    -------
-    ndarray of bool, shape (t,)
-    """
-    rows: Rows = in_contact(total_force) & np.any(np.asarray(mode) == Mode.FORCE_FOLLOW, axis=1)
-    return rows
-
-
-def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floats | None = None) -> Floats:
+def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
     """Return how far the blister is behind the finger, in the rows in contact.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
@@ -56,8 +36,6 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floa
         N.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
-    total : ndarray, shape (t,), optional
-        Sum of the forces, where it is known already.
 
     Returns
     -------
@@ -65,39 +43,37 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floa
         m.
     """
     pressed = np.asarray(force, dtype=np.float64)
-    total = pressed.sum(axis=1) if total is None else total
+    x, y = (pressed @ np.asarray(position, dtype=np.float64)).T
+    return lag_of_sums(pressed.sum(axis=1), x, y, fingertip)
+
+
+def lag_of_sums(total: Floats, x: Floats, y: Floats, fingertip: ArrayLike) -> Floats:
+    """Return the `lag` from sums over the cells (t,): of the force, N, and of the force times place, N m."""
     rows = in_contact(total)
-    centroid = (pressed @ np.asarray(position, dtype=np.float64))[rows] / total[rows, None]
+    centroid = np.column_stack([x, y])[rows] / total[rows, None]
     distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
     return distance
 
 
-def surface_under(
-    height: ArrayLike, force: ArrayLike, fingertip: ArrayLike, total: Floats | None = None
-) -> Floats:
+def surface_under(total: Floats, height: Floats, fingertip: ArrayLike) -> Floats:
     """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
 
     Parameters
     ----------
-    height, force : array_like, shape (t, n)
-        m, N.
+    total, height : ndarray, shape (t,)
+        Sums over the cells of the force, N, and of the force times height, N m.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
-    total : ndarray, shape (t,), optional
-        Sum of the forces, where it is known already.
 
     Returns
     -------
     ndarray, shape (rows in contact,)
         m.
     """
-    pressed = np.asarray(force, dtype=np.float64)
-    total = pressed.sum(axis=1) if total is None else total
     rows = in_contact(total)
-    mean = np.einsum("tn,tn->t", pressed, np.asarray(height, dtype=np.float64))[rows] / total[rows]
-    above: Floats = mean - np.asarray(fingertip, dtype=np.float64)[rows, 2]
+    above: Floats = height[rows] / total[rows] - np.asarray(fingertip, dtype=np.float64)[rows, 2]
     return above
 
 

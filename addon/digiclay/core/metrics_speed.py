@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .errors import ParameterError
-from .metrics import rfd
+from .metrics_force import rfd
 from .metrics_path import lag
 from .metrics_trial import Trial, trial
 from .quantity import Parameters, quantity

@@ -20,8 +20,9 @@ from ..system import System
 from .assembly import put_together
 from .beds import Beds
 from .fingers import Fingers, Way, still_coming, way_over
-from .recording import StackRecording, StackTraces, summary
+from .recording import StackRecording
 from .simulation import Stack, advance, begin, blow_up, broken, differences, follow, kept
+from .traces import StackTraces, summary
 
 __all__ = ["judge_of", "judge_together", "run_together"]
 
