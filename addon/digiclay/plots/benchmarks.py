@@ -53,6 +53,8 @@ class Gain(Protocol):
     stacked: float
     judged_alone: float
     judged_stacked: float
+    errors_alone: float
+    errors_stacked: float
 
 
 def precision(work: Sequence[Work], out: Path) -> Path:
@@ -121,12 +123,13 @@ def stack(sizes: Sequence[Gain], out: Path) -> Path:
             for gains, line, label in (
                 ([one.alone / one.stacked for one in own], "-", "simulated"),
                 ([one.judged_alone / one.judged_stacked for one in own], "--", "recorded and judged"),
+                ([one.errors_alone / one.errors_stacked for one in own], ":", "errors estimated too"),
             ):
                 panel.loglog(
                     runs, gains, line, color=colour, marker=marker,
                     markerfacecolor=colour if line == "-" else "white", label=f"{study} varies, {label}",
                 )  # fmt: skip
-        panel.axhline(6.0, color="#777777", linestyle=":", linewidth=1.2, label="the goal")
+        panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
         panel.set_xticks(runs, [str(count) for count in runs])
         panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
         panel.minorticks_off()
