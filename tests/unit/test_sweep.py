@@ -102,6 +102,10 @@ def test_what_cannot_vary_is_told_with_key_rule_and_value(said: str, message: st
             "--vary control.method must not be given to --method",
         ),
         (
+            ["--vary", "simulation.stepper=a", "--tolerance", "1 um"],
+            "--vary simulation.stepper must not be given to --tolerance as well",
+        ),
+        (
             ["--vary", "layout.rows=11,13", "--workers", "0"],
             "digiclay sweep: argument --workers: must be a whole",
         ),
@@ -137,6 +141,13 @@ def test_every_metric_of_a_run_can_be_asked_for() -> None:
 def test_a_point_is_the_run_with_that_setting() -> None:
     assert main([*GAINS, "--out", "out"]) == 0
     alone = run(load(find("my.toml"), [Setting("control.force_gain", "5")]))
+    assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
+
+
+def test_every_point_keeps_to_the_tolerance() -> None:
+    assert main([*GAINS, "--out", "out", "--tolerance", "0.1 um"]) == 0
+    kept_to = [Setting("simulation.stepper", "adaptive"), Setting("simulation.tolerance", "0.1 um")]
+    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5"), *kept_to]))
     assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
 
 

@@ -24,7 +24,7 @@ from ..core.sweep import ERRORS, Point, Record, figure, finish, points
 from ..core.sweep_axis import Axis, axis
 from ..core.sweep_bundles import Bundles, bundles, evaluate_all
 from ..core.sweep_folder import Folder, columns, grid, opened, table
-from .arguments import add_scene
+from .arguments import add_scene, settings_of
 from .progress import PAUSE, WIDTH
 from .stop import Stop
 
@@ -104,14 +104,12 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setting]:
-    """Return what --set, --method and --stepper change; what varies is given by --vary alone."""
-    settings = list(arguments.settings)
-    for option, key in (("method", "control.method"), ("stepper", "simulation.stepper")):
-        if getattr(arguments, option) is None:
-            continue
-        if key in [one.key for one in axes]:
-            raise ParameterError(f"--vary {key}", "", f"must not be given to --{option} as well", key)
-        settings.append(Setting(key, getattr(arguments, option), f"--{option}"))
+    """Return what the options change of the scene; what varies is given by --vary alone."""
+    settings = settings_of(arguments)
+    varied = [one.key for one in axes]
+    for key, _, option in settings[len(arguments.settings) :]:
+        if key in varied:
+            raise ParameterError(f"--vary {key}", "", f"must not be given to {option} as well", key)
     return settings
 
 
