@@ -160,15 +160,32 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
         [sys.executable, "-c", script, *MANY, *hours, "--out", "out"], stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ADDON)}, start_new_session=True,
     )  # fmt: skip
-    time.sleep(3.0)  # the workers are running by then; a terminal sends Ctrl-C to them as well
-    assert (here / "out" / "sweep.json").exists()
-    os.killpg(started.pid, signal.SIGINT)
     try:
-        _, err = started.communicate(timeout=20)
+        deadline = time.monotonic() + 60.0
+        while not (here / "out" / "sweep.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert (here / "out" / "sweep.json").exists()
+        time.sleep(3.0)  # the workers run or are being started; a terminal sends Ctrl-C to them as well
+        os.killpg(started.pid, signal.SIGINT)
+        _, err = started.communicate(timeout=60)  # the sessions would take hours
     finally:
         if started.poll() is None:
             os.killpg(started.pid, signal.SIGKILL)
     assert (started.returncode, err, list((here / "out").glob("points/*"))) == (130, "", [])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_ctrl_c_does_not_reach_a_worker_that_is_just_being_started(here: Path) -> None:
+    # Python runs this file before all else; of the processes a sweep starts only workers are told of a fork.
+    ctrl_c = "import os, sys\nif '--multiprocessing-fork' in sys.orig_argv:\n    os.kill(os.getpid(), {})\n"
+    (here / "sitecustomize.py").write_text(ctrl_c.format(int(signal.SIGINT)), encoding="utf-8")
+    script = "from digiclay.cli import console; console()"
+    done = subprocess.run(
+        [sys.executable, "-c", script, *MANY, "--set", "simulation.duration=0.1", "--out", "out"],
+        env={**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{ADDON}"}, capture_output=True, text=True,
+        timeout=120,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 ONE = Column("control.force_gain", "1/N", (1.0, 2.0, 4.0), True)

@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -201,12 +201,34 @@ def local(count: int) -> Iterator[tuple[Executor, Task, Callable[[], None]]]:
 
     fresh = multiprocessing.get_context("spawn")
     halted = fresh.Event()
-    with ProcessPoolExecutor(count, fresh, _begin, (halted,)) as pool:
+    with _Processes(count, fresh, _begin, (halted,)) as pool:
         try:
             yield pool, _run, halted.set
         finally:
             halted.set()
             pool.shutdown(cancel_futures=True)
+
+
+class _Processes(ProcessPoolExecutor):
+    """Workers that Ctrl-C on a terminal does not reach, from their first moment on."""
+
+    def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
+        """Submit a task; the worker that is started for it takes over that Ctrl-C is held back."""
+        with _held():
+            return super().submit(task, *arguments, **known)
+
+
+@contextmanager
+def _held() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block. Windows cannot: there it is ignored from `_begin` on."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
 
 def _begin(halted: Any) -> None:
