@@ -116,7 +116,9 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.look("another file")
     drawing = getattr(bpy.types.STATUSBAR_HT_header.draw, "_draw_funcs", [])
     blender.SEEN["keys drawn"] = [f.__module__ for f in drawing if f.__module__.startswith(blender.EXTENSION)]
-    # The run ends with a session on: Blender must be able to quit.
     blender.call(bpy.ops.mesh.digital_clay_add)
     yield from start(blender)
     blender.look("before quitting")
+    blender.hand_over()
+    bpy.ops.wm.quit_blender()  # with the session on: nobody disables the extension before
+    yield 60.0
