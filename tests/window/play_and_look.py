@@ -58,6 +58,8 @@ def gizmo(blender: Any) -> Iterator[float | None]:
         at = arrow + step / 6 * (there - here)
         blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(at).astype(int).tolist()))
         yield None
+        if step == 6:  # the pins give way as fast as the machine simulates them
+            yield from until(lambda: lowest(blender) < 39.9)
         blender.look(f"gizmo {step}")
     blender.shot("play_gizmo")
     blender.event("LEFTMOUSE", "RELEASE", tuple(np.rint(arrow + there - here).astype(int).tolist()))
