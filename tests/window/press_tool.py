@@ -8,6 +8,9 @@ from typing import Any
 import bpy
 import numpy as np
 
+#: A finger that is on its way moves in each of so many ticks of its session.
+TICKS = 5
+
 
 def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> tuple[int, int]:
     """Return where a place in the bed's space, mm, is seen."""
@@ -31,15 +34,22 @@ def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> It
 
 
 def come(blender: Any) -> Iterator[float | None]:
-    """Wait until the finger has come to rest, however slow the machine is: at most 15 s."""
-    last, still = None, 0
-    for _ in range(60):
+    """Wait until the finger has come to rest: it stays where it is while the session ticks on.
+
+    By time alone a slow machine, on which nothing happens for a second, would be taken for a finger at rest.
+    """
+    last, still, since = None, 0, 0
+    for _ in range(480):
         yield 0.25
         now = tuple(blender.fingertip().location)
-        still = still + 1 if now == last else 0
-        last = now
-        if still == 3:
+        moment = max((session.moment for session in blender.part("live.running").all()), default=0)
+        if now != last:
+            last, still, since = now, 0, moment
+            continue
+        still += 1
+        if still >= 3 and moment >= since + TICKS:
             return
+    raise AssertionError("The finger does not come to rest")
 
 
 def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
