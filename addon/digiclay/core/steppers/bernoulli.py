@@ -128,9 +128,10 @@ class Block:
         self.filters[:] = self.pulp
         exponent = near * m
         exponent -= self.start
-        _tension(exponent, zero, most, last)
+        _tension(exponent, zero, most, first)
         for s, (rise, risen, ways, slip, bow, decay) in enumerate(self.steps):
-            first[:] = last
+            if s:
+                first[:] = last
             plan.begin[s].dot(self.begun, self.begins)
             idle = first <= lost
             stiffness = decay.copy()
