@@ -16,6 +16,9 @@ from .core.errors import DigiclayError
 
 __all__ = ["console", "main"]
 
+#: What tells the libraries behind numpy's products on how many cores to work.
+CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code: 0, 2 for what a user can mend, 130 when stopped.
@@ -59,7 +62,13 @@ def _wrong(said: str) -> int:
 
 
 def console() -> NoReturn:
-    """Run as a program."""
+    """Run as a program.
+
+    On one core, unless the environment says otherwise: a session's products are small, and a second
+    thread would spend its time waiting for the next, which counts as well.
+    """
+    for name in CORES:  # read when numpy is imported, which it has not been yet
+        os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may not know µ
     try:

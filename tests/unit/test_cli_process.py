@@ -35,6 +35,23 @@ def process(*arguments: str, block: str = "") -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(("said", "cores"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_the_program_works_on_one_core_unless_told_otherwise(said: dict[str, str], cores: str) -> None:
+    script = (
+        "import os, sys\n"
+        "from digiclay import cli\n"
+        "cli.main = lambda: print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules) or 0\n"
+        "cli.console()\n"
+    )
+    known = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True,
+        env={**known, **said, "PYTHONPATH": str(ADDON)},
+    ).stdout  # fmt: skip
+    # Numpy reads it when it is imported, so that must not have happened before.
+    assert told.split() == [cores, "False"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "missing", "install"),
     [
