@@ -23,9 +23,8 @@ __all__ = ["taking_part"]
 
 Cells = NDArray[np.intp]
 
-#: Time after which the set is made anew, without the cells that have come to rest, s; and the fewest control
-#: periods it serves.
-KEPT, FEWEST = 0.16, 32
+#: Control periods after which the set is made anew, without the cells that have come to rest.
+KEPT = 32
 
 
 def taking_part(
@@ -51,8 +50,7 @@ def taking_part(
     ):
         return state
     moving, top = _put_back(system, state)
-    kept = max(FEWEST, round(KEPT / system.period))
-    peak = min(top + kept * system.period * system.fastest, system.cell.actuator.stroke)
+    peak = min(top + KEPT * system.period * system.fastest, system.cell.actuator.stroke)
     margin = grid.layout.pitch
     wide_control, wide_reach = _wider(control, margin), _wider(_reach(finger, peak), margin)
     near = _inside(grid, wide_reach)
@@ -72,7 +70,7 @@ def taking_part(
         wide_reach,
         wide_control,
         peak,
-        state.period + kept,
+        state.period + KEPT,
     )
     return State(state.period, state.rows, state.modes, state.aged, top, held, state.memory)
 
