@@ -23,7 +23,7 @@ from digiclay.core.modes import Mode
 from digiclay.core.places import Measurement, Orders
 from digiclay.core.relaxation import Relaxation
 from digiclay.core.scene import Path, Scene, Simulation
-from digiclay.core.scene_file import find, load
+from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.simulation import System, begin, periods
 from digiclay.core.state import State
 from digiclay.core.supply import Supply
@@ -188,6 +188,17 @@ def master(*toward: float, **known: Any) -> Master:
     return start._replace(heading=Heading(0.0, 0.0, *toward), **known)
 
 
-def sample(name: str) -> Scene:
-    """Return a sample scene."""
-    return load(find(name))
+#: A sample of each method that stands in stacks.
+STACKABLE = {
+    "virtual_master": "ridge_mound_valley",
+    "cell_states": "ridge_mound_valley",
+    "elastic": "elastic_press",
+    "plastic": "plastic_press",
+    "force_display": "force_display",
+    "shape_display": "shape_display",
+}
+
+
+def sample(name: str, *settings: str) -> Scene:
+    """Return a sample scene with some settings, ``key=value``."""
+    return load(find(name), [Setting(*setting.split("=")) for setting in settings])

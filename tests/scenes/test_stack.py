@@ -11,27 +11,14 @@ import pytest
 from digiclay.core.errors import DivergenceError, ParameterError
 from digiclay.core.methods import METHODS
 from digiclay.core.scene import Scene, Waypoint
-from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import Result, run
 from digiclay.core.stack.assembly import STACKED, structure, why_not
 from digiclay.core.stack.session import run_together
 
+from tests.assemble import STACKABLE, sample
+
 #: Sums in another order: a last bit here and there. Heights are centimetres, forces tenths of a newton.
 HEIGHT, FORCE = 1e-12, 1e-10
-#: A sample of each method that stands in stacks.
-SAMPLES = {
-    "virtual_master": "ridge_mound_valley",
-    "cell_states": "ridge_mound_valley",
-    "elastic": "elastic_press",
-    "plastic": "plastic_press",
-    "force_display": "force_display",
-    "shape_display": "shape_display",
-}
-
-
-def scene(name: str, *settings: str) -> Scene:
-    """Return a sample with some settings, ``key=value``."""
-    return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
 def moved(known: Scene, x: float, z: float) -> Scene:
@@ -72,7 +59,7 @@ def assert_as_alone(found: Result, known: Scene) -> None:
 
 @pytest.mark.parametrize("method", STACKED)
 def test_runs_with_fingers_and_ends_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
-    known = scene(SAMPLES[method], f"control.method={method}", "simulation.duration=1.5")
+    known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
     scenes = [
         replace(
             moved(known, 0.7e-3 * i, -0.2e-3 * i),
@@ -111,7 +98,7 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
     key: str, values: Sequence[str]
 ) -> None:
     profile = "gaussian" if key == "blister.sigma" else "cone"
-    scenes = [scene("tap", f"{key}={value}", f"blister.profile={profile}") for value in values]
+    scenes = [sample("tap", f"{key}={value}", f"blister.profile={profile}") for value in values]
     for found, one in zip(together(scenes), scenes, strict=True):
         assert_as_alone(found, one)
 
@@ -122,13 +109,13 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(
     [("valve.stroke", ("25e-6", "40e-6")), ("actuator.rest_height", ("39e-3", "41e-3"))],
 )
 def test_the_other_methods_hold_on_devices_of_their_own(method: str, key: str, values: Sequence[str]) -> None:
-    scenes = [scene("tap", f"{key}={value}", f"control.method={method}") for value in values]
+    scenes = [sample("tap", f"{key}={value}", f"control.method={method}") for value in values]
     for found, one in zip(together(scenes), scenes, strict=True):
         assert_as_alone(found, one)
 
 
 @pytest.mark.parametrize(
-    ("sample", "key", "values"),
+    ("name", "key", "values"),
     [
         ("elastic_press", "control.stiffness", ("10", "20", "40")),
         ("elastic_press", "control.settling_time", ("20e-3", "40e-3")),
@@ -137,9 +124,9 @@ def test_the_other_methods_hold_on_devices_of_their_own(method: str, key: str, v
     ],
 )
 def test_behaviours_with_parameters_of_their_own_do_what_they_do_alone(
-    sample: str, key: str, values: Sequence[str]
+    name: str, key: str, values: Sequence[str]
 ) -> None:
-    scenes = [scene(sample, f"{key}={value}", "simulation.duration=1.0") for value in values]
+    scenes = [sample(name, f"{key}={value}", "simulation.duration=1.0") for value in values]
     for found, one in zip(together(scenes), scenes, strict=True):
         assert_as_alone(found, one)
 
@@ -147,7 +134,7 @@ def test_behaviours_with_parameters_of_their_own_do_what_they_do_alone(
 def test_the_papers_session_in_a_stack_is_the_papers_session() -> None:
     gains = ((3, 10), (5, 26.5))
     scenes = [
-        scene("ridge_mound_valley", f"control.force_gain={gain}", f"simulation.duration={end}")
+        sample("ridge_mound_valley", f"control.force_gain={gain}", f"simulation.duration={end}")
         for gain, end in gains
     ]
     assert_as_alone(together(scenes)[1], scenes[1])
@@ -156,7 +143,7 @@ def test_the_papers_session_in_a_stack_is_the_papers_session() -> None:
 def test_pins_pressed_onto_their_end_stops_come_to_what_they_come_to_alone() -> None:
     rests = ("1e-3", "1.5e-3")
     method = ("control.method=elastic", "control.stiffness=5")
-    low = [scene("tap", f"actuator.rest_height={rest}", *method) for rest in rests]
+    low = [sample("tap", f"actuator.rest_height={rest}", *method) for rest in rests]
     scenes = [moved(one, 0.0, -41e-3) for one in low]
     for found, one in zip(together(scenes), scenes, strict=True):
         assert_as_alone(found, one)
@@ -169,7 +156,7 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
         Waypoint(time=time, position=(0.0, 0.0, z))
         for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))
     )
-    known = scene("tap", "control.method=plastic")
+    known = sample("tap", "control.method=plastic")
     twice = replace(
         known,
         trajectory=replace(known.trajectory, waypoints=points),
@@ -182,38 +169,38 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
 
 def test_richardsons_form_moves_cells_of_their_own_as_alone() -> None:
     settings = ("simulation.stepper=richardson", "simulation.duration=0.4")
-    scenes = [scene("tap", f"valve.stroke={stroke}", *settings) for stroke in ("25e-6", "40e-6")]
+    scenes = [sample("tap", f"valve.stroke={stroke}", *settings) for stroke in ("25e-6", "40e-6")]
     assert_as_alone(together(scenes)[1], scenes[1])
 
 
 @pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
 def test_any_stepper_can_move_a_stack(stepper: str) -> None:
     settings = (f"simulation.stepper={stepper}", "simulation.physics_step=5e-4", "simulation.duration=0.4")
-    scenes = [scene("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
+    scenes = [sample("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
     assert_as_alone(together(scenes)[1], scenes[1])
 
 
 def test_a_recorder_that_leaves_out_rows_leaves_out_the_same() -> None:
     settings = ("recorder.every=7", "simulation.duration=1.003")
-    scenes = [scene("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
+    scenes = [sample("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
     assert_as_alone(together(scenes)[0], scenes[0])
 
 
 def test_without_a_recorder_there_is_no_history() -> None:
-    scenes = [scene("tap", f"control.force_gain={gain}", "recorder=absent") for gain in (3, 5)]
+    scenes = [sample("tap", f"control.force_gain={gain}", "recorder=absent") for gain in (3, 5)]
     assert [one.history for one in together(scenes)] == [None, None]
 
 
 def test_without_a_finger_or_a_controller_a_stack_stands_still() -> None:
     settings = ("control=absent", "fingertip=absent", "simulation.duration=0.1")
-    scenes = [replace(scene("tap", *settings), name=name) for name in "ab"]
+    scenes = [replace(sample("tap", *settings), name=name) for name in "ab"]
     assert_as_alone(together(scenes)[1], scenes[1])
 
 
 def blown_up() -> list[Scene]:
     """Return three scenes in steps far too long for Euler; only the middle one's finger gets to the bed."""
     long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
-    known = scene("slow_press", "simulation.stepper=euler", *long)
+    known = sample("slow_press", "simulation.stepper=euler", *long)
     return [moved(known, 0.0, 20e-3), known, moved(known, 1e-3, 20e-3)]
 
 
@@ -234,7 +221,7 @@ def test_when_a_run_diverges_the_others_go_on() -> None:
 
 
 def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on() -> None:
-    known = scene("tap")
+    known = sample("tap")
     endless = replace(known, simulation=replace(known.simulation, duration=1e6))
     found = together([endless, known])
     assert isinstance(found[0], ParameterError)
@@ -243,27 +230,27 @@ def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on() -> None:
 
 
 def test_a_stack_that_is_stopped_gives_up_what_is_not_done() -> None:
-    scenes = [scene("tap", f"control.force_gain={gain}") for gain in (3, 5)]
+    scenes = [sample("tap", f"control.force_gain={gain}") for gain in (3, 5)]
     assert list(run_together(scenes, stopped=lambda: True)) == []
 
 
 def test_the_run_times_of_a_stack_are_shares_of_it() -> None:
-    first, second = together([scene("tap", f"control.force_gain={gain}") for gain in (3, 5)])
+    first, second = together([sample("tap", f"control.force_gain={gain}") for gain in (3, 5)])
     assert first.run_time == second.run_time > 0.0
 
 
 def test_every_method_stands_in_stacks_or_says_why_not() -> None:
     for method in METHODS:
-        known = scene("tap", f"control.method={method}")
+        known = sample("tap", f"control.method={method}")
         assert bool(why_not(known)) == (method not in STACKED), method
 
 
 def test_sensors_keep_a_scene_out_of_stacks() -> None:
-    assert why_not(scene("tap", "sensors.force_noise=0.001")) == "their sensors are no part of a stack yet"
+    assert why_not(sample("tap", "sensors.force_noise=0.001")) == "their sensors are no part of a stack yet"
 
 
 def test_a_shape_to_start_from_keeps_a_scene_out_of_stacks() -> None:
-    assert why_not(scene("dome_peaked")) == "a shape comes up before their method takes over"
+    assert why_not(sample("dome_peaked")) == "a shape comes up before their method takes over"
 
 
 @pytest.mark.parametrize(
@@ -271,4 +258,4 @@ def test_a_shape_to_start_from_keeps_a_scene_out_of_stacks() -> None:
     ["layout.rows=21", "delay=absent", "simulation.physics_step=2e-3", "blister.profile=gaussian"],
 )
 def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
-    assert structure(scene("tap", setting)) != structure(scene("tap"))
+    assert structure(sample("tap", setting)) != structure(sample("tap"))

@@ -8,28 +8,15 @@ from dataclasses import asdict, replace
 import pytest
 from digiclay.core.accuracy import estimated
 from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import Result, run
 from digiclay.core.stack.assembly import STACKED, structure
 from digiclay.core.stack.session import judge_of, judge_together
 
+from tests.assemble import STACKABLE, sample
+
 #: An estimate is the difference of two integrations under the same commands. Alone and in a stack both end in
 #: other last bits (sums in another order), some 1e-17 m and 1e-14 N, of heights of 4 cm and forces of 0.4 N.
 RELATIVE, ABSOLUTE = 1e-9, {"height": 1e-15, "force": 1e-12, "total_force": 1e-12}
-#: A sample of each method that stands in stacks.
-SAMPLES = {
-    "virtual_master": "ridge_mound_valley",
-    "cell_states": "ridge_mound_valley",
-    "elastic": "elastic_press",
-    "plastic": "plastic_press",
-    "force_display": "force_display",
-    "shape_display": "shape_display",
-}
-
-
-def scene(name: str, *settings: str) -> Scene:
-    """Return a sample with some settings, ``key=value``."""
-    return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
 def judged(scenes: Sequence[Scene]) -> list[Result]:
@@ -55,7 +42,7 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
 
 @pytest.mark.parametrize("method", STACKED)
 def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
-    known = scene(SAMPLES[method], f"control.method={method}", "simulation.duration=1.5")
+    known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
     first, *others = known.trajectory.waypoints
     scenes = []
     for i in range(3):
@@ -84,18 +71,18 @@ def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: s
     ],
 )
 def test_runs_with_parameters_of_their_own_are_as_exact_as_alone(key: str, values: Sequence[str]) -> None:
-    assert_estimated_as_alone([scene("tap", f"{key}={value}") for value in values])
+    assert_estimated_as_alone([sample("tap", f"{key}={value}") for value in values])
 
 
 @pytest.mark.parametrize("stepper", ["richardson", "adaptive", "runge_kutta_4"])
 def test_runs_of_any_stepper_are_as_exact_as_alone(stepper: str) -> None:
     settings = (f"simulation.stepper={stepper}", "simulation.physics_step=1e-3", "simulation.duration=0.4")
-    assert_estimated_as_alone([scene("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)])
+    assert_estimated_as_alone([sample("tap", f"control.force_gain={gain}", *settings) for gain in (3, 5)])
 
 
 def test_pins_on_their_end_stops_are_as_exact_as_alone() -> None:
     settings = ("control.method=elastic", "control.stiffness=5")
-    known = scene("tap", "actuator.rest_height=1.5e-3", *settings)
+    known = sample("tap", "actuator.rest_height=1.5e-3", *settings)
     points = tuple(
         replace(point, position=(*point.position[:2], point.position[2] - 39e-3))
         for point in known.trajectory.waypoints
@@ -105,11 +92,11 @@ def test_pins_on_their_end_stops_are_as_exact_as_alone() -> None:
 
 
 def test_where_commands_are_left_out_no_errors_are_told() -> None:
-    (found,) = judged([scene("tap", "recorder.every=2", "simulation.duration=0.1")])
+    (found,) = judged([sample("tap", "recorder.every=2", "simulation.duration=0.1")])
     assert "height_error" not in found.metrics
 
 
 def test_without_being_asked_no_errors_are_told() -> None:
-    ((_, found),) = judge_together([scene("tap", "simulation.duration=0.1")])
+    ((_, found),) = judge_together([sample("tap", "simulation.duration=0.1")])
     assert isinstance(found, Result)
     assert "height_error" not in found.metrics

@@ -10,28 +10,15 @@ import pytest
 from digiclay.core.errors import DivergenceError
 from digiclay.core.metrics import METRICS
 from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import run
 from digiclay.core.stack.assembly import STACKED
 from digiclay.core.stack.session import judge_together
 
+from tests.assemble import STACKABLE, sample
+
 #: Sums in another order. By unit: heights agree to 1e-12 m and forces to 1e-10 N (test_stack.py), lags are
 #: rounded to 1e-12 m; a volume adds up some hundred heights, each over 1e-5 m².
 RELATIVE, ABSOLUTE = 1e-9, {"m": 1e-12, "N": 1e-10, "m3": 1e-15, "s": 1e-12, "1": 1e-12}
-#: A sample of each method that stands in stacks.
-SAMPLES = {
-    "virtual_master": "ridge_mound_valley",
-    "cell_states": "ridge_mound_valley",
-    "elastic": "elastic_press",
-    "plastic": "plastic_press",
-    "force_display": "force_display",
-    "shape_display": "shape_display",
-}
-
-
-def scene(name: str, *settings: str) -> Scene:
-    """Return a sample with some settings, ``key=value``."""
-    return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
 def judged(scenes: Sequence[Scene]) -> list[Any]:
@@ -62,7 +49,7 @@ def assert_as(found: Any, alone: Any) -> None:
 
 @pytest.mark.parametrize("method", STACKED)
 def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str) -> None:
-    known = scene(SAMPLES[method], f"control.method={method}", "simulation.duration=2.5")
+    known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=2.5")
     first, *others = known.trajectory.waypoints
     scenes = []
     for i in range(3):
@@ -76,7 +63,8 @@ def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str
 def test_the_papers_session_is_judged_as_alone() -> None:
     # The ridge ends after 10 s: by then every metric has a value.
     scenes = [
-        scene("ridge_mound_valley", f"control.force_gain={gain}", "simulation.duration=11") for gain in (3, 5)
+        sample("ridge_mound_valley", f"control.force_gain={gain}", "simulation.duration=11")
+        for gain in (3, 5)
     ]
     assert_judged_as_alone(scenes)
 
@@ -85,40 +73,40 @@ def test_the_papers_session_is_judged_as_alone() -> None:
 def test_runs_with_one_finger_and_times_of_their_own_are_judged_as_alone(key: str) -> None:
     values = {"duration": (2.0, 2.5), "control_period": (4e-3, 5e-3)}[key]
     assert_judged_as_alone(
-        [scene("tap", "simulation.duration=2.5", f"simulation.{key}={value}") for value in values]
+        [sample("tap", "simulation.duration=2.5", f"simulation.{key}={value}") for value in values]
     )
 
 
 def test_rows_that_are_left_out_are_left_out_of_the_metrics() -> None:
     settings = ("recorder.every=7", "simulation.duration=1.003")
-    assert_judged_as_alone([scene("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)])
+    assert_judged_as_alone([sample("slow_press", f"control.force_gain={gain}", *settings) for gain in (3, 5)])
 
 
 def test_a_session_of_a_single_period_is_judged() -> None:
-    scenes = [scene("tap", f"control.force_gain={gain}", "simulation.duration=5e-3") for gain in (3, 5)]
+    scenes = [sample("tap", f"control.force_gain={gain}", "simulation.duration=5e-3") for gain in (3, 5)]
     assert_judged_as_alone(scenes)
 
 
 def test_a_finger_that_touches_nothing_is_judged() -> None:
     low = ("simulation.duration=0.1", "control.force_gain=3")
-    assert_judged_as_alone([scene("tap", f"actuator.rest_height={height}", *low) for height in (0.01, 0.02)])
+    assert_judged_as_alone([sample("tap", f"actuator.rest_height={height}", *low) for height in (0.01, 0.02)])
 
 
 def test_beds_whose_rows_are_shifted_are_judged() -> None:
     settings = ("layout.arrangement=hexagonal", "simulation.duration=2.5")
     assert_judged_as_alone(
-        [scene("ridge_mound_valley", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
+        [sample("ridge_mound_valley", f"control.force_gain={gain}", *settings) for gain in (3, 5)]
     )
 
 
 def test_a_run_without_a_history_has_none() -> None:
-    (only,) = judged([scene("tap", "simulation.duration=0.05")])
+    (only,) = judged([sample("tap", "simulation.duration=0.05")])
     assert only.history is None
 
 
 def test_a_run_that_diverges_is_told_and_the_others_are_judged() -> None:
     long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
-    known = scene("slow_press", "simulation.stepper=euler", *long)
+    known = sample("slow_press", "simulation.stepper=euler", *long)
     points = tuple(
         replace(point, position=(*point.position[:2], point.position[2] + 20e-3))
         for point in known.trajectory.waypoints

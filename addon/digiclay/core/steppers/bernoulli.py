@@ -78,8 +78,9 @@ class Block:
         self.conductances, self.inputs = inputs[: 2 * gauss], inputs[:, :k]
         self.size, self.signed = inputs[:gauss], inputs[gauss : 2 * gauss]
         self.under = inputs[2 * gauss : -1, :k]
-        # What the maps make of them: see `BernoulliPlan.loaded`.
-        self.free, self.loaded = empty(len(plan.segments), count), empty(len(plan.loaded), k)
+        # What the maps make of them: see `BernoulliPlan.moves`, of which the first rows, and `loaded`.
+        self.rises = plan.moves[: len(plan.segments)]
+        self.free, self.loaded = empty(len(self.rises), count), empty(len(plan.loaded), k)
         self.steps = tuple(
             (rise, rise[:k], self.loaded[at : at + 2], *self.loaded[at : at + 3])
             for rise, at in zip(self.free, range(1, len(self.loaded), 3), strict=True)
@@ -106,7 +107,7 @@ class Block:
         self.size[:] = plan.unloaded(self.opening)
         # The sign picks the reservoir.
         np.copysign(self.size, self.opening, self.signed)
-        plan.free.dot(self.conductances, self.free)
+        self.rises.dot(self.conductances, self.free)
         if under.shape[1]:
             self.under[:] = under
             plan.loaded.dot(self.inputs, self.loaded)

@@ -48,8 +48,6 @@ class BernoulliPlan:
     moves : ndarray (4 s, 2 g)
         From conductances at the Gauss points, and the same with the signs of the openings, to
         what each step has: free rise, m; the same and its `bow`, in 1/m; decay, see `closed_form`.
-    free : ndarray (s, 2 g)
-        The free rise's rows of it.
     path : ndarray (3 s + 1, p)
         From the finger's underside at the period's instants to what each step has, in 1/m: rise
         and its bow; underside at the start, and at the end of the last.
@@ -85,7 +83,6 @@ class BernoulliPlan:
     segments: tuple[Segment, ...]
     response: Floats
     moves: Floats
-    free: Floats
     path: Floats
     loaded: Floats
     nodes: tuple[slice, ...]
@@ -131,7 +128,6 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
         segments,
         cell.lag.response(queue, [*times, end]),
         moves,
-        moves[: len(segments)],
         path,
         _loaded(moves, path, m * contact.offset),
         nodes,

@@ -60,7 +60,7 @@ class Richardson:
             coarse[:] = driven
             once(under)
             twice(under)
-            np.add(fine_rows, (fine_rows - coarse_rows) / 3.0, fine_rows)
+            np.add(fine_rows, (fine_rows - coarse_rows) / 3.0, out=fine_rows)
             np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
             np.maximum(pulp, 0.0, out=pulp)
             return felt(cell, driven, under[-1])
