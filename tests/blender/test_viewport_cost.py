@@ -18,8 +18,9 @@ def test_every_part_of_a_tick_is_timed_and_nothing_is_left_in_the_file() -> None
 
 
 def test_a_session_does_not_gather_memory_as_it_goes_on() -> None:
-    # What fits into the rings of trace and gestures is kept; a leak of a state a tick were 25 times 13 kB.
-    assert viewport_cost.measured(12, 12, 25).growth < 100e3
+    # What fits into the rings of trace and gestures is kept, and filled arrays of known widths: up to
+    # 77 kB in ten runs. A leak of a state a tick were 25 times 13 kB.
+    assert viewport_cost.measured(12, 12, 25).growth < 200e3
 
 
 def test_the_command_prints_a_row_for_every_bed(
