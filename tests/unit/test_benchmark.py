@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands import benchmark_peers as peers
-from digiclay.commands import benchmark_precision as precision
 from digiclay.commands.benchmark_calls import Counted, Ledger, floor
 from digiclay.commands.benchmark_loop import loop
-from digiclay.commands.benchmark_problems import PROBLEMS, Work, problem, solved
+from digiclay.commands.benchmark_problems import PROBLEMS, problem, solved
 from digiclay.commands.benchmark_report import kept, made_with
 from digiclay.commands.benchmark_terms import LONGER, TERMS, without
+from digiclay.commands.benchmark_work import Work, best_ratio
 from digiclay.commands.tables import table
 from digiclay.core.errors import OutputError
 
@@ -93,7 +93,7 @@ def test_the_cheapest_run_is_the_fastest_that_is_exact_enough() -> None:
         run("bernoulli", 1e-5, 1.0, peer=False), run("bernoulli", 1e-7, 3.0, peer=False),
         run("LSODA", 1e-7, 60.0, peer=True), run("Python loop", 1e-9, 9.0, peer=True),
     ]  # fmt: skip
-    ratios = [precision.best_ratio(work, level) for level in (1e-5, 1e-6, 1e-8)]
+    ratios = [best_ratio(work, level) for level in (1e-5, 1e-6, 1e-8)]
     assert ratios == [60.0, 20.0, None]
 
 

@@ -12,9 +12,10 @@ from ..core.fingertip import JOIN
 from ..core.simulation import begin
 from ..core.steppers.bernoulli_plan import POINTS
 from .benchmark_peers import ROOT, Line
-from .benchmark_problems import Measured, Problem
+from .benchmark_problems import PERIOD, Measured, Problem
+from .benchmark_work import LOOP, Work
 
-__all__ = ["Scalar", "loop"]
+__all__ = ["Scalar", "loop", "looped"]
 
 #: Gauss points of a whole step.
 WHOLE = POINTS[-1][1]
@@ -23,7 +24,7 @@ WHOLE = POINTS[-1][1]
 def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
     """Integrate the first periods cell by cell in plain Python; return the CPU time, s, too.
 
-    Only the cells that take part are gone through, as for the solvers.
+    Only the cells that take part by the problem's sets are gone through, as for the solvers.
     """
     line = Line(known)
     system, grid = line.system, line.system.grid
@@ -56,6 +57,14 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
         heights.append([y[0] for y in state])
         forces.append(total)
     return Measured(np.array(heights), np.array(forces)), time.process_time() - started
+
+
+def looped(known: Problem, exact: Measured, step: float) -> Work:
+    """Return the loop's point: a whole run at one step, s."""
+    found, took = loop(known, step, known.scene.periods)
+    height, force = found.against(exact)
+    count = known.scene.periods * round(PERIOD / step)
+    return Work(known.name, LOOP, step, height, force, took, count, True)
 
 
 class Scalar:

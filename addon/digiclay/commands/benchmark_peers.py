@@ -1,7 +1,8 @@
 """The same problems by SciPy: what our steppers are measured by.
 
-The peers get every advantage: rates with few numpy calls, only the cells that take part, the
-banded Jacobian where a solver knows one, and a solver's own Fortran loop where there is one.
+The peers get every advantage: rates with few numpy calls, only the cells that take part by the
+problem's sets, the banded Jacobian where a solver knows one, and a solver's own Fortran loop where
+there is one.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import math
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +21,26 @@ from ..core.errors import DigiclayError
 from ..core.fingertip import JOIN
 from ..core.simulation import begin
 from ..core.trajectory import Trajectory
-from .benchmark_problems import Measured, Problem, Work, replaying
+from .benchmark_problems import Measured, Problem, replaying, solved
+from .benchmark_work import Work
 
-__all__ = ["ROOT", "SOLVERS", "Line", "missing", "peer", "points", "reference"]
+__all__ = [
+    "CHECK",
+    "ROOT",
+    "SOLVERS",
+    "Line",
+    "missing",
+    "peer",
+    "points",
+    "reference",
+    "reference_and_check",
+]
 
 Floats = NDArray[np.float64]
 #: Moves the flat state from one time to another; returns it and the number of evaluations.
 Solver = Callable[[Any, float, Floats, float, float, Floats, int], tuple[Floats, int]]
+#: Step of the check of the reference, s.
+CHECK = 5e-5
 ROOT = math.sqrt(1.0 - JOIN)
 
 
@@ -192,6 +207,14 @@ def _force(line: Line, t: float, state: Floats, x: Floats, y: Floats) -> float:
 def reference(known: Problem) -> Measured:
     """Return the solution at a tolerance of 1e-12."""
     return peer(known, _marched("DOP853", max_step=1e-3, first_step=1e-5), 1e-12)[0]
+
+
+def reference_and_check(known: Problem) -> tuple[Measured, float]:
+    """Return the exact solution and how far Richardson's form, its stand-in without SciPy, is from it, m."""
+    simulation = replace(known.scene.simulation, stepper="richardson", physics_step=CHECK)
+    other = solved(replace(known.scene, simulation=simulation), known.commands)
+    exact = other if missing() else reference(known)
+    return exact, other.against(exact)[0]
 
 
 def points(known: Problem, exact: Measured, name: str, tolerances: tuple[float, ...]) -> Iterator[Work]:

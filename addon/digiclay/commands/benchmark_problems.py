@@ -16,13 +16,13 @@ from ..core.scene import Scene
 from ..core.scene_table import resolve
 from ..core.simulation import begin, periods
 from ..core.system import System
+from .benchmark_work import Work
 
 __all__ = [
     "PERIOD",
     "PROBLEMS",
     "Measured",
     "Problem",
-    "Work",
     "live",
     "ours",
     "problem",
@@ -83,6 +83,11 @@ class Problem:
     commands: Floats
     sets: list[tuple[NDArray[np.intp], int]]
 
+    @property
+    def taking_part(self) -> float:
+        """Cells that take part in a period, the mean."""
+        return float(np.mean([cells.size for cells, _ in self.sets]))
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -97,25 +102,18 @@ class Measured:
         return float(np.abs(height).max()), float(np.abs(force).max())
 
 
-@dataclass(frozen=True)
-class Work:
-    """A point of the work-precision plot: SI units; `evaluations` of the rates of all cells."""
-
-    problem: str
-    method: str
-    setting: float
-    height_error: float
-    force_error: float
-    seconds: float
-    evaluations: int
-    peer: bool
-
-
-def live(name: str, period: float = PERIOD, step: float = 1e-3, stepper: str = "bernoulli") -> Scene:
-    """Return a problem's scene under Method I."""
-    side, waypoints, joined, held = PROBLEMS[name]
+def live(
+    name: str,
+    period: float = PERIOD,
+    step: float = 1e-3,
+    stepper: str = "bernoulli",
+    *,
+    side: int | None = None,
+) -> Scene:
+    """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns."""
+    own, waypoints, joined, held = PROBLEMS[name]
     table: dict[str, Any] = {
-        "layout": {"rows": side, "columns": side},
+        "layout": {"rows": side or own, "columns": side or own},
         "recorder": "absent",
         "control": {} if held is None else "absent",
         "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
@@ -127,9 +125,9 @@ def live(name: str, period: float = PERIOD, step: float = 1e-3, stepper: str = "
     return resolve(table, name)
 
 
-def problem(name: str) -> Problem:
-    """Record a problem's commands and work out which cells take part."""
-    scene, held = live(name), PROBLEMS[name][3]
+def problem(name: str, *, side: int | None = None) -> Problem:
+    """Record a problem's commands, on its own bed or another, and work out which cells take part."""
+    scene, held = live(name, side=side), PROBLEMS[name][3]
     system = assemble(scene)
     if held is None:
         run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)

@@ -19,6 +19,8 @@ LOOKS: dict[str, tuple[str, str, str]] = {
     "runge_kutta_4": ("#CC79A7", "D", "-"), "heun": ("#E69F00", "^", "-"), "euler": ("#56B4E9", "v", "-"),
     "LSODA": ("#D55E00", "o", "--"), "DOP853": ("#222222", "s", "--"), "Radau": ("#8A6D00", "D", "--"),
     "Python loop": ("#777777", "X", ":"),
+    "LSODA, whole bed": ("#D55E00", "P", "-."), "DOP853, whole bed": ("#222222", "p", "-."),
+    "Radau, whole bed": ("#8A6D00", "d", "-."), "Python loop, whole bed": ("#777777", "*", ":"),
 }  # fmt: skip
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans", "font.size": 10, "axes.titlelocation": "left", "axes.titlesize": 11,
@@ -57,8 +59,8 @@ class Gain(Protocol):
     errors_stacked: float
 
 
-def precision(work: Sequence[Work], out: Path) -> Path:
-    """Draw the work-precision plot, one panel a problem, and return its path."""
+def precision(work: Sequence[Work], out: Path, lines: str = "full lines: ours; dashed: peers") -> Path:
+    """Draw the work-precision plot, one panel a problem, and return its path; `lines` heads the legend."""
     names = list(dict.fromkeys(one.problem for one in work))
     columns = min(3, len(names))
     rows = -(-(len(names) + 1) // columns)
@@ -74,9 +76,7 @@ def precision(work: Sequence[Work], out: Path) -> Path:
             for panel in panels[: len(names)]
             for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)
         }
-        panels[len(names)].legend(
-            handles.values(), handles, loc="center", ncols=2, title="full lines: ours; dashed: peers"
-        )
+        panels[len(names)].legend(handles.values(), handles, loc="center", ncols=2, title=lines)
         return _written(figure, out)
 
 
