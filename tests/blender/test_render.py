@@ -18,6 +18,8 @@ from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import render, stage
 
+from tests.patience import HANGS
+
 WIDTH, HEIGHT = 240, 150
 
 
@@ -143,7 +145,7 @@ def test_rendering_without_blender_says_in_one_line_what_to_install(tmp_path: Pa
     )
     path = f"{tmp_path}:{Path(digiclay.__file__).parents[1]}"
     done = subprocess.run(
-        [sys.executable, "-c", code], env={"PYTHONPATH": path}, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code], env={"PYTHONPATH": path}, capture_output=True, text=True, timeout=HANGS
     )
     assert done.stderr == ""
     assert done.stdout.splitlines() == [

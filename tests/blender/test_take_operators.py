@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core import live
 from digiclay.core.scene_file import load
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
@@ -19,12 +18,6 @@ from numpy.typing import NDArray
 pytestmark = pytest.mark.usefixtures("extension")
 #: Time between two ticks, s: a session follows ten control periods in each.
 TICK = 0.05
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test records must not depend on who else uses the machine."""
-    monkeypatch.setattr(live, "SHARE", 1e9)
 
 
 @pytest.fixture

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 
+from tests.patience import HANGS
+
 PROGRAMS = ("admesh", "assimp", "prusa-slicer")
 
 
@@ -54,7 +56,7 @@ def told(*command: str | Path) -> str:
     done = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        text=True, errors="replace", timeout=120,
+        text=True, errors="replace", timeout=HANGS,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     return done.stdout

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import HANGS
+
 ADDON = Path(__file__).parents[2] / "addon"
 
 RUN = """
@@ -26,7 +28,7 @@ def imported(*absent: str) -> set[str]:
     """Run a short session without some parts; return the core's modules it imported."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN, *absent],
-        cwd=ADDON, capture_output=True, text=True, check=False, timeout=60,
+        cwd=ADDON, capture_output=True, text=True, check=False, timeout=HANGS,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return set(done.stdout.split())

@@ -18,6 +18,8 @@ from digiclay.core.export_model import Model, bodies
 from digiclay.core.formed import Formed
 from digiclay.core.layout import Layout, grid
 
+from tests.patience import HANGS
+
 
 @pytest.fixture
 def solid() -> list[Body]:
@@ -88,7 +90,7 @@ def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
 def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     disk = tmp_path / "disk"
     disk.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=20)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=HANGS)
     try:
         path = disk / f"surface{export.suffix(kind)}"
         path.write_bytes(b"older")
@@ -100,7 +102,7 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
         assert [one.name for one in disk.iterdir()] == [path.name]
         assert path.read_bytes() == b"older"
     finally:
-        subprocess.run(["umount", disk], check=True, timeout=20)
+        subprocess.run(["umount", disk], check=True, timeout=HANGS)
 
 
 def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
@@ -125,7 +127,7 @@ def test_exporting_needs_numpy_alone():
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANGS,
         check=True,
         env=environment,
     )

@@ -14,6 +14,8 @@ from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
 from digiclay.plots import run as plots
 
+from tests.patience import HANGS
+
 
 def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
     """A finger that touches down at 1 s, draws a ridge along x and lifts at 9 s."""
@@ -187,7 +189,7 @@ def python(script: str) -> str:
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANGS,
         check=True,
         env=environment,
     )

@@ -21,6 +21,8 @@ from digiclay.core.session import run
 from digiclay.core.simulation import begin, periods
 from numpy.typing import NDArray
 
+from tests.patience import HANGS
+
 Floats = NDArray[np.float64]
 
 CELLS = 500
@@ -235,7 +237,7 @@ def test_only_the_sensor_models_asked_for_are_imported(setting: str, modules: st
     )
     done = subprocess.run(
         [sys.executable, "-c", script, "simulation.duration=0.1", *filter(None, [setting])],
-        cwd=Path(__file__).parents[2] / "addon", capture_output=True, text=True, check=True, timeout=60,
+        cwd=Path(__file__).parents[2] / "addon", capture_output=True, text=True, check=True, timeout=HANGS,
     )  # fmt: skip
     assert done.stdout.strip() == modules
 

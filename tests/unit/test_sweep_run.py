@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
@@ -23,6 +24,8 @@ from digiclay.core.sweep_axis import axis
 from digiclay.core.sweep_bundles import evaluate_all
 from digiclay.core.sweep_folder import Column, columns
 from digiclay.plots.sweep import sweep_figure
+
+from tests.patience import HANGS, until
 
 #: A tenth of a second of a scene is enough for most of this.
 SHORT = [Setting("simulation.duration", "0.1")]
@@ -108,14 +111,22 @@ def test_a_session_that_was_stopped_is_no_finished_point() -> None:
 
 def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
     begun: list[Scene] = []
+    asked = threading.Semaphore(0)
 
     def task(scenes: list[Scene]) -> list[Record | None]:
         begun.extend(scenes)
-        time.sleep(0.3)
+        # Asked once more after it was told to stop, it has given up what was not begun.
+        assert asked.acquire(timeout=HANGS)
+        assert asked.acquire(timeout=HANGS)
         return [{"figures": {}}]
 
+    def stopped() -> bool:
+        if begun:
+            asked.release()
+        return bool(begun)
+
     with ThreadPoolExecutor(1) as one:
-        done = finished(one, task, some(9), stopped=lambda: bool(begun))
+        done = finished(one, task, some(9), stopped=stopped)
     assert (len(begun), len(done)) == (1, 1)
 
 
@@ -125,17 +136,24 @@ def test_workers_that_die_are_told_in_one_line() -> None:
 
 
 def interrupted(out: Path, number: int) -> tuple[int, str]:
-    """Start a sweep, send it a signal after its first points; return exit code and stderr."""
-    started = subprocess.Popen(
-        [sys.executable, "-c", "from digiclay.cli import console; console()", *MANY, "--out", str(out)],
-        stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ADDON)},
+    """Run a sweep that gets a signal as soon as it has kept its second point; return exit code and stderr."""
+    script = (
+        "import os\n"
+        "from digiclay.core.sweep_folder import Folder\n"
+        "keep, kept = Folder.keep, []\n"
+        "def told(*given):\n"
+        "    keep(*given)\n"
+        "    kept.append(given)\n"
+        "    if len(kept) == 2:\n"
+        f"        os.kill(os.getpid(), {int(number)})\n"
+        "Folder.keep = told\n"
+        "from digiclay.cli import console; console()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, *MANY, "--out", str(out)], capture_output=True, text=True,
+        timeout=HANGS, env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
-    deadline = time.monotonic() + 60.0
-    while len(list(out.glob("points/*.json"))) < 2 and time.monotonic() < deadline:
-        time.sleep(0.005)
-    started.send_signal(number)
-    _, err = started.communicate(timeout=60)
-    return started.returncode, err
+    return done.returncode, done.stderr
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -161,13 +179,10 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
         env={**os.environ, "PYTHONPATH": str(ADDON)}, start_new_session=True,
     )  # fmt: skip
     try:
-        deadline = time.monotonic() + 60.0
-        while not (here / "out" / "sweep.json").exists() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert (here / "out" / "sweep.json").exists()
+        until((here / "out" / "sweep.json").exists)
         time.sleep(3.0)  # the workers run or are being started; a terminal sends Ctrl-C to them as well
         os.killpg(started.pid, signal.SIGINT)
-        _, err = started.communicate(timeout=60)  # the sessions would take hours
+        _, err = started.communicate(timeout=HANGS)  # the sessions would take hours
     finally:
         if started.poll() is None:
             os.killpg(started.pid, signal.SIGKILL)
@@ -183,7 +198,7 @@ def test_ctrl_c_does_not_reach_a_worker_that_is_just_being_started(here: Path) -
     done = subprocess.run(
         [sys.executable, "-c", script, *MANY, "--set", "simulation.duration=0.1", "--out", "out"],
         env={**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{ADDON}"}, capture_output=True, text=True,
-        timeout=120,
+        timeout=HANGS,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
 

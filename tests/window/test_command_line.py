@@ -10,11 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import HANGS
 from tests.window.blender_window import BLENDER
 
 TOOL = Path(__file__).parents[2] / "tools" / "extension.py"
-#: A command takes 1 s, a still 5 s with software GL; beyond this Blender hangs.
-LIMIT = 120
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -28,11 +27,11 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         given = [BLENDER, "--command", *words]
         return subprocess.run(
-            given, env=environment, cwd=folder, capture_output=True, text=True, timeout=LIMIT
+            given, env=environment, cwd=folder, capture_output=True, text=True, timeout=HANGS
         )
 
     built = [sys.executable, str(TOOL), "--out", str(folder)]
-    done = subprocess.run(built, capture_output=True, text=True, timeout=LIMIT)
+    done = subprocess.run(built, capture_output=True, text=True, timeout=HANGS)
     assert done.returncode == 0, done.stderr
     (archive,) = folder.glob("*.zip")
     done = run("extension", "validate", str(archive))

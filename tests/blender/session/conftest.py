@@ -8,18 +8,11 @@ from typing import Any
 import bpy
 import digiclay
 import pytest
-from digiclay.core import live
 from digiclay.live import handlers
 
 from tests.blender.session.live import (
     Clock,
 )
-
-
-@pytest.fixture(autouse=True)
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live, "SHARE", 1e9)
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,19 @@
+"""How long tests wait for other processes: so much longer than any takes that only what hangs is given up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+__all__ = ["HANGS", "until"]
+
+#: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it hangs, s.
+HANGS = 240.0
+
+
+def until(holds: Callable[[], object]) -> None:
+    """Wait until something holds."""
+    deadline = time.monotonic() + HANGS
+    while not holds():
+        assert time.monotonic() < deadline, "What was waited for did not come"
+        time.sleep(0.02)
