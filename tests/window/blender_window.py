@@ -12,9 +12,9 @@ from typing import Any
 BLENDER = os.environ.get("DIGICLAY_BLENDER_WINDOW", "")
 HERE = Path(__file__).parent
 ADDON = HERE.parents[1] / "addon" / "digiclay"
-#: A run takes two minutes under a virtual screen with software GL, and has taken more than four on a busy
+#: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
 #: machine; beyond this it hangs, s.
-LIMIT = 480
+LIMIT = 1200
 
 
 def played(script: str, out: Path, size: tuple[int, int] = (1280, 800)) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import json
 import subprocess
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,11 @@ def middle() -> tuple[int, int]:
     """Return the middle of the 3D view, window pixels."""
     _, region = view()
     return region.x + region.width // 2, region.y + region.height // 2
+
+
+def evaluate() -> None:
+    """Have Blender work out where things stand, unknown from an undo to the next picture."""
+    window().view_layer.update()
 
 
 def pixel(place: Any) -> tuple[int, int]:
@@ -138,8 +143,10 @@ def grab(
 ) -> Iterator[float | None]:
     """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
 
-    With `look_as` what stands in the scene is written down during the move, after each step.
+    Sessions follow each step before the next. With `look_as` what stands in the scene is written down
+    during the move, after each step.
     """
+    evaluate()
     start = bpy.context.view_layer.objects.active.matrix_world.translation.copy()
     scale = part("bridge").SCALE * 1e-3
     key_at = pixel(start)
@@ -154,10 +161,20 @@ def grab(
         key_at = pixel(place)
         event("MOUSEMOVE", "NOTHING", key_at)
         yield None
+        yield from settle(1)
         if look_as:
             look(f"{look_as} {step}")
     key(end, key_at)
     yield None
+
+
+def until(found: Callable[[], bool]) -> Iterator[float | None]:
+    """Wait until something is so, however slow the machine is; what is not so after minutes never will be."""
+    for _ in range(480):
+        yield 0.25
+        if found():
+            return
+    raise AssertionError("What was waited for did not come")
 
 
 def settle(ticks: int = 3) -> Iterator[float | None]:
@@ -174,6 +191,7 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
 
 def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
+    evaluate()
     bridge, running = part("bridge"), part("live.running")
     found: dict[str, Any] = {"beds": len(beds()), "sessions": len(running.all()), "said": running.said()}
     for bed in beds()[:1]:
@@ -204,7 +222,7 @@ def shot(name: str) -> None:
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
     command = ["import", "-window", "root", str(file)]
-    subprocess.run(command, check=True, timeout=30, capture_output=True)
+    subprocess.run(command, check=True, timeout=120, capture_output=True)
     image = bpy.data.images.load(str(file))
     SEEN.setdefault("colours", {})[name] = len(
         np.unique(np.array(image.pixels[:], np.float32).reshape(-1, image.channels), axis=0)
@@ -228,8 +246,12 @@ def main() -> None:
     """Enable the extension under the name Blender gives it, and play the script."""
     faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
+    # A view that is still on its way would not be where the mouse is sent by it.
+    bpy.context.preferences.view.smooth_view = 0
     # Smooth edges cost software GL most of its time.
     bpy.context.preferences.system.viewport_aa = "OFF"
+    # What Blender saves by itself has the name of its process: others can have had that before.
+    bpy.context.preferences.filepaths.temporary_directory = str(OUT)
     # Whoever is asked whether to save waits for ever.
     bpy.context.preferences.view.use_save_prompt = False
     if addon_utils.enable(EXTENSION) is None:

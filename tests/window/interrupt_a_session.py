@@ -91,7 +91,7 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.ops.ed.undo_push(message="Before")
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.key("DEL", blender.middle())
-    yield 1.0
+    yield from blender.until(lambda: not blender.part("live.running").all())
     blender.look("all deleted")
     blender.key("Z", blender.middle(), ctrl=True)
     yield 1.0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -45,10 +44,12 @@ def script(blender: Any) -> Iterator[float | None]:
         area.spaces.active.show_region_ui = False
         yield None
         blender.call(bpy.ops.digiclay.take_record)  # until Blender has saved by itself
+        earlier = written()
         yield from ridge(blender)
-        yield from saved(blender)
+        yield from saved(blender, earlier)
         blender.key("ESC", blender.middle())
-        yield from until(lambda: not blender.part("live.running").all())
+        yield from blender.until(lambda: not blender.part("live.running").all())
+        yield 1.0
         note(blender, "stopped")
         yield from blender.open_sidebar("Look at Takes")
         yield from replayed(blender)
@@ -57,15 +58,6 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.ops.wm.open_mainfile(filepath=str(blender.OUT / "recovered.blend"))
     yield 1.0
     note(blender, "recovered")
-
-
-def until(found: Callable[[], bool], most: float = 30.0) -> Iterator[float | None]:
-    """Wait until something is so, and has been drawn."""
-    for _ in range(int(4 * most)):
-        if found():
-            break
-        yield 0.25
-    yield 1.0
 
 
 def to_height(blender: Any, height: float, steps: int) -> Iterator[float | None]:
@@ -90,13 +82,21 @@ def ridge(blender: Any) -> Iterator[float | None]:
     note(blender, "ridge left")
 
 
-def saved(blender: Any) -> Iterator[float | None]:
-    """Wait until Blender has saved by itself, which the session must let it do; keep what it saved."""
-    file = Path(bpy.app.tempdir).parent / f"{os.getpid()}_autosave.blend"
-    start = time.monotonic()
-    yield from until(file.is_file, 90.0)
-    blender.SEEN["saved by itself"] = [file.is_file(), time.monotonic() - start]
-    shutil.copy(file, blender.OUT / "recovered.blend")
+def autosave() -> Path:
+    """Return the file Blender saves by itself."""
+    return Path(bpy.app.tempdir).parent / f"{os.getpid()}_autosave.blend"
+
+
+def written() -> int:
+    """Return when Blender last saved by itself, ns; 0 when it has not."""
+    return autosave().stat().st_mtime_ns if autosave().is_file() else 0
+
+
+def saved(blender: Any, earlier: int) -> Iterator[float | None]:
+    """Wait until Blender has saved by itself again, which the session must let it do; keep the file."""
+    yield from blender.until(lambda: written() > earlier)
+    blender.SEEN["saved by itself"] = True
+    shutil.copy(autosave(), blender.OUT / "recovered.blend")
     yield from blender.settle()
     note(blender, "saved while recording")
     blender.call(bpy.ops.digiclay.take_keep)
@@ -105,8 +105,9 @@ def saved(blender: Any) -> Iterator[float | None]:
 
 def replayed(blender: Any) -> Iterator[float | None]:
     """Replay the take: stop it by Esc half way, then let it come to its end."""
+    before = fingertip(blender)
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
-    yield 2.5
+    yield from blender.until(lambda: fingertip(blender) != before)
     note(blender, "replaying")
     blender.shot("takes_replaying")
     blender.key("ESC", blender.middle())
@@ -114,7 +115,8 @@ def replayed(blender: Any) -> Iterator[float | None]:
     note(blender, "replay stopped")
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     end = blender.part("recorded.takes").read(blender.beds()[0], "1").end
-    yield from until(lambda: blender.part("live.bed_state").kept(blender.beds()[0]) == end)
+    yield from blender.until(lambda: blender.part("live.bed_state").kept(blender.beds()[0]) == end)
+    yield 1.0
     note(blender, "replayed")
 
 
@@ -129,7 +131,8 @@ def baked(blender: Any) -> Iterator[float | None]:
     yield 1.0
     note(blender, "bake stopped")
     blender.call(bpy.ops.digiclay.bake, "INVOKE_DEFAULT", source="TAKE", take="1", first=1)
-    yield from until(lambda: blender.part("recorded.bake").is_baked(blender.beds()[0]))
+    yield from blender.until(lambda: blender.part("recorded.bake").is_baked(blender.beds()[0]))
+    yield 1.0
     note(blender, "baked")
     bed = blender.beds()[0]
     blender.window().view_layer.objects.active = bed
@@ -138,11 +141,14 @@ def baked(blender: Any) -> Iterator[float | None]:
         blender.SEEN["session on a bake"] = bpy.ops.digiclay.session.poll()
     scene.frame_set(1)
     scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
+    places = [fingertip(blender)]
     blender.call(bpy.ops.screen.animation_play)
-    places = []
-    for _ in range(6):
-        yield 0.5
-        places.append(blender.fingertip().matrix_world.translation.z)
+
+    def moved() -> bool:
+        places.append(fingertip(blender))
+        return max(places) - min(places) > 10e-3
+
+    yield from blender.until(moved)
     blender.SEEN["played"] = places
     blender.shot("takes_played")
     blender.key("ESC", blender.middle())
@@ -150,6 +156,11 @@ def baked(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.bake_free)
     yield None
     note(blender, "freed")
+
+
+def fingertip(blender: Any) -> float:
+    """Return how high the fingertip's object is."""
+    return float(blender.fingertip().matrix_world.translation.z)
 
 
 def note(blender: Any, name: str) -> None:

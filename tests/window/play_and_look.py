@@ -59,7 +59,7 @@ def gizmo(blender: Any) -> Iterator[float | None]:
         blender.event("MOUSEMOVE", "NOTHING", tuple(np.rint(at).astype(int).tolist()))
         yield None
         if step == 6:  # the pins give way as fast as the machine simulates them
-            yield from until(lambda: lowest(blender) < 39.9)
+            yield from blender.until(lambda: lowest(blender) < 39.9)
         blender.look(f"gizmo {step}")
     blender.shot("play_gizmo")
     blender.event("LEFTMOUSE", "RELEASE", tuple(np.rint(arrow + there - here).astype(int).tolist()))
@@ -82,7 +82,7 @@ def playback(blender: Any) -> Iterator[float | None]:
     scene.frame_set(1)
     yield from start(blender)
     blender.call(bpy.ops.screen.animation_play)
-    yield from until(lambda: lowest(blender) < 39.5)
+    yield from blender.until(lambda: lowest(blender) < 39.5)
     blender.look("played")
     blender.shot("play_playback")
     for name in ("after one Esc", "after two"):
@@ -113,7 +113,7 @@ def windows(blender: Any) -> Iterator[float | None]:
     blender.look("started in the second")
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
-    yield from closed(blender, "its own window closed")
+    yield from closed(blender, "its own window closed", lambda: not blender.part("live.running").all())
     kept = blender.part("recorded.takes").entries
     blender.SEEN["kept when its window was closed"] = [entry.name for entry in kept(blender.beds()[0])]
     bpy.ops.ed.undo()
@@ -123,11 +123,12 @@ def windows(blender: Any) -> Iterator[float | None]:
     blender.SEEN["kept after undo and redo"] = [entry.name for entry in kept(blender.beds()[0])]
 
 
-def closed(blender: Any, name: str) -> Iterator[float | None]:
-    """Close the last window."""
+def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> Iterator[float | None]:
+    """Close the last window, and wait until what is to follow has come."""
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.wm.window_close()
     yield 1.5
+    yield from blender.until(then)
     blender.look(name)
     blender.SEEN[name]["windows"] = len(bpy.context.window_manager.windows)
 
@@ -146,11 +147,12 @@ def render(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.render.render, "INVOKE_DEFAULT")
     waits: list[str] = []
     blender.SEEN["waits in a render"] = waits
-    for _ in range(100):
-        yield 0.2
-        waits += {session.waits for session in blender.part("live.running").all()} - set(waits)
-        if not bpy.app.is_job_running("RENDER"):
-            break
+
+    def rendered() -> bool:
+        waits.extend({session.waits for session in blender.part("live.running").all()} - set(waits))
+        return not bpy.app.is_job_running("RENDER")
+
+    yield from blender.until(rendered)
     yield from blender.settle()
     blender.look("rendered")
 
@@ -161,7 +163,7 @@ def views(blender: Any) -> Iterator[float | None]:
     area, region = blender.view()
     area.spaces.active.region_3d.view_perspective = "ORTHO"
     # Blender works out the matrices of a view when it draws it.
-    yield from until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
+    yield from blender.until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
     yield from tapped(blender, region, area.spaces.active.region_3d, (-15.0, 9.0), "orthographic")
     blender.shot("play_orthographic")
     blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
@@ -174,7 +176,7 @@ def views(blender: Any) -> Iterator[float | None]:
         if region.data.view_matrix.to_quaternion().angle < 1e-3:  # seen from straight above
             yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
     with drawn(blender) as marks:
-        yield from until(lambda: len(marks) == 4)
+        yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
     area, _ = blender.view()
     turned = area.spaces.active.region_3d
@@ -184,6 +186,8 @@ def views(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.screen.region_quadview)
     yield None
     blender.call(bpy.ops.screen.screen_full_area)
+    yield None
+    blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     yield None
 
 
@@ -211,6 +215,7 @@ def tapped(
     from bpy_extras.view3d_utils import location_3d_to_region_2d
     from mathutils import Vector
 
+    blender.evaluate()
     scale = blender.part("bridge").SCALE * 1e-3
     world = blender.beds()[0].matrix_world @ (Vector((*place, 40.0)) * scale)
     seen = location_3d_to_region_2d(region, looking, world)
@@ -218,10 +223,11 @@ def tapped(
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
-    yield from until(lambda: pressed(blender))
+    yield from blender.until(lambda: pressed(blender))
     blender.look(name)
     blender.event("LEFTMOUSE", "RELEASE", at)
-    yield from until(lambda: not pressed(blender))
+    # Until the gesture has ended it takes the next press for its own.
+    yield from blender.until(lambda: not held(blender))
 
 
 def pressed(blender: Any) -> bool:
@@ -229,12 +235,9 @@ def pressed(blender: Any) -> bool:
     return bool(blender.part("bridge").pose(blender.fingertip())[2] < 36.1e-3)
 
 
-def until(found: Callable[[], bool]) -> Iterator[float | None]:
-    """Wait until something is so, however slow the machine is: at most 30 s."""
-    for _ in range(120):
-        yield 0.25
-        if found():
-            return
+def held(blender: Any) -> bool:
+    """Tell whether a gesture of the Press tool is under way."""
+    return "DIGICLAY_OT_press" in [operator.bl_idname for operator in blender.window().modal_operators]
 
 
 def at_rest(blender: Any) -> None:

@@ -16,6 +16,7 @@ def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> tuple[int, 
     """Return where a place in the bed's space, mm, is seen."""
     from mathutils import Vector
 
+    blender.evaluate()
     scale = blender.part("bridge").SCALE * 1e-3
     return blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
 
@@ -103,13 +104,13 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from let_go(blender, 0.0, -18.0)
     note(blender, "tapped")
     blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    yield from blender.settle()
     note(blender, "tap undone")
     blender.key("Z", blender.middle(), ctrl=True)
-    yield 1.0
+    yield from blender.settle()
     note(blender, "valley undone")
     blender.key("Z", blender.middle(), ctrl=True, shift=True)
-    yield 1.0
+    yield from blender.settle()
     note(blender, "valley redone")
 
     yield from depths(blender)
@@ -127,11 +128,14 @@ def depths(blender: Any) -> Iterator[float | None]:
         yield 0.1
     yield from come(blender)
     note(blender, "after the wheel")
+    # Moves that Blender makes up itself have the keys that are held.
+    blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     for step in range(1, 5):
         blender.event("MOUSEMOVE", "NOTHING", (at[0], at[1] + 20 * step), ctrl=True)
         yield 0.1
     yield from come(blender)
     note(blender, "after Ctrl")
+    blender.event("LEFT_CTRL", "RELEASE", at)
     blender.key("ESC", at)
     yield 1.0
     blender.event("LEFTMOUSE", "RELEASE", at)

@@ -10,7 +10,6 @@ import bpy
 
 def script(blender: Any) -> Iterator[float | None]:
     """Record, and let the file go away, three times."""
-    bpy.context.preferences.filepaths.temporary_directory = str(blender.OUT)
     yield from recorded(blender)
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
