@@ -38,6 +38,17 @@ def test_a_master_below_the_edge_makes_a_dent() -> None:
     assert CONE.height(np.array([10.5e-3]), 40e-3, 30e-3) == pytest.approx(35e-3, abs=1e-17)
 
 
+@pytest.mark.parametrize("top", [55e-3, 40e-3, 30e-3], ids=["bump", "level", "dent"])
+@pytest.mark.parametrize(
+    "blister", [CONE, BELL, Blister(flat_radius=0.0)], ids=["cone", "gaussian", "no flat top"]
+)
+def test_the_surface_around_a_master_is_the_height_inside_the_blister(blister: Blister, top: float) -> None:
+    distance = np.linspace(0.0, blister.radius, 31)
+    # The same line, worked out in another order: rounding only.
+    expected = blister.height(distance, 40e-3, top)
+    assert blister.surface(distance, 40e-3, top) == pytest.approx(expected, abs=1e-16)
+
+
 def test_a_flat_top_as_wide_as_the_blister_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"^Blister\.flat_radius must be below the radius, 0\.015 m"):
         Blister(flat_radius=15e-3)

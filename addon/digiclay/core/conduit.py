@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,19 +45,26 @@ class OrificeAndConduit(Orifice):
 
     resistance: float
 
-    def laminar_conductance(self, opening: Floats) -> Floats:
-        """Return g / (1 + R g), m³/(s Pa)."""
-        lift = Orifice.laminar_lift(self, opening)
-        series = self.resistance * lift
+    @property
+    def resistances(self) -> tuple[float, float]:
+        """Of the conduit, and of the fully open valve in its laminar branch, Pa s/m³."""
+        return self.resistance, 1.0 / self.laminar
+
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
+        """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
+        lift = self.laminar_lift(opening, out)
+        series = lift * self.resistance
         series += 1.0 / self.laminar
-        return lift / series
+        lift /= series
+        return lift
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""
         a = self.turbulent * np.abs(opening)
         ra = self.resistance * a
         turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
-        return np.minimum(self.laminar_conductance(opening), turbulent)
+        laminar: Floats = self.laminar_conductance(opening)
+        return np.minimum(laminar, turbulent)
 
 
 def in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,13 +69,20 @@ class Orifice:
         """Smallest drop at which some opening lets the flow turn turbulent, Pa (equation 6 at h* = 1)."""
         return (self.turbulent / self.laminar) ** 2
 
-    def laminar_conductance(self, opening: Floats) -> Floats:
-        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K, (n,)."""
-        return self.laminar * self.laminar_lift(opening)
+    @property
+    def resistances(self) -> tuple[float, float]:
+        """Of the line behind the valve, and of the fully open valve in its laminar branch, Pa s/m³."""
+        return 0.0, 1.0 / self.laminar
 
-    def laminar_lift(self, opening: Floats) -> Floats:
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K; in `out` if that is given."""
+        conductance = self.laminar_lift(opening, out)
+        conductance *= self.laminar
+        return conductance
+
+    def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
         """Return the opening's size to the power of the laminar branch."""
-        return opening * opening if self.power == 2 else abs(opening)
+        return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return the secant conductance Q/ΔP, m³/(s Pa).
@@ -87,7 +95,8 @@ class Orifice:
             Pressure drop over valve and line, either sign, Pa.
         """
         root = np.sqrt(np.abs(drop)) + np.finfo(float).tiny
-        return np.minimum(self.laminar_conductance(opening), self.turbulent * np.abs(opening) / root)
+        laminar: Floats = self.laminar_conductance(opening)
+        return np.minimum(laminar, self.turbulent * np.abs(opening) / root)
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`."""

@@ -66,3 +66,10 @@ class Blister(Parameters):
         height *= top - edge
         height += edge
         return height
+
+    def surface(self, distance: Floats, edge: float, top: float) -> Floats:
+        """Return `height` at distances inside the blister, of one virtual master."""
+        if self.profile == "gaussian":
+            return self.height(distance, edge, top)
+        cone: Floats = np.interp(distance, (self.flat_radius, self.radius), (top, edge))
+        return cone

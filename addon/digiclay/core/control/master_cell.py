@@ -47,12 +47,30 @@ def master_cell(cell: Cell, period: float) -> MasterCell:
     nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
     # Without a lag there is no column for the opening at the start.
     openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
-    supply, area, laminar = cell.supply, cell.actuator.area, cell.flow.knee > cell.supply.largest
+    laminar = cell.flow.knee > cell.supply.largest
+    speed = _laminar_speed(cell) if laminar else _speed(cell)
+    return MasterCell(openings, speed, period, cell.actuator.stroke)
+
+
+def _laminar_speed(cell: Cell) -> Callable[[float], float]:
+    """Return the speed where every flow is laminar, see `Flow.laminar_conductance`, in plain numbers."""
+    line, valve = cell.flow.resistances
+    square, area = cell.flow.power == 2, cell.actuator.area
+    up, down = cell.supply.high / area, cell.supply.low / area
+
+    def speed(opening: float) -> float:
+        lift = opening * opening if square else abs(opening)
+        return lift / (line * lift + valve) * (up if opening > 0.0 else down)
+
+    return speed
+
+
+def _speed(cell: Cell) -> Callable[[float], float]:
+    """Return the speed where some flow may be turbulent."""
+    supply, area = cell.supply, cell.actuator.area
 
     def speed(opening: float) -> float:
         pressure = supply.high if opening > 0.0 else supply.low
-        if laminar:
-            return float(cell.flow.laminar_conductance(opening) * pressure / area)
         return float(cell.flow.flow(np.array([opening]), np.array([pressure]))[0]) / area
 
-    return MasterCell(openings, speed, period, cell.actuator.stroke)
+    return speed

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..filled import filled
 from ..quantity import Parameters, quantity
+from ..some import some
 
 __all__ = ["Servo", "locked_under_overload"]
 
@@ -52,6 +53,6 @@ def locked_under_overload(command: Floats, force: Floats, limit: float) -> Float
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
     overload = force >= filled((limit,), force.size)[0]
-    if not np.count_nonzero(overload):
+    if not some(overload):
         return command
     return np.where(overload & (command > 0.0), 0.0, command)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ABEAM", "Heading", "ahead_of", "seen_from", "square_distance", "turned"]
+__all__ = ["ABEAM", "Heading", "ahead_of", "beyond", "seen_from", "square_distance", "turned"]
 
 Floats = NDArray[np.float64]
 
@@ -65,16 +65,27 @@ def seen_from(heading: Heading, x: float, y: float, place: Floats) -> tuple[Floa
         Rows 1, x, y, x², x y, y² of the cells.
     """
     _, _, toward_x, toward_y = heading
-    forms = np.array(
-        (
-            (x * x + y * y, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0),
-            (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0),
-        )
-    )
-    distance, ahead = forms.dot(place)
+    square = (x * x + y * y, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0)
+    forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
+    distance, ahead = np.array((square, forward)).dot(place)
     np.abs(distance, distance)  # at the point itself rounding may leave a negative square
     np.sqrt(distance, distance)
     return distance, ahead
+
+
+def beyond(x: float, y: float, radius: float, place: Floats) -> Floats:
+    """Return by how much the squares of distances from a point exceed that of a radius, shape (m,), m².
+
+    Parameters
+    ----------
+    x, y, radius : float
+        m.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of the cells.
+    """
+    form = np.array((x * x + y * y - radius * radius, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0))
+    excess: Floats = form.dot(place)
+    return excess
 
 
 def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:

@@ -18,12 +18,13 @@ from ..filled import filled
 from ..layout import ON_THE_SIDE
 from ..modes import Mode
 from ..places import Measurement, Orders
+from ..some import how_many, some
 from .bench import Bench
 from .blister import Blister
 from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
 from .servo import locked_under_overload
-from .travel import ABEAM, Heading, seen_from, square_distance, turned
+from .travel import ABEAM, Heading, beyond, seen_from, turned
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
 
@@ -87,15 +88,15 @@ class VirtualMasterControl:
         if total < known.felt_force:
             return self._alone(master)
         if master.phase is not Phase.IDLE:
-            none, near = filled((0.0, known.radius**2 * (1.0 + ON_THE_SIDE)), force.size)
-            far = square_distance(master.x, master.y, place) > near
+            none = filled(self.limits, force.size)[0]
+            far = beyond(master.x, master.y, known.radius * (1.0 + ON_THE_SIDE), place) > none
             far &= force != none
             felt = total
-            if np.count_nonzero(far):
+            if some(far):
                 felt, x, y = place.dot(np.where(far, none, force)).tolist()[:3]
             if felt >= known.felt_force:
                 x, y = x / felt, y / felt
-                return master._replace(x=x, y=y, alone=0, heading=turned(master.heading, x, y, known.travel))
+                return master.at(x, y, turned(master.heading, x, y, known.travel))
             # The finger has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
             _, x, y = pressed
@@ -137,21 +138,7 @@ class VirtualMasterControl:
         else:
             effort = known.force_gain * (known.force_setpoint - force)
         height, opening = self.model.after(master.height, master.opening, min(max(effort, -1.0), 1.0))
-        felt = height if master.alone == 0 else master.felt
-        # Every period comes by here, and `_replace` takes twice as long.
-        return Master(
-            phase,
-            master.x,
-            master.y,
-            height,
-            opening,
-            master.reference,
-            master.edge,
-            master.heading,
-            felt,
-            master.alone,
-            master.losses,
-        )
+        return master.led(phase, height, opening)
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
         """Create the blister, freeze what is left behind, command every cell; see `places.Controller`."""
@@ -165,7 +152,7 @@ class VirtualMasterControl:
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        rest, band = filled((self.actuator.rest_height, self.parameters.dead_band), target.size)
+        rest, band = filled(self.limits, target.size)[-2:]
         off = target - rest
         np.abs(off, off)
         # False and True are the codes of these two modes.
@@ -176,7 +163,7 @@ class VirtualMasterControl:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         blister, stroke = self.blister, self.actuator.stroke
         limits = filled(self.limits, seen.target.size)
-        none, abeam, radius, edge_radius, flat_radius, behind, release = limits
+        none, abeam, radius, edge_radius, flat_radius, behind, release, *_ = limits
         edge, formed, spring, follow, froze = filled(CODES, seen.target.size, np.int8)
         distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
         inside = distance <= radius
@@ -185,20 +172,21 @@ class VirtualMasterControl:
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
         facing = ahead >= abeam
         facing &= ring
-        count = np.count_nonzero(facing)
+        count = how_many(facing)
         if count:
-            master = master._replace(edge=float(facing.astype(np.float64).dot(seen.height)) / count)
+            master = master.with_edge(float(facing.astype(np.float64).dot(seen.height)) / count)
         frozen = ahead < behind * distance
         frozen &= distance > flat_radius
         frozen |= seen.mode == froze
         frozen &= inside
         frozen &= seen.force < release
-        profile = blister.height(distance, min(max(master.edge, 0.0), stroke), master.height)
-        if np.count_nonzero(frozen):
+        profile = blister.surface(distance, min(max(master.edge, 0.0), stroke), master.height)
+        if some(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
             outgrown = np.maximum if master.height >= master.edge else np.minimum
             np.putmask(profile, frozen, outgrown(profile, seen.target))
-        target = np.where(inside, profile, seen.target)
+        target = seen.target.copy()
+        np.putmask(target, inside, profile)
         touched = seen.force > none
         touched &= inside
         np.putmask(mode, inside, formed)
@@ -211,15 +199,18 @@ class VirtualMasterControl:
     def limits(self) -> tuple[float, ...]:
         """What tells cells apart.
 
-        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; a force, N.
-        Circles are widened by a billionth, for the sake of cells exactly on them.
+        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; a force, N; the
+        height of a pin at rest, and how far from it one counts as formed, m. Circles are widened
+        by a billionth, for the sake of cells exactly on them.
         """
         blister = self.blister
         wider = (
             radius * (1.0 + ON_THE_SIDE)
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
-        return (0.0, -ABEAM, *wider, self.parameters.behind, self.parameters.release_force)
+        known = self.parameters
+        rest = self.actuator.rest_height, known.dead_band
+        return (0.0, -ABEAM, *wider, known.behind, known.release_force, *rest)
 
 
 def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:

@@ -22,6 +22,7 @@ from ..delay import Queue
 from ..filled import filled
 from ..physics import Cell
 from ..places import Segment
+from ..some import some
 from .bernoulli_plan import BernoulliPlan, bernoulli_plan
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "Block"]
@@ -82,7 +83,7 @@ class Block:
         self.rises = plan.moves[: len(plan.segments)]
         self.free, self.loaded = empty(len(self.rises), count), empty(len(plan.loaded), k)
         self.steps = tuple(
-            (rise, rise[:k], self.loaded[at : at + 2], *self.loaded[at : at + 3])
+            (rise, rise[:k], *self.loaded[at : at + 3])
             for rise, at in zip(self.free, range(1, len(self.loaded), 3), strict=True)
         )
         self.start = self.loaded[0]
@@ -95,8 +96,7 @@ class Block:
         self.force: Floats = self.work[-5]
         self.begun, self.moved = self.work[:-2], self.work[:-4]
         self.first, self.mean, self.last = self.work[-3:]
-        self.constants = filled(plan.numbers[:-1], k)
-        self.none, self.hard = np.zeros_like(self.moved), np.full_like(self.begins, plan.numbers[-1])
+        self.constants, self.none = filled(plan.numbers, k), np.zeros_like(self.moved)
         self.stops = filled((0.0, cell.actuator.stroke), count)
 
     def __call__(self, under: Floats) -> Floats:
@@ -104,7 +104,7 @@ class Block:
         plan = self.plan
         plan.response.dot(self.opened_by, self.openings)
         self.lag[:] = self.opening_after
-        self.size[:] = plan.unloaded(self.opening)
+        plan.unloaded(self.opening, self.size)
         # The sign picks the reservoir.
         np.copysign(self.size, self.opening, self.signed)
         self.rises.dot(self.conductances, self.free)
@@ -124,13 +124,13 @@ class Block:
         """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
         plan, height, near = self.plan, self.height, self.near
         first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
-        m, offset, per_m, most, zero, one, half, tiny = self.constants
+        m, offset, per_m, most, zero, one, half, tiny, hard = self.constants
         lowest, highest = self.stops
         self.filters[:] = self.pulp
         exponent = near * m
         exponent -= self.start
         _tension(exponent, zero, most, first)
-        for s, (rise, risen, ways, slip, bow, decay) in enumerate(self.steps):
+        for s, (rise, risen, slip, bow, decay) in enumerate(self.steps):
             if s:
                 first[:] = last
             plan.begin[s].dot(self.begun, self.begins)
@@ -140,10 +140,10 @@ class Block:
             push = stiffness * relaxed
             growth = push + slip
             growth += tiny
-            ends = exponent + ways
-            end, bent = ends
-            strained = ends >= self.hard
-            if not np.count_nonzero(strained):
+            end = exponent + slip
+            bent = exponent + bow
+            strained = np.maximum(end, bent) >= hard
+            if not some(strained):
                 relief = pressed(np.exp(bent), growth, stiffness)
                 np.divide(relief, stiffness, mean)
                 mean -= one
@@ -153,7 +153,7 @@ class Block:
                 stiffness = np.where(idle, tiny, decay)
                 push = stiffness * relaxed
                 # Their way bends with the load, not as it would without.
-                np.putmask(bow, strained.any(axis=0), zero)
+                np.putmask(bow, strained, zero)
                 relief, grown = careful(exponent + bow, push + slip + tiny, stiffness)
                 np.subtract(grown, one, mean)
                 end = exponent + slip
@@ -162,7 +162,7 @@ class Block:
             _tension(end, zero, most, last)
             crossing = last <= lost
             crossing ^= idle
-            if np.count_nonzero(crossing):
+            if some(crossing):
                 parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
                 push[crossing], mean[crossing] = crossed(*parts)
                 end = exponent + slip + push
@@ -173,7 +173,7 @@ class Block:
             np.maximum(rise, lowest, out=height)
             np.minimum(height, highest, out=height)
             stopped = risen != near
-            if np.count_nonzero(stopped):
+            if some(stopped):
                 # The mean found above is that of a pin that no end stop holds.
                 end = near * m - offset - plan.path[2 * len(self.steps) + s + 1].dot(self.under)
                 _tension(end, zero, most, last)

@@ -69,7 +69,7 @@ class BernoulliPlan:
     shares : tuple of float
         Share of the tension that does push, one a step: the rest is lost within it.
     unloaded : callable
-        Conductance of a valve without load, m³/(s Pa), from its opening.
+        Works out the conductance of valves without load, m³/(s Pa), from their openings, into an array.
     numbers : tuple of float
         The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`; and
         the exponent below which every flow is laminar and nothing overflows.
@@ -92,7 +92,7 @@ class BernoulliPlan:
     begin: tuple[Floats, ...]
     finish: tuple[Floats, ...]
     shares: tuple[float, ...]
-    unloaded: Callable[[Floats], Floats]
+    unloaded: Callable[[Floats, Floats], Floats]
     numbers: tuple[float, ...]
     unit: float
     to_load: float
@@ -116,8 +116,9 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
     widest = float(cell.flow.laminar_conductance(1.0))
     hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
 
-    def under_supply(opening: Floats) -> Floats:
-        return cell.flow.conductance(opening, supply.pressure(opening))
+    def under_supply(opening: Floats, out: Floats) -> Floats:
+        out[:] = cell.flow.conductance(opening, supply.pressure(opening))
+        return out
 
     moves = _moves(supply, steps, m * bows, to_decay * np.array(shares)[:, None] * steps, m)
     path = m * _path(segments)
