@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import addon_utils
 import bpy
 import numpy as np
 
@@ -116,6 +117,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from depths(blender)
     yield from shown(blender)
     yield from ended(blender)
+    yield from disabled(blender)
 
 
 def depths(blender: Any) -> Iterator[float | None]:
@@ -141,6 +143,22 @@ def depths(blender: Any) -> Iterator[float | None]:
     blender.event("LEFTMOUSE", "RELEASE", at)
     yield 0.5
     note(blender, "taken back")
+
+
+def disabled(blender: Any) -> Iterator[float | None]:
+    """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
+    yield from blender.add_bed()
+    workspace, at = bpy.context.window_manager.windows[0].workspace, on_the_bed(blender, -15, 5)
+    held = [workspace.tools.from_space_view3d_mode("OBJECT").idname]
+    blender.event("MOUSEMOVE", "NOTHING", at)
+    yield 1.0
+    addon_utils.disable(blender.EXTENSION)
+    held.append(workspace.tools.from_space_view3d_mode("OBJECT").idname)
+    for step in range(3):
+        blender.event("MOUSEMOVE", "NOTHING", (at[0] + 5 * step, at[1]))
+        yield 1.0
+    blender.SEEN["tools held"] = held
+    addon_utils.enable(blender.EXTENSION)  # for what comes after the script
 
 
 def shown(blender: Any) -> Iterator[float | None]:

@@ -94,6 +94,13 @@ def test_the_next_press_starts_the_session_anew_and_ends_with_its_bed(seen: dict
     assert (seen["bed deleted"]["beds"], seen["bed deleted"]["sessions"]) == (0, 0)
 
 
+def test_disabled_with_the_tool_in_hand_the_extension_leaves_the_first_one_there(
+    seen: dict[str, Any],
+) -> None:
+    # What it left behind to draw would fail with a traceback, which ends `played`.
+    assert seen["tools held"] == ["digiclay.press_tool", "builtin.select_box"]
+
+
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
     # Shaded pins and a shaded fingertip have thousands of colours, a blank screen has one.
     assert len(seen["colours"]) == 5

@@ -95,4 +95,15 @@ def register() -> None:
 
 def unregister() -> None:
     """Take the tool away; whoever has it in hand gets the first one."""
+    _put_down()
     bpy.utils.unregister_tool(PressTool)
+
+
+def _put_down() -> None:
+    """Take up the first tool in every window where this one is in hand: else its cursor is still drawn."""
+    for window in bpy.context.window_manager.windows:
+        tool = window.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
+        area = next((one for one in window.screen.areas if one.type == "VIEW_3D"), None)
+        if tool is not None and tool.idname == PressTool.bl_idname and area is not None:
+            with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+                bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")
