@@ -28,8 +28,8 @@ extension: ## build the Blender extension and leave its zip in dist/
 test: ## run all tests but those of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 900 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
-	$(PART) .reports/test.txt "tests in Blender 4.5" 600 -- -n auto --dist loadfile tests/blender || status=1; \
+	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
+	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
 	echo; cat .reports/test.txt; exit $$status
 
 lint: ## check style, format and types
@@ -46,7 +46,7 @@ test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
 test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 1500 -- tests/window
+	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 -- tests/window
 
 test-proof: ## judge exported meshes by admesh, assimp and PrusaSlicer, which root installs on Debian
 	@tools/proof .reports
