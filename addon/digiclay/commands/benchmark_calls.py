@@ -28,7 +28,7 @@ from .benchmark_report import table
 
 __all__ = ["Counted", "Ledger", "floor", "period_calls", "report"]
 
-#: Methods of arrays that make an array; reductions reach `__array_ufunc__` by themselves.
+#: Methods of arrays that make an array or bytes; reductions reach `__array_ufunc__` by themselves.
 METHODS = ("take", "copy", "astype", "dot", "reshape", "tobytes", "__getitem__", "__setitem__")
 
 

@@ -54,7 +54,7 @@ def add(kinds: Any) -> None:
     parser.add_argument(
         "--whole-bed",
         action="store_true",
-        help="then also peers that are not told which cells take part, on the paper's bed (10 minutes more)",
+        help="then also peers that are not told which cells take part, on the paper's bed (11 minutes more)",
     )
     parser.set_defaults(carry_out=carry_out)
 

@@ -166,8 +166,8 @@ def report(found: Sequence[Beside], apart: Sequence[float], rounds: int) -> Iter
         for one, off in zip(found, apart, strict=True)
     ]
     yield from table(("problem", "cells of the bed", "cells taking part", "apart, pm"), rows)
-    yield f"\nCPU times are the least of {rounds}, run by turns; of 1 for the loops and Radau. To stay within"
-    yield "10 minutes ours is run at few steps, DOP853 at two tolerances and Radau at one: over the whole"
+    yield f"\nCPU times are the least of {rounds}, run by turns; of 1 for the loops and Radau. Not to take"
+    yield "hours, ours is run at few steps, DOP853 at two tolerances and Radau at one: over the whole"
     yield f"bed only, and not in problems of more than {SHORT} periods.\n"
     yield from runs([one for each in found for one in each.work])
     yield "\nThe best solver's time over our best stepper's, at an error of height of at most:\n"

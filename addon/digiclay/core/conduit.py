@@ -52,9 +52,10 @@ class OrificeAndConduit(Orifice):
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
+        line, valve = self.resistances
         lift = self.laminar_lift(opening, out)
-        series = lift * self.resistance
-        series += 1.0 / self.laminar
+        series = lift * line
+        series += valve
         lift /= series
         return lift
 

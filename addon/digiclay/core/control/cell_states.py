@@ -20,6 +20,7 @@ from ..layout import ON_THE_SIDE
 from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
+from ..some import some
 from .bench import Bench
 from .blister import Blister
 from .servo import locked_under_overload
@@ -149,7 +150,7 @@ class CellStatesControl:
     def attend(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
         """Find where the finger presses, and how far its blister can reach; see `places.Controller`."""
         pressed = touched.force > 0.0
-        if not np.count_nonzero(pressed):
+        if not some(pressed):
             return memory, None
         force, place = touched.force[pressed], touched.place[:, pressed]
         total, x, y = np.dot(place[:3], force).tolist()
@@ -169,7 +170,7 @@ class CellStatesControl:
         under = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
-        if np.count_nonzero(under):
+        if some(under):
             memory, mode, target = self._around(memory, seen, mode, under, target)
             memory = memory._replace(felt=True)
         else:

@@ -65,9 +65,8 @@ def seen_from(heading: Heading, x: float, y: float, place: Floats) -> tuple[Floa
         Rows 1, x, y, x², x y, y² of the cells.
     """
     _, _, toward_x, toward_y = heading
-    square = (x * x + y * y, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0)
     forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
-    distance, ahead = np.array((square, forward)).dot(place)
+    distance, ahead = np.array((_circle(x, y), forward)).dot(place)
     np.abs(distance, distance)  # at the point itself rounding may leave a negative square
     np.sqrt(distance, distance)
     return distance, ahead
@@ -83,9 +82,13 @@ def beyond(x: float, y: float, radius: float, place: Floats) -> Floats:
     place : ndarray (6, m)
         Rows 1, x, y, x², x y, y² of the cells.
     """
-    form = np.array((x * x + y * y - radius * radius, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0))
-    excess: Floats = form.dot(place)
+    excess: Floats = np.array(_circle(x, y, radius)).dot(place)
     return excess
+
+
+def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
+    """Return the squared distance from a point, less that of a circle about it, as a form in 1, x, ... y²."""
+    return (x * x + y * y - radius * radius, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0)
 
 
 def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:

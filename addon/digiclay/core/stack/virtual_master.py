@@ -117,7 +117,7 @@ class VirtualMasters:
         known, place, force = self.parameters, touched.place, touched.force
         active, present = master.phase != IDLE, total >= known.felt_force
         dx, dy = place[1] - master.x, place[2] - master.y
-        near = force * (dx * dx + dy * dy <= known.radius**2 * (1.0 + ON_THE_SIDE))
+        near = force * (dx * dx + dy * dy <= (known.radius * (1.0 + ON_THE_SIDE)) ** 2)
         felt = np.add.reduce(near)
         followed = active & present & (felt >= known.felt_force)
         # Where nothing is felt the quotient is of no use, but it must be a number.

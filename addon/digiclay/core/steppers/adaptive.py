@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..delay import Queue
 from ..physics import Cell, felt
 from ..places import Movement, Segment
+from ..some import some
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Adaptive", "AdaptivePlan"]
@@ -112,7 +113,7 @@ class Adaptive:
             off = np.abs(fine - coarse)
             wide = off[0] > plan.allowed * share[open_cells]
             wide |= (off[cell.pulp_rows] > plan.allowed_tension * PRESSED).any(axis=0)
-            if not np.count_nonzero(wide):
+            if not some(wide):
                 break
             open_cells, coarse = open_cells[wide], fine[:, wide]
         np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
