@@ -74,7 +74,9 @@ def test_a_drag_goes_straight_and_level_at_its_speed() -> None:
 
 
 def test_a_drag_at_the_depth_of_the_first_press_is_a_path_as_well() -> None:
-    Drag(press=4e-3, height=-4e-3).path(12e-3, 40e-3)[0].trajectory()
+    pathway, start, end = Drag(press=4e-3, height=-4e-3).path(12e-3, 40e-3)
+    heights = pathway.trajectory().poses(np.linspace(start, end, 11))[:, 2]
+    np.testing.assert_allclose(heights, 36e-3, rtol=1e-12)
 
 
 def test_a_lift_is_as_fast_as_it_says_at_its_fastest() -> None:

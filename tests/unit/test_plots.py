@@ -173,8 +173,8 @@ def test_a_single_row_or_column_has_no_surface(tmp_path, shape):
 
 def test_a_session_of_one_row_can_be_drawn(tmp_path):
     case = {name: value if name == "position" else value[:1] for name, value in drag().items()}
-    plots.session(case, tmp_path / "session.png", 0.4)
-    plots.surface(case, tmp_path / "surface.png")
+    assert plots.session(case, tmp_path / "session.png", 0.4).stat().st_size > 40_000
+    assert plots.surface(case, tmp_path / "surface.png").stat().st_size > 40_000
 
 
 def test_a_folder_that_is_not_there_is_one_line(tmp_path):

@@ -106,9 +106,18 @@ def test_a_written_history_is_much_smaller_than_its_arrays(tmp_path: Path) -> No
     assert (tmp_path / "history.npz").stat().st_size < 0.05 * heights.nbytes
 
 
-def test_a_history_that_fits_exactly_is_accepted() -> None:
-    recorder = Recorder(1)
-    refuse_what_cannot_fit(recorder, ROWS, 1000, 100, bytes_needed(recorder, ROWS, 1000, 100))
+def fits(recorder: Recorder, cells: int, periods: int, free: int) -> bool:
+    """Tell whether a history is accepted."""
+    try:
+        refuse_what_cannot_fit(recorder, ROWS, cells, periods, free)
+    except ParameterError:
+        return False
+    return True
+
+
+def test_a_history_fits_to_the_byte() -> None:
+    needed = bytes_needed(Recorder(1), ROWS, 1000, 100)
+    assert [fits(Recorder(1), 1000, 100, free) for free in (needed - 1, needed)] == [False, True]
 
 
 def test_a_history_too_large_is_refused_with_what_to_change() -> None:
@@ -120,8 +129,8 @@ def test_a_history_too_large_is_refused_with_what_to_change() -> None:
     )
 
 
-def test_the_recommended_thinning_fits() -> None:
-    refuse_what_cannot_fit(Recorder(7), ROWS, 1_000_000, 5200, 20_000_000_000)
+def test_the_recommended_thinning_is_the_least_that_fits() -> None:
+    assert [fits(Recorder(every), 1_000_000, 5200, 20_000_000_000) for every in (6, 7)] == [False, True]
 
 
 def test_a_bed_too_large_for_any_history_is_refused_as_such() -> None:

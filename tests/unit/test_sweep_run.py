@@ -239,8 +239,12 @@ def test_two_axes_are_a_heat_map_labelled_with_units() -> None:
 
 
 @pytest.mark.parametrize("columns", [[ONE], [ONE, TWO]])
-def test_a_metric_nobody_has_is_drawn_without_a_warning(columns: list[Column]) -> None:
-    sweep_figure(columns, "rfd", np.full([len(one.values) for one in columns], np.nan)).canvas.draw()
+def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Column]) -> None:
+    nothing = np.full([len(one.values) for one in columns], np.nan)
+    picture = sweep_figure(columns, "rfd", nothing)
+    picture.canvas.draw()
+    crosses = sum(len(line.get_xdata()) for line in picture.axes[0].get_lines() if line.get_marker() == "x")
+    assert crosses + sum(text.get_text() == "×" for text in picture.axes[0].texts) == nothing.size
 
 
 def test_a_sweep_over_two_axes_leaves_a_picture_of_each_metric(here: Path) -> None:
