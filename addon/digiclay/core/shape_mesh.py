@@ -18,11 +18,15 @@ __all__ = ["ShapeMesh", "shape_mesh"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 #: Pairs of a ray and a triangle that are worked on at a time.
 CHUNK = 2_000_000
+#: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
+#: float32 or to six digits, which moves the rim by up to a micrometre, and no pin is placed as exactly.
+EDGE = 1e-3
 #: Two hits of a ray are one when they are closer than this share of the mesh's height.
-SAME = 1e-6
+SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +85,12 @@ class ShapeMesh:
 
         A closed mesh is passed through once, from its top to its underside; an open one is hit once.
         """
-        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0))]
-        cell, z = np.concatenate([hit[0] for hit in hits]), np.concatenate([hit[1] for hit in hits])
+        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), np.empty(0, np.bool_))]
+        cell, z, over = (np.concatenate([hit[part] for hit in hits]) for part in range(3))
+        known = np.zeros(grid.count, np.bool_)
+        known[cell[over]] = True
+        used = over | ~known[cell]
+        cell, z = cell[used], z[used]
         order = np.lexsort((z, cell))
         cell, z = cell[order], z[order]
         value, covered = np.zeros(grid.count), np.zeros(grid.count, np.bool_)
@@ -93,14 +101,17 @@ class ShapeMesh:
         layers = np.bincount(cell[new], minlength=grid.count)
         return Tops(value, covered, layers > (2 if self.closed else 1))
 
-    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats]]:
-        """Give the cells whose rays hit a triangle, and the heights of the hits."""
+    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags]]:
+        """Give the cells whose rays hit a triangle or pass it closely, where, and whether they hit it."""
         plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
         corners, z = plan[self.faces], self.vertices[self.faces, 2]
         sides = corners[:, 1:] - corners[:, :1]
         area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
         size = np.abs(sides).max(axis=(1, 2))
-        first_row, last_row, first, last = _window(grid, corners.min(axis=1), corners.max(axis=1))
+        slack = EDGE * min(grid.layout.pitch, grid.layout.row_spacing)
+        first_row, last_row, first, last = _window(
+            grid, corners.min(axis=1) - slack, corners.max(axis=1) + slack
+        )
         rows, columns = np.maximum(last_row - first_row + 1, 0), np.maximum(last - first + 1, 0)
         # A triangle on edge covers no pin; its neighbours have the same edges.
         candidates = np.where(np.abs(area) > 1e-12 * size * size, rows * columns, 0)
@@ -115,10 +126,15 @@ class ShapeMesh:
             dx, dy = grid.x[cell] - corners[face, 0, 0], grid.y[cell] - corners[face, 0, 1]
             (ax, ay), (bx, by) = sides[face, 0].T, sides[face, 1].T
             one, two = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
-            inside = (one >= -ON_THE_SIDE) & (two >= -ON_THE_SIDE) & (one + two <= 1.0 + ON_THE_SIDE)
-            face, one, two = face[inside], one[inside], two[inside]
+            over = (one >= -ON_THE_SIDE) & (two >= -ON_THE_SIDE) & (one + two <= 1.0 + ON_THE_SIDE)
+            # Beside an edge the triangle is as high as on it, however steep it is.
+            one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)
+            whole = np.maximum(one + two, 1.0)
+            one, two = one / whole, two / whole
+            near = np.hypot(dx - one * ax - two * bx, dy - one * ay - two * by) <= slack
+            cell, over, face, one, two = cell[near], over[near], face[near], one[near], two[near]
             low = z[face, 0]
-            yield cell[inside], low + one * (z[face, 1] - low) + two * (z[face, 2] - low)
+            yield cell, low + one * (z[face, 1] - low) + two * (z[face, 2] - low), over
 
 
 def _merged(vertices: Floats) -> Indices:
@@ -131,17 +147,17 @@ def _merged(vertices: Floats) -> Indices:
 
 
 def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, Indices, Indices]:
-    """Return the first and last rows and columns of the pins that may lie in boxes (f, 2), m."""
+    """Return the first and last rows and columns of the pins that lie in boxes (f, 2), m."""
     plan, (left, bottom) = grid.layout, grid.corner
 
     def index(places: Floats, most: int) -> Indices:
         bounded: Indices = np.clip(places, -1.0, most).astype(np.int64)
         return bounded
 
-    first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing - ON_THE_SIDE)
-    last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing + ON_THE_SIDE)
-    first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch - ON_THE_SIDE)
-    last = np.floor((high[:, 0] - left) / plan.pitch + ON_THE_SIDE)
+    first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing)
+    last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing)
+    first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch)
+    last = np.floor((high[:, 0] - left) / plan.pitch)
     return (
         np.maximum(index(first_row, plan.rows), 0),
         np.minimum(index(last_row, plan.rows), plan.rows - 1),

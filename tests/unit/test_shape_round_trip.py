@@ -1,0 +1,98 @@
+"""What was formed, written as a mesh and read back as a shape: the same heights, cell by cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.actuator import Actuator
+from digiclay.core.export import FORMATS, suffix, write
+from digiclay.core.export_model import Model, bodies
+from digiclay.core.formed import Formed
+from digiclay.core.layout import Grid, Layout, grid
+from digiclay.core.relief import Placement
+from digiclay.core.shape import Shape
+from digiclay.core.shape_file import read
+from digiclay.core.shape_fit import Fitted, fitted
+from digiclay.core.shape_mesh import shape_mesh
+
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+#: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in decimals.
+PITCHES = (3.0, 2.3, 1.7, 3.1, 2.54)
+#: Formats that are read back; 3MF is written only.
+READ = tuple(kind for kind in FORMATS if kind != "3mf")
+#: A float32 of 50 mm is 2 nm off at most, and beside a pin a slope of 20 moves the height by 20 times that;
+#: pins are rounded to 0.1 µm.
+EXACT = 1e-7
+
+
+def bed(pitch: float, arrangement: str) -> tuple[Grid, Formed]:
+    """A bed with pins anywhere between 30 and 50 mm."""
+    cells = grid(Layout(9, 8, pitch * 1e-3, arrangement))
+    height = np.random.default_rng(3).uniform(0.03, 0.05, cells.count)
+    return cells, Formed.of(cells.positions, height, 0.04, 0.0, 0)
+
+
+def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str, unit: str = "mm") -> Fitted:
+    """Write a surface, and lay the file onto the bed it came from."""
+    write(bodies(formed, model), path, unit, format)
+    shape = Shape(file=str(path), fit="placed", unit="auto" if format == "glb" else unit)
+    return fitted(shape, read(shape), cells, Actuator())
+
+
+@pytest.mark.parametrize("format", READ)
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_formed_bed_comes_back_cell_by_cell(tmp_path: Path, arrangement: str, format: str) -> None:
+    path = tmp_path / f"formed{suffix(format)}"
+    for pitch in PITCHES:
+        cells, formed = bed(pitch, arrangement)
+        for kind in ("solid", "surface", "pins"):
+            back = read_back(cells, formed, Model(kind=kind), path, format)
+            assert (back.covered, back.overhanging) == (cells.count, 0), (pitch, kind)
+            assert np.abs(back.heights - formed.height).max() < EXACT, (pitch, kind)
+
+
+@pytest.mark.parametrize("skin", ["smooth", "membrane"])
+def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None:
+    cells, formed = bed(2.3, "hexagonal")
+    back = read_back(cells, formed, Model(kind="solid", skin=skin), tmp_path / "x.stl", "stl")
+    assert back.covered == cells.count
+    assert np.abs(back.heights - formed.height).max() < 1e-6  # the membrane stops at 1 nm a point
+
+
+@pytest.mark.parametrize("format", [kind for kind in READ if kind != "glb"])
+def test_a_file_in_metres_comes_back_too(tmp_path: Path, format: str) -> None:
+    cells, formed = bed(2.3, "staggered")
+    path = tmp_path / f"formed{suffix(format)}"
+    back = read_back(cells, formed, Model(), path, format, unit="m")
+    assert back.covered == cells.count
+    assert np.abs(back.heights - formed.height).max() < EXACT
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement: str) -> None:
+    cells, formed = bed(2.3, arrangement)
+    (body,) = bodies(formed, Model(kind="surface"))
+    rounded = np.array([[float(f"{value * 1e3:.6g}") for value in row] for row in body.vertices])
+    tops = shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
+    assert tops.covered.all()
+    # 50 nm off, at a slope of up to 20.
+    assert np.abs(tops.value * 1e-3 - formed.height).max() < 2e-6
+
+
+def test_a_pin_a_hundredth_of_a_pitch_beside_a_shape_is_not_covered() -> None:
+    cells = grid(Layout(5, 5, 3e-3))
+    plate = np.array([[-5.97, -5.97, 1.0], [5.97, -5.97, 1.0], [5.97, 5.97, 1.0], [-5.97, 5.97, 1.0]])
+    tops = shape_mesh("x", plate, [[0, 1, 2], [0, 2, 3]], "z", 1e-3).tops(
+        cells, Placement(1e-3, 1e-3, 0.0, 0.0)
+    )
+    assert tops.covered.sum() == 9  # the inner pins
+
+
+def test_a_needle_covers_no_pin_ahead_of_its_tip() -> None:
+    cells = grid(Layout(5, 5, 3e-3))
+    # It ends a quarter of a pitch before the middle pin, at an angle of 1e-4.
+    needle = np.array([[-6.0, -3e-4, 1.0], [-6.0, 3e-4, 1.0], [-0.75, 0.0, 1.0]])
+    tops = shape_mesh("x", needle, [[0, 2, 1]], "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
+    np.testing.assert_array_equal(np.flatnonzero(tops.covered), [10, 11])
