@@ -22,8 +22,8 @@ except ImportError as error:
     raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
 
 __all__ = [
-    "PACKAGE", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "quiet", "scratch",
-    "set_node_setting", "shader_nodes", "strips", "to_video",
+    "PACKAGE", "bpy", "curves", "has_denoiser", "keyframe_node_setting", "node_setting", "own_curves",
+    "quiet", "scratch", "set_node_setting", "shader_nodes", "strips", "to_video",
 ]  # fmt: skip
 
 #: The name Blender knows the extension by.
@@ -70,14 +70,35 @@ def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
 
 
 def curves(owner: Any) -> list[Any]:
-    """Return the collections of animation curves of an object; there is one for each slot from 5.0 on."""
-    action = owner.animation_data.action if owner.animation_data else None
+    """Return the collections of animation curves of an object: from 4.4 on those of its own slot alone."""
+    data = owner.animation_data
+    action = data.action if data else None
     if action is None:
         return []
-    if hasattr(action, "fcurves"):
+    if not hasattr(data, "action_slot"):  # up to 4.3 an action has no slots
         return [action.fcurves]
+    if data.action_slot is None:
+        return []
     strips = (strip for layer in action.layers for strip in layer.strips)
-    return [bag.fcurves for strip in strips for bag in strip.channelbags]
+    bags = (strip.channelbag(data.action_slot) for strip in strips)
+    return [bag.fcurves for bag in bags if bag is not None]
+
+
+def own_curves(owner: Any) -> None:
+    """Give an object an action of its own where it shares its curves with others, as linked duplicates do."""
+    data = owner.animation_data
+    if not data or data.action is None:
+        return
+    slot = getattr(data, "action_slot", None)  # up to 4.3 whoever has the action has all its curves
+    if (data.action.users if slot is None else len(slot.users())) < 2:
+        return
+    made = data.action.copy()
+    data.action = made
+    if slot is None:
+        return
+    data.action_slot = made.slots[slot.identifier]
+    for other in [one for one in made.slots if one.identifier != slot.identifier]:
+        made.slots.remove(other)
 
 
 def has_denoiser() -> bool:

@@ -105,6 +105,14 @@ def test_a_name_gets_the_ending_of_its_format_in_place_of_another(bed, tmp_path)
     assert found == ["four.stl", "one.STL", "three.part.stl", "two.stl"]
 
 
+def test_a_format_nobody_asked_for_is_told_by_the_name(bed, tmp_path):
+    for name in ("one.obj", "two.GLB", "three.ascii.stl", "four.stl", "five.part"):
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), kind="surface")
+    found = sorted(path.name for path in tmp_path.iterdir())
+    assert found == ["five.part.stl", "four.stl", "one.obj", "three.ascii.stl", "two.GLB"]
+    assert (tmp_path / "two.GLB").read_bytes()[:4] == b"glTF"
+
+
 def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
     path = tmp_path / "für später" / "grüne Form.stl"
     path.parent.mkdir()
@@ -201,6 +209,23 @@ def test_the_mesh_stands_beside_the_bed_or_where_its_surface_is(bed):
     bpy.context.view_layer.update()
     away = bpy.context.object.matrix_world.translation - bed.matrix_world.translation
     assert away.length > 13 * 3e-3 * bridge.SCALE
+
+
+def test_the_next_mesh_stands_beside_the_one_before_and_takes_a_place_that_is_free(bed):
+    bed.rotation_euler = (0.0, 0.0, 0.5)
+    made = []
+    for _ in range(3):
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.objects.active = bed
+        bpy.ops.mesh.digital_clay_make(kind="solid")
+        made.append(bpy.context.object)
+    bpy.data.objects.remove(made.pop(1))
+    bpy.context.view_layer.objects.active = bed
+    bpy.ops.mesh.digital_clay_make(kind="solid")
+    away = [(one.matrix_world.translation - bed.matrix_world.translation).length for one in made]
+    again = (bpy.context.object.matrix_world.translation - bed.matrix_world.translation).length
+    np.testing.assert_allclose([again, away[1]], [2 * away[0], 3 * away[0]], rtol=1e-5)
+    assert away[0] > 14 * 3e-3 * bridge.SCALE
 
 
 def test_the_mesh_goes_on_into_a_boolean(bed):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -172,6 +173,46 @@ def test_freeing_a_bake_leaves_nothing_of_it(bed: Any) -> None:
     assert not bake.is_baked(bed)
     assert not bake.free(bed)
     assert [curve for group in bake.curves(bed) for curve in group] == []
+
+
+def other_bed() -> Any:
+    """Return a second bed in the open file."""
+    made = scene()
+    return view.build(Instant.at_rest(made.layout, made.actuator, made.fingertip), bpy.context.collection)
+
+
+def same_action(bed: Any) -> Any:
+    """Return a second bed that was baked into the action of the first."""
+    other = other_bed()
+    other.animation_data_create().action = bed.animation_data.action
+    baked(other, taken()[0])
+    return other
+
+
+@pytest.mark.parametrize("made", [same_action, lambda bed: bed.copy()], ids=["an action", "its curves"])
+@pytest.mark.parametrize("freed", [0, 1])
+def test_freeing_the_bake_of_one_of_two_beds_that_share_leaves_the_others(
+    bed: Any, made: Callable[[Any], Any], freed: int
+) -> None:
+    take, heights = taken()
+    baked(bed, take)
+    beds = [bed, made(bed)]
+    if beds[1].name not in bpy.context.scene.objects:
+        bpy.context.collection.objects.link(beds[1])
+        beds[1].data = bed.data.copy()
+    assert bake.free(beds.pop(freed))
+    (left,) = beds
+    assert np.abs(shown(left, 11) - heights[50]).max() < 1e-7
+    assert np.abs(shown(left, 21) - heights[100]).max() < 1e-7
+
+
+def test_a_bake_is_keyframed_in_the_beds_own_curves_where_it_shares_them(bed: Any) -> None:
+    bed.keyframe_insert("location", frame=1)
+    other = bed.copy()
+    bpy.context.collection.objects.link(other)
+    baked(bed, taken()[0])
+    paths = [[curve.data_path for group in bake.curves(one) for curve in group] for one in (other, bed)]
+    assert [len(one) for one in paths] == [3, 4]
 
 
 def test_a_bake_plays_without_the_extension(bed: Any, tmp_path: Path) -> None:

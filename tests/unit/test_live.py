@@ -68,6 +68,13 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
     assert 0.1 < clock.factor < 0.25
 
 
+def test_a_machine_too_slow_simulates_for_seven_tenths_of_the_time_and_draws_in_the_rest() -> None:
+    _, clock = looked([0.0])
+    count, _ = due(spent(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)
+    # 101 periods have gone by, and each takes five to simulate: 14 take 70, 15 would take 75.
+    assert count == 14
+
+
 def test_a_clock_that_goes_back_does_no_harm() -> None:
     assert looked([5.0, 4.0, 4.01])[0] == [0, 0, 2]
 

@@ -101,6 +101,27 @@ def test_a_marked_gesture_is_taken_back_to_where_it_began_though_the_finger_neve
     assert at[0] == 6e-3
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-6])
+def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_finger_moves(
+    off: float,
+) -> None:
+    hand = Hand()
+    session = hand.move(started(), [(0.0, z) for z in np.linspace(46, 38, 20)] + [(0.0, 38.0)] * 30)
+    first = heights(session)
+    session = hand.move(session, [(x, 38.0) for x in np.linspace(0, 5, 10)])
+    assert len(session.gestures) == 2
+    back = sculpting.rewound(session)
+    # Put there by 32 bits, the finger is read a little beside; and stands on the pins as it stood.
+    back = hand.move(back, [(1e3 * off, 38.0)] * 3)
+    assert len(back.gestures) == 1
+    # Under a finger at rest pins still settle by hundredths of a millimetre, of 2 mm pressed.
+    np.testing.assert_allclose(heights(back), first, rtol=0, atol=5e-5)
+    again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
+    assert len(again.gestures) == 2
+    back = sculpting.rewound(sculpting.rewound(again))
+    assert (heights(back) == 40e-3).all()
+
+
 def test_gestures_kept_do_not_grow_in_number() -> None:
     hand, session = Hand(), started()
     for _ in range(sculpting.GESTURES + 3):

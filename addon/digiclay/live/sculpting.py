@@ -36,6 +36,9 @@ GESTURES, GESTURE_BYTES = 20, 200_000_000
 CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
 #: A finger that moves on after resting so long makes another gesture, s.
 REST = 0.5
+#: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
+#: to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by 1e-6 m beside it.
+STILL = 2e-6
 
 
 def begun(
@@ -153,7 +156,7 @@ def _compared(shadow: Shadow, state: State, part: Floats) -> tuple[Shadow, LiveE
 
 def _about_to_touch(running: Running, pose: Floats, count: int) -> Running:
     """Keep where a gesture begins: at a finger that moves after a rest, or that does not touch."""
-    moved = not np.array_equal(pose, running.pose)
+    moved = float(np.abs(pose - running.pose).max()) > STILL
     rested = 0.0 if moved else running.rested + count * running.system.period
     coming = running.coming
     free = coming is None and felt(running.system, running.state) == 0.0
@@ -213,12 +216,17 @@ def marked(running: Running) -> tuple[Running, Gesture]:
 
 
 def taken_back(running: Running, gesture: Gesture) -> Running:
-    """Bring state and finger back to where a gesture began; a recording that began before goes back too."""
+    """Bring state and finger back to where a gesture began; a recording that began before goes back too.
+
+    A finger that touched there already has to move on before it makes another gesture: else it counted at
+    once, and could be taken back for ever without a way to those before it.
+    """
     keep = running.recording
     back = restored(replace(running, recording=None), gesture.kept, gesture.pose)
     # The gesture a reset leaves behind has periods of another count.
     counts = keep is not None and gesture.period == back.state.period
-    return replace(back, coming=gesture, recording=keep.until(gesture.period) if counts else None)
+    coming = gesture if back.coming is not None else None
+    return replace(back, coming=coming, rested=REST, recording=keep.until(gesture.period) if counts else None)
 
 
 def reset(running: Running) -> Running:

@@ -68,11 +68,15 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         name = bpy.path.clean_name(bed_of(context).name)
         self.filepath = str(folder / f"{name}{suffix(self.file_format)}")
+        self.shown = self.file_format
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def check(self, context: Any) -> bool:
-        """Keep the ending of the name that of the format."""
+        """Keep name and format the same: the one that was changed last tells the other."""
+        if self.file_format == self.shown:
+            self.file_format = _told_by(self.filepath) or self.file_format
+        self.shown = self.file_format
         wanted = str(self._file())
         changed = wanted != self.filepath
         self.filepath = wanted
@@ -93,7 +97,9 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         row.prop(self, "separate")
 
     def execute(self, context: Any) -> set[str]:
-        """Write the file, or the files."""
+        """Write the file, or the files; a format nobody has asked for is told by the ending of the name."""
+        if not self.properties.is_property_set("file_format"):
+            self.file_format = _told_by(self.filepath) or self.file_format
         target = self._file()
         try:
             bed = chosen(context)
@@ -118,9 +124,15 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         ending = suffix(self.file_format)
         if path.name.lower().endswith(ending) and not (ending == ".stl" and _is_text(path)):
             return path
-        known = sorted((suffix(name) for name in FORMATS), key=len, reverse=True)
-        other = next((end for end in known if path.name.lower().endswith(end)), "")
+        told = _told_by(path.name)
+        other = suffix(told) if told else ""
         return path.with_name(path.name[: len(path.name) - len(other)] + ending)
+
+
+def _told_by(name: str) -> str:
+    """Return the format that the ending of a name tells; empty where it tells none."""
+    by_length = sorted(FORMATS, key=lambda one: len(suffix(one)), reverse=True)
+    return next((one for one in by_length if name.lower().endswith(suffix(one))), "")
 
 
 def _is_text(path: Path) -> bool:

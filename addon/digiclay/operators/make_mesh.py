@@ -1,6 +1,7 @@
 """Make Mesh: what was formed in a bed as new mesh objects, to go on with in Blender."""
 
 # No postponed annotations here: Blender reads an operator's properties from them.
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ __all__ = ["MakeMesh"]
 
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35
+#: Marks what was made here, so that what is made next is put elsewhere.
+MADE = "digiclay_made"
 
 
 class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
@@ -54,15 +57,14 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
         smooth = self.skin != "bilinear" and self.kind != "pins"
-        where = bed.matrix_world.copy()
-        if self.beside:
-            width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
-            where.translation += where.to_3x3() @ where.translation.__class__(((1.0 + GAP) * width, 0.0, 0.0))
+        where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
         things = []
         for body in made:
             name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
             new = body_mesh.thing(body, name, smooth=smooth)
+            new[MADE] = True
             context.collection.objects.link(new)
             new.matrix_world = where
             things.append(new)
@@ -72,3 +74,35 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         groups = f" with vertex groups {', '.join(made[0].groups)}" if made[0].groups else ""
         self.report({"INFO"}, f"Made {', '.join(new.name for new in things)}{groups}")
         return {"FINISHED"}
+
+
+def _beside(context: Any, bed: Any, width: float) -> Any:
+    """Return the first place beside a bed, a matrix, that no mesh made before stands in.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    width : float
+        Of its pins, in its own space.
+    """
+    step, half = (1.0 + GAP) * width, width / 2
+    to_bed = np.array(bed.matrix_world.inverted(), np.float64)
+    place = 1
+    for low, high in sorted(_spans(context, to_bed, half)):
+        if low < place * step + half and place * step - half < high:
+            place = int((high + half) // step) + 1
+    where = bed.matrix_world.copy()
+    where.translation += where.to_3x3() @ where.translation.__class__((place * step, 0.0, 0.0))
+    return where
+
+
+def _spans(context: Any, to_bed: Any, half: float) -> Iterator[tuple[float, float]]:
+    """Give from where to where along a bed's x axis the meshes made before stand that lie beside it."""
+    for thing in context.scene.objects:
+        if not thing.get(MADE):
+            continue
+        corners = np.column_stack([np.array(thing.bound_box, np.float64), np.ones(8)])
+        x, y = (corners @ (to_bed @ np.array(thing.matrix_world, np.float64)).T)[:, :2].T
+        if np.isfinite(x).all() and y.min() < half and y.max() > -half:
+            yield float(x.min()), float(x.max())

@@ -50,7 +50,8 @@ class ExportTake(bpy.types.Operator):  # type: ignore[misc]
             number = self.take or takes.last(bed)
             take = takes.read(bed, number)
             name = next(one.name for one in takes.entries(bed) if one.number == number)
-            file = Path(bpy.path.abspath(self.filepath)).with_suffix(".toml")
+            # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
+            file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
             write_whole(file, text(as_scene(take, name)).encode())
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))

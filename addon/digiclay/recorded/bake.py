@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import bridge
-from ..compat import bpy, curves, keyframe_node_setting, set_node_setting
+from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
 from ..core.assembly import assemble
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
@@ -111,6 +111,7 @@ def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe
     modifier.node_group = pins_at_moment(_held(moments), count)
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]
+    own_curves(bed)
     for row in (0, count - 1):
         set_node_setting(modifier, MOMENT, float(row))
         keyframe_node_setting(modifier, MOMENT, first + row)
@@ -136,6 +137,7 @@ def free(bed: Any) -> bool:
     modifier = _modifier(bed)
     if modifier is None:
         return False
+    own_curves(bed)
     for owner, curve in list(_curves(bed)):
         owner.remove(curve)
     tree = modifier.node_group
