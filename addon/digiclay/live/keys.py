@@ -1,4 +1,4 @@
-"""Keys of a running session in the 3D view, to be changed in Blender's preferences like all others."""
+"""Keys of a running session, to be changed in Blender's preferences like all others."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from ..compat import bpy
 
 __all__ = ["KEYS", "register", "unregister"]
 
-#: Operator, key, and whether Shift is held. Without a session the operators decline, and the key does what
-#: it always does.
+#: Blender's keymaps: their names and the editors they are of.
+VIEW, WINDOW = ("3D View", "VIEW_3D"), ("Window", "EMPTY")
+#: Keymap, operator, key, and whether Shift is held: None, whatever is held. Without a session the operators
+#: decline, and the key does what it always does.
 KEYS = (
-    ("digiclay.session_pause", "P", False),
-    ("digiclay.session_step", "P", True),
-    ("digiclay.session_rewind", "BACK_SPACE", False),
-    ("digiclay.session_reset", "BACK_SPACE", True),
+    (VIEW, "digiclay.session_pause", "P", False),
+    (VIEW, "digiclay.session_step", "P", True),
+    (VIEW, "digiclay.session_rewind", "BACK_SPACE", False),
+    (VIEW, "digiclay.session_reset", "BACK_SPACE", True),
+    (WINDOW, "digiclay.session_escape", "ESC", None),
 )
 _ADDED: list[tuple[Any, Any]] = []
 
@@ -24,16 +27,17 @@ def register() -> None:
     configuration = bpy.context.window_manager.keyconfigs.addon
     if configuration is None:
         return
-    view = configuration.keymaps.new(name="3D View", space_type="VIEW_3D")
-    for operator, key, shift in KEYS:
-        item = view.keymap_items.new(operator, key, "PRESS", shift=shift)
+    for (name, space), operator, key, shift in KEYS:
+        keymap = configuration.keymaps.new(name=name, space_type=space)
+        held = {"any": True} if shift is None else {"shift": shift}
+        item = keymap.keymap_items.new(operator, key, "PRESS", **held)
         if operator == "digiclay.session_reset":
             item.properties.running_only = True
-        _ADDED.append((view, item))
+        _ADDED.append((keymap, item))
 
 
 def unregister() -> None:
     """Undo `register`."""
-    for view, item in _ADDED:
-        view.keymap_items.remove(item)
+    for keymap, item in _ADDED:
+        keymap.keymap_items.remove(item)
     _ADDED.clear()

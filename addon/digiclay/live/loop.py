@@ -9,7 +9,7 @@ from .. import preferences
 from ..compat import bpy
 from . import running
 
-__all__ = ["begin", "drawn", "due", "end", "runs", "token"]
+__all__ = ["aside", "begin", "drawn", "due", "end", "runs", "step_aside", "take_over", "token"]
 
 #: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
 GONE = 5.0
@@ -44,6 +44,21 @@ def begin(context: Any) -> int:
     bpy.types.STATUSBAR_HT_header.prepend(draw)
     status_changed()
     return _COUNT[0]
+
+
+def step_aside() -> None:
+    """Note that for the moment no operator drives the loop, nor takes the keys."""
+    _LOOP["aside"] = True
+
+
+def take_over() -> None:
+    """Note that an operator drives the loop."""
+    _LOOP.pop("aside", None)
+
+
+def aside() -> bool:
+    """Tell whether there is a loop that no operator drives for the moment."""
+    return "aside" in _LOOP
 
 
 def end() -> None:

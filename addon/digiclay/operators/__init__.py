@@ -49,6 +49,7 @@ CLASSES: tuple[type, ...] = (
     find_features.ForgetSurface,
     session.Session,
     session_loop.GoOn,
+    session_loop.Escape,
     session_stop.StopSession,
     session_pause.PauseSession,
     session_step.StepSession,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.errors import DigiclayError
+from . import status
 
 __all__ = ["LongWork"]
 
@@ -66,7 +67,7 @@ class LongWork:
             return {"CANCELLED"}
         context.window_manager.progress_update(100.0 * share)
         said = f"{self.bl_label}: {100.0 * share:.0f} %     Esc: stop"  # type: ignore[attr-defined]
-        context.workspace.status_text_set(said)
+        status.tell(context, said)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
@@ -78,4 +79,4 @@ class LongWork:
         self._steps.close()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
+        status.clear()

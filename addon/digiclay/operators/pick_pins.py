@@ -8,6 +8,7 @@ from ..core.errors import DigiclayError
 from ..device import display
 from ..device.view import bed_of
 from ..press import aim
+from . import status
 from .reasons import allowed, no_bed
 
 __all__ = ["ClearPins", "PickPins"]
@@ -32,14 +33,15 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
         self.changed = False
-        context.workspace.status_text_set(KEYS)
+        status.tell(context, KEYS)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under a click; what is no click goes on to the view."""
+        status.tell(context, KEYS)
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
-            context.workspace.status_text_set(None)
+            status.clear()
             return {"FINISHED"} if self.changed else {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             return self._clicked(context, event)
@@ -47,14 +49,15 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
 
     def cancel(self, context: Any) -> None:
         """Blender ends the operator, for instance to load a file."""
-        context.workspace.status_text_set(None)
+        status.clear()
 
     def _clicked(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under the mouse; a click beside the bed goes on to whatever lies there."""
-        region = _under(context.area, event)
+        # The view it was started in may be gone by now: another workspace, another editor in its place.
+        area, region = _under(context.window.screen, event)
         if region is None:
             return {"PASS_THROUGH"}
-        with context.temp_override(region=region):
+        with context.temp_override(area=area, region=region):
             found = aim.target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
         if found is None or found.bed != bed_of(context):
             return {"PASS_THROUGH"}
@@ -69,15 +72,14 @@ class PickPins(bpy.types.Operator):  # type: ignore[misc]
         return {"RUNNING_MODAL"}
 
 
-def _under(area: Any, event: Any) -> Any | None:
-    """Return the main region of a 3D view that the mouse is in; the view may be split into four."""
-    for region in area.regions if area.type == "VIEW_3D" else ():
-        inside = (
-            0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
-        )
-        if region.type == "WINDOW" and inside:
-            return region
-    return None
+def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
+    """Return the 3D view that the mouse is in and its main region, of which it may have four."""
+    for area in screen.areas:
+        for region in area.regions if area.type == "VIEW_3D" else ():
+            x, y = event.mouse_x - region.x, event.mouse_y - region.y
+            if region.type == "WINDOW" and 0 <= x < region.width and 0 <= y < region.height:
+                return area, region
+    return None, None
 
 
 class ClearPins(bpy.types.Operator):  # type: ignore[misc]

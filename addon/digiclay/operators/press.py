@@ -12,6 +12,7 @@ from ..device import view
 from ..live import running, sculpting, tick, waiting
 from ..press import aim
 from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged
+from . import status
 from .reasons import allowed
 
 __all__ = ["Press"]
@@ -165,12 +166,12 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
 
     def _tell(self, context: Any) -> None:
         """Show depth and keys in the status bar."""
-        context.workspace.status_text_set(KEYS.format(1e3 * self.gesture.depth * self.gesture.pressure))
+        status.tell(context, KEYS.format(1e3 * self.gesture.depth * self.gesture.pressure))
 
     def _end(self, context: Any) -> None:
         """Give back timer and status bar."""
         context.window_manager.event_timer_remove(self.timer)
-        context.workspace.status_text_set(None)
+        status.clear()
 
 
 def _bed(uid: int) -> Any | None:

@@ -13,7 +13,7 @@ from ..compat import bpy
 from ..live import handlers, loop, recovery, running, tick
 from .reasons import allowed
 
-__all__ = ["GoOn", "Looping"]
+__all__ = ["Escape", "GoOn", "Looping"]
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -26,6 +26,7 @@ class Looping:
 
     def begun(self, context: Any) -> set[str]:
         """Begin to drive the loop that there is."""
+        loop.take_over()
         self.token, self.since = loop.token(), time.perf_counter()
         self.newer = _others(context)
         context.window_manager.modal_handler_add(self)
@@ -85,6 +86,24 @@ class GoOn(Looping, bpy.types.Operator):  # type: ignore[misc]
         return self.begun(context)
 
 
+class Escape(bpy.types.Operator):  # type: ignore[misc]
+    """Stop the sessions in the moment in which no operator of theirs takes the key"""
+
+    bl_idname = "digiclay.session_escape"
+    bl_label = "Stop Sessions"
+    bl_options = {"INTERNAL"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """At any other time Esc is for whoever else it is for."""
+        return allowed(cls, "" if loop.aside() else "The session takes the key itself")
+
+    def execute(self, context: Any) -> set[str]:
+        """Stop them, as Esc does at any other time."""
+        handlers.end_all(handlers.STOPPED)
+        return {"FINISHED"}
+
+
 def _saves(context: Any) -> bool:
     """Tell whether Blender saves by itself."""
     return bool(context.preferences.filepaths.use_auto_save_temporary_files)
@@ -103,6 +122,7 @@ def _go_on_later(token: int, window: Any) -> None:
 
     Until then the file has what is being recorded, in case Blender saves it.
     """
+    loop.step_aside()
     recovery.lend()
     pointer = window.as_pointer()
 

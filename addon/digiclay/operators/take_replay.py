@@ -20,6 +20,7 @@ from ..live import bed_state, sculpting, tick
 from ..live.running import Running
 from ..recorded import takes
 from ..settings import properties
+from . import status
 from .reasons import allowed, no_bed, no_take, session_runs
 
 __all__ = ["ReplayTake"]
@@ -99,7 +100,7 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
         view.show_state(bed, self._system, self._state)
         self._place(bed)
         seconds, whole = self._at * period, self._took.duration
-        context.workspace.status_text_set(f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
+        status.tell(context, f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
@@ -182,4 +183,4 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
         """Take back what the replay needs of Blender."""
         self._states.close()
         context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+        status.clear()
