@@ -121,7 +121,7 @@ def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: runni
 
 def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Running) -> None:
     told = views.told(bed, session, palettes.PALETTES["okabe_ito"])
-    assert (told.name, told.method, told.set_point) == (bed.name, "virtual_master", session.scene.set_point)
+    assert (told.name, told.method, told.set_point) == (bed.name, "virtual_master", 0.4)
     assert told.modes.sum() == 400
     assert np.count_nonzero(told.modes) > 1
     total = session.state.row(session.system.rows.force).sum()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.scene_file import load
+from digiclay.core.set_point import SetPoint
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.recorded import bake, takes
@@ -180,7 +181,7 @@ def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_fo
     (note,) = [note for notes in later for note in notes]
     assert "The recording ended and was kept as Take 1" in note.words
     (entry,) = takes.entries(bed)
-    assert takes.read(bed, entry.number).scene.set_point == 0.4
+    assert takes.read(bed, entry.number).scene.set_point == SetPoint(0.4)
     assert running.of(bed).recording is None
     tick.stop(bed.session_uid)
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}

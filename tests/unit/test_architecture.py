@@ -22,7 +22,7 @@ CORE = PACKAGE / "core"
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
     "body feature_region skin_spline errors modes png closed_form filled some control.travel metrics_signal "
-    "stack.columns",
+    "set_point stack.columns",
     "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export metrics_force metrics_trace control.servo control.blister",

@@ -10,7 +10,9 @@ from digiclay.core.assembly import assemble
 from digiclay.core.fingertip import LEVEL
 from digiclay.core.keeping import packed
 from digiclay.core.live import Clock, due, lived, reachable, spent, way
+from digiclay.core.modes import Mode
 from digiclay.core.scene_table import resolve
+from digiclay.core.set_point import SetPoint
 from digiclay.core.shadow import PAUSE, STRETCH, LiveErrors, cast, cast_from, compared
 from digiclay.core.simulation import begin, periods
 from digiclay.core.trace import ROWS, begun, extended, felt, picked, row
@@ -139,7 +141,7 @@ def test_a_trace_never_holds_more_than_its_rows() -> None:
     trace = begun(PERIOD)
     state = begin(SYSTEM)
     for time in range(5 * ROWS):
-        line = row(SYSTEM, state, 0.4, ())
+        line = row(SYSTEM, state, SetPoint(0.4), ())
         line[0] = time
         trace = extended(trace, [line])
     assert len(trace.rows) == ROWS
@@ -157,7 +159,7 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     middle, corner = 312, 0
     assert np.isin([middle, corner], state.gathered.cells).tolist() == [True, False]
     trace = picked(begun(PERIOD), [middle, corner], system.grid.count)
-    trace = extended(trace, [row(system, state, 0.4, trace.pins)])
+    trace = extended(trace, [row(system, state, SetPoint(0.4), trace.pins)])
     assert trace.heights.tolist() == [[state.row(0)[middle], state.row(0)[corner]]]
     assert trace.force[0] == pytest.approx(state.row(system.rows.force).sum(), rel=1e-12)
     assert trace.force[0] > 0.1
@@ -169,9 +171,19 @@ def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
     assert np.isnan(trace.set_point).all()
 
 
+def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
+    press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
+    *_, state = periods(SYSTEM, press, begin(SYSTEM), 10)
+    held, asked = state.gathered, SetPoint(0.04, per_cell=True)
+    held.mode[:] = Mode.REST
+    assert np.isnan(row(SYSTEM, state, asked, ())[2])
+    held.mode[:3] = Mode.FORCE_FOLLOW
+    assert row(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
+
+
 def test_a_pin_that_stays_picked_keeps_its_past() -> None:
     trace = picked(begun(PERIOD), [3, 4], 121)
-    trace = extended(trace, [row(SYSTEM, begin(SYSTEM), 0.4, trace.pins)])
+    trace = extended(trace, [row(SYSTEM, begin(SYSTEM), SetPoint(0.4), trace.pins)])
     other = picked(trace, [9, 4, 500, -1], 121)
     assert other.pins == (9, 4)
     assert np.isnan(other.heights[0, 0])

@@ -20,10 +20,13 @@ from digiclay.core.metrics import (
 )
 from digiclay.core.metrics_trace import trace_of
 from digiclay.core.modes import Mode
+from digiclay.core.set_point import SetPoint
 
 TIME = np.linspace(0.0, 10.0, 2001)
 #: Rounding of sums over 2001 rows.
 ROUNDING = 1e-12
+#: Asked of all cells together, and of each that follows: 9 of them in `history`.
+WHOLE, EACH = SetPoint(0.4), SetPoint(0.04, per_cell=True)
 
 
 def history(total: np.ndarray, time: np.ndarray = TIME) -> dict[str, np.ndarray]:
@@ -63,7 +66,7 @@ def test_the_rfd_leaves_out_the_time_without_contact():
 def test_the_rfd_of_the_whole_session_counts_the_time_without_contact():
     # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
     total = np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)
-    found = summary(history(total), 0.4)
+    found = summary(history(total), WHOLE)
     assert found["rfd_session"] == pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3)
     assert found["rfd"] == 0.0
 
@@ -79,8 +82,50 @@ def test_the_rfd_weighs_rows_by_their_time():
 def test_the_rfd_while_shaping_leaves_out_touching_down():
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
     case["mode"][TIME < 5.0] = Mode.SPRING
-    assert summary(case, 0.4)["rfd_shaping"] == 0.0
-    assert summary(case, 0.4)["rfd"] > 0.1
+    assert summary(case, WHOLE)["rfd_shaping"] == 0.0
+    assert summary(case, WHOLE)["rfd"] > 0.1
+
+
+def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
+    # 9 cells follow in the first half, 4 in the second: 0.36 and 0.16 N are asked for.
+    early = TIME < 5.0
+    case = history(np.where(early, 0.36, 0.16))
+    case["mode"][~early, :5] = Mode.SPRING
+    found = summary(case, EACH)
+    assert found["rfd"] == found["rfd_shaping"] == pytest.approx(0.0, abs=ROUNDING)
+    # The middle row, 1 of 2000 intervals, belongs to the second half.
+    assert found["set_point"] == pytest.approx(0.5 * (0.36 + 0.16), abs=1e-4)
+    case["total_force"] = case["total_force"] + 0.05
+    assert summary(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
+
+
+def test_rows_in_which_no_cell_follows_ask_for_nothing_of_a_method_that_asks_each_cell():
+    case = history(np.where(TIME < 5.0, 0.2, 0.36))
+    case["mode"][TIME < 5.0] = Mode.SPRING
+    found = summary(case, EACH)
+    assert found["rfd"] == found["rfd_session"] == pytest.approx(0.0, abs=ROUNDING)
+    case["mode"][:] = Mode.SPRING
+    found = summary(case, EACH)
+    names = ("set_point", "rfd", "rfd_session", "force_overshoot", "settling_time")
+    assert [found[name] for name in names] == [None] * 5
+
+
+def test_the_first_touch_of_a_method_that_asks_each_cell_is_judged_by_what_it_asks_for():
+    # No cell follows before 2 s; a quarter too much then, falling below a tenth at ln 2.5 = 0.916 s more.
+    total = np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0))))
+    case = history(total)
+    case["mode"][TIME < 2.0] = Mode.SPRING
+    found = summary(case, EACH)
+    assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
+    assert found["settling_time"] == pytest.approx(1.0 + np.log(2.5), abs=0.011)
+
+
+def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
+    case = history(np.full(2001, 0.4))
+    with_one, without = summary(case, WHOLE), summary(case, None)
+    assert {name for name in METRICS if with_one[name] is not None and without[name] is None} == {
+        "set_point", "rfd", "rfd_shaping", "rfd_session", "force_overshoot", "settling_time"
+    }  # fmt: skip
 
 
 def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
@@ -106,7 +151,7 @@ def test_lifting_at_the_end_is_no_contact_loss():
 
 
 def test_the_contact_share_is_the_time_in_contact():
-    found = summary(history(np.where(TIME < 2.5, 0.4, 0.0)), 0.4)
+    found = summary(history(np.where(TIME < 2.5, 0.4, 0.0)), WHOLE)
     assert found["contact_share"] == pytest.approx(0.25, abs=5e-4)  # one row of 2001
 
 
@@ -119,13 +164,13 @@ def test_the_lag_is_the_distance_from_finger_to_force_centroid():
 
 
 def test_the_summary_finds_the_lag_of_a_finger_beside_the_force():
-    found = summary(history(np.full(2001, 0.4)), 0.4)
+    found = summary(history(np.full(2001, 0.4)), WHOLE)
     assert found["lag_mean"] == pytest.approx(0.002, rel=ROUNDING)
     assert found["lag_max"] == pytest.approx(0.002, rel=ROUNDING)
 
 
 def test_the_summary_tells_extremes_of_forces_and_heights():
-    found = summary(history(np.linspace(0.0, 0.5, 2001)), 0.4)
+    found = summary(history(np.linspace(0.0, 0.5, 2001)), WHOLE)
     assert found["max_cell_force"] == found["max_total_force"] == 0.5
     assert (found["lowest"], found["highest"]) == (0.039, 0.043)
     assert found["height_range"] == pytest.approx(0.004, rel=ROUNDING)
@@ -133,7 +178,7 @@ def test_the_summary_tells_extremes_of_forces_and_heights():
 
 def test_volumes_above_and_below_the_initial_surface_are_told_apart():
     # Pins raised by 3 and 1 mm and sunk by 1 mm, 9 mm² each.
-    found = summary(history(np.full(2001, 0.4)), 0.4)
+    found = summary(history(np.full(2001, 0.4)), WHOLE)
     assert found["raised_volume"] == pytest.approx(4e-3 * 9e-6, rel=1e-9)  # 0.043 - 0.04 loses three digits
     assert found["sunk_volume"] == pytest.approx(1e-3 * 9e-6, rel=1e-9)
 
@@ -153,7 +198,7 @@ def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimetres):
 
 
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():
-    found = summary(history(np.zeros(2001)), 0.4)
+    found = summary(history(np.zeros(2001)), WHOLE)
     nothing = {name for name, value in found.items() if value is None}
     assert nothing == {
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
@@ -170,23 +215,18 @@ def test_the_first_touch_ends_where_contact_does_and_begins_a_row_before_it():
 
 def test_the_overshoot_of_the_first_touch_is_its_peak_over_the_set_point():
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
-    assert summary(history(total), 0.4)["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
+    assert summary(history(total), WHOLE)["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
 
 
 def test_the_first_touch_settles_when_its_force_comes_within_a_tenth_of_the_set_point():
     # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
-    assert summary(history(total), 0.4)["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
-
-
-def test_without_a_set_point_there_is_no_overshoot_and_no_settling():
-    found = summary(history(np.full(2001, 0.4)), 0.0)
-    assert (found["force_overshoot"], found["settling_time"]) == (None, None)
+    assert summary(history(total), WHOLE)["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
 
 
 def test_the_force_deviation_leaves_out_a_constant_offset():
     total = 0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)
-    assert summary(history(total), 0.4)["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
+    assert summary(history(total), WHOLE)["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
 
 
 def test_a_single_pin_has_no_area_to_form_a_volume_over():
@@ -195,11 +235,11 @@ def test_a_single_pin_has_no_area_to_form_a_volume_over():
         for name, value in history(np.full(2001, 0.4)).items()
     }
     case["position"] = np.zeros((1, 2))
-    assert summary(case, 0.4)["raised_volume"] is None
+    assert summary(case, WHOLE)["raised_volume"] is None
 
 
 def test_a_history_of_one_row_is_summed_up():
-    found = summary(history(np.array([0.5]), np.array([0.0])), 0.4)
+    found = summary(history(np.array([0.5]), np.array([0.0])), WHOLE)
     assert found["rfd"] == pytest.approx(0.1, rel=1e-10)
     assert found["duration"] == 0.0
 
@@ -207,7 +247,7 @@ def test_a_history_of_one_row_is_summed_up():
 def test_numbers_that_are_not_finite_become_none():
     case = history(np.full(2001, 0.4))
     case["height"][-1, 0] = np.nan
-    assert summary(case, 0.4)["height_range"] is None
+    assert summary(case, WHOLE)["height_range"] is None
 
 
 def test_a_history_without_rows_is_refused():
@@ -215,11 +255,11 @@ def test_a_history_without_rows_is_refused():
         name: value if name == "position" else value[:0] for name, value in history(np.zeros(2001)).items()
     }
     with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
-        summary(case, 0.4)
+        summary(case, WHOLE)
 
 
 def test_the_summary_is_json_and_every_key_has_a_unit_and_a_meaning():
-    found = summary(history(np.full(2001, 0.4)), 0.4)
+    found = summary(history(np.full(2001, 0.4)), WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert list(found) == list(METRICS)
     assert all(unit and meaning for unit, meaning in METRICS.values())

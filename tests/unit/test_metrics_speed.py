@@ -53,7 +53,7 @@ GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
 
 
 @pytest.mark.parametrize(
-    "bad", [{"losses": 1}, {"loss_share": 0.01}, {"lag": 5e-3}, {"rfd": 0.6}, {"lag": float("inf")}]
+    "bad", [{"losses": 1}, {"loss_share": 0.01}, {"lag": 3.1e-3}, {"rfd": 0.21}, {"lag": float("inf")}]
 )
 def test_each_part_of_the_criterion_can_fail_a_finger(bad: dict[str, float]) -> None:
     assert GOOD.meets(Criterion())

@@ -31,8 +31,8 @@ def test_a_trace_has_the_strongest_force_of_each_row() -> None:
     np.testing.assert_array_equal(TRACE.strongest, [0.0, 0.3])
 
 
-def test_a_trace_tells_in_which_rows_a_cell_follows_the_force() -> None:
-    np.testing.assert_array_equal(TRACE.following, [False, True])
+def test_a_trace_counts_the_cells_that_follow_the_force() -> None:
+    np.testing.assert_array_equal(TRACE.following, [0, 1])
 
 
 def test_a_trace_has_the_first_and_the_last_heights() -> None:

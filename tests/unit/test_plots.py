@@ -12,6 +12,7 @@ import pytest
 from digiclay.core.errors import OutputError, ParameterError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
+from digiclay.core.set_point import SetPoint
 from digiclay.plots import run as plots
 
 from tests.patience import HANGS
@@ -46,7 +47,7 @@ def png_size(path) -> tuple[int, int]:
 
 
 def test_the_session_has_heights_and_force_over_time_with_units():
-    figure = plots.session_figure(drag(), 0.4)
+    figure = plots.session_figure(drag(), SetPoint(0.4))
     assert axes(figure, "heights").get_ylabel() == "height (mm)"
     assert axes(figure, "force").get_ylabel() == "force (N)"
     assert axes(figure, "force").get_xlabel() == "time (s)"
@@ -54,14 +55,35 @@ def test_the_session_has_heights_and_force_over_time_with_units():
 
 def test_the_session_shows_the_total_force_and_its_set_point():
     case = drag()
-    total, set_point = axes(plots.session_figure(case, 0.37), "force").get_lines()
+    total, set_point = axes(plots.session_figure(case, SetPoint(0.37)), "force").get_lines()
     np.testing.assert_array_equal(total.get_ydata(), case["total_force"])
     assert set(set_point.get_ydata()) == {0.37}
 
 
+def test_a_set_point_of_each_cell_is_drawn_as_their_number_changes():
+    case = drag()
+    case["mode"][:] = Mode.REST
+    case["mode"][50:100, :5] = Mode.FORCE_FOLLOW
+    case["mode"][100:, :3] = Mode.FORCE_FOLLOW
+    force = axes(plots.session_figure(case, SetPoint(0.04, per_cell=True)), "force")
+    expected = np.repeat([np.nan, 0.2, 0.12], [50, 50, 101])
+    np.testing.assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
+    assert "set point 0.04 N a cell" in [text.get_text() for text in force.get_legend().get_texts()]
+
+
+def test_a_method_without_a_set_point_has_neither_it_nor_a_deviation_in_the_picture():
+    figure = plots.session_figure(drag(), None)
+    force, told = axes(figure, "force"), axes(figure, "figures")
+    assert [line.get_label() for line in force.get_lines()] == ["total force"]
+    words = " ".join(text.get_text() for text in (*force.get_legend().get_texts(), *told.texts))
+    assert "largest force" in words
+    assert "set point" not in words
+    assert "RFD" not in words
+
+
 def test_the_session_shows_the_chosen_cells_in_millimetres():
     case = drag()
-    lines = axes(plots.session_figure(case, 0.4), "heights").get_lines()
+    lines = axes(plots.session_figure(case, SetPoint(0.4)), "heights").get_lines()
     cells = plots.session_cells(case)
     assert len(lines) == len(cells) == 6
     for line, cell in zip(lines, cells, strict=True):
@@ -69,12 +91,12 @@ def test_the_session_shows_the_chosen_cells_in_millimetres():
 
 
 def test_both_panels_of_the_session_share_their_time():
-    figure = plots.session_figure(drag(), 0.4)
+    figure = plots.session_figure(drag(), SetPoint(0.4))
     assert axes(figure, "heights").get_xlim() == axes(figure, "force").get_xlim() == (0.0, 10.0)
 
 
 def test_every_curve_of_the_session_is_in_a_legend():
-    figure = plots.session_figure(drag(), 0.4)
+    figure = plots.session_figure(drag(), SetPoint(0.4))
     names = [
         text.get_text()
         for label in ("heights", "force")
@@ -152,7 +174,7 @@ def test_the_map_shows_the_fingers_path_in_contact_and_lifted():
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
 def test_both_pictures_are_written_at_their_size(tmp_path, arrangement):
     case = drag(arrangement=arrangement)
-    assert png_size(plots.session(case, tmp_path / "session.png", 0.4)) == (2000, 1008)
+    assert png_size(plots.session(case, tmp_path / "session.png", SetPoint(0.4))) == (2000, 1008)
     assert png_size(plots.surface(case, tmp_path / "surface.png")) == (2000, 880)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["session.png", "surface.png"]
     # A picture with something on it: a white one of this size has 10 kB.
@@ -161,7 +183,7 @@ def test_both_pictures_are_written_at_their_size(tmp_path, arrangement):
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
 def test_a_single_row_or_column_still_has_a_session(tmp_path, shape):
-    assert plots.session(drag(*shape), tmp_path / "session.png", 0.4).stat().st_size > 40_000
+    assert plots.session(drag(*shape), tmp_path / "session.png", SetPoint(0.4)).stat().st_size > 40_000
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
@@ -173,13 +195,13 @@ def test_a_single_row_or_column_has_no_surface(tmp_path, shape):
 
 def test_a_session_of_one_row_can_be_drawn(tmp_path):
     case = {name: value if name == "position" else value[:1] for name, value in drag().items()}
-    assert plots.session(case, tmp_path / "session.png", 0.4).stat().st_size > 40_000
+    assert plots.session(case, tmp_path / "session.png", SetPoint(0.4)).stat().st_size > 40_000
     assert plots.surface(case, tmp_path / "surface.png").stat().st_size > 40_000
 
 
 def test_a_folder_that_is_not_there_is_one_line(tmp_path):
     with pytest.raises(OutputError, match=r"^Cannot write \S+session\.png: No such file or directory\.$"):
-        plots.session(drag(), tmp_path / "missing" / "session.png", 0.4)
+        plots.session(drag(), tmp_path / "missing" / "session.png", SetPoint(0.4))
 
 
 def python(script: str) -> str:
@@ -205,7 +227,7 @@ def test_without_matplotlib_it_says_what_to_install():
         "import sys; sys.modules['matplotlib'] = None\n"
         "from digiclay.plots import run\nfrom digiclay.core.errors import OutputError\n"
         "case = {'position': [[0, 0]], 'time': [0], 'total_force': [0], 'height': [[0]]}\n"
-        "try:\n    run.session(case, 'session.png', 0.4)\n"
+        "try:\n    run.session(case, 'session.png', None)\n"
         "except OutputError as error:\n    print(error)\n"
     )
     assert python(script) == "Plots need matplotlib: run 'pip install digiclay[plots]'.\n"

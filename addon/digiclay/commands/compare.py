@@ -12,11 +12,13 @@ from typing import Any
 from ..core.errors import ParameterError, SceneError
 from ..core.methods import METHODS
 from ..core.metrics_speed import Criterion, Drag, Lift, largest_speed
+from ..core.metrics_trace import trace_of
 from ..core.metrics_trial import TRIAL_METRICS, Trial, trial
 from ..core.quantity import nearest
 from ..core.run_folder import may_be_written, written
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
+from ..core.set_point import asked
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
@@ -86,12 +88,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
     scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
     found: dict[str, Metrics] = {}
-    forces: dict[str, tuple[Any, Any, float | None]] = {}
+    forces: dict[str, tuple[Any, Any, Any]] = {}
     with Stop() as stop, written(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             done = _run(scene, method, stop, quiet=arguments.quiet)
             found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
-            forces[method] = done.history["time"], done.history["total_force"], scene.set_point
+            wanted = asked(scene.set_point, trace_of(done.history).following)
+            forces[method] = done.history["time"], done.history["total_force"], wanted
         units = {name: unit for name, (unit, _) in {**TRIAL_METRICS, **SPEEDS}.items()}
         known = {"scene": scene.name, "methods": found, "units": units}
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.finished import last_touch, read, row_at
+from ..core.metrics import summary
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
@@ -188,7 +189,8 @@ def draw_film(
     from ..pictures.film import film
 
     told = {"progress": progress, "stopped": stopped}
-    return film(history, out, looks, set_point=scene.set_point, **told, **sizes(scene))
+    wanted = summary(history, scene.set_point)["set_point"]
+    return film(history, out, looks, set_point=wanted, **told, **sizes(scene))
 
 
 def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int:

@@ -150,7 +150,7 @@ def _extras(arguments: argparse.Namespace, result: Result, folder: Path) -> Iter
     if arguments.plots:
         from ..plots.run import session, surface
 
-        yield lambda: session(history, folder / "session.png", scene.set_point or 0.0)
+        yield lambda: session(history, folder / "session.png", scene.set_point)
         yield lambda: surface(history, folder / "surface.png")
     if arguments.render:
         yield lambda: picture(scene, history, last_touch(history), folder / "pins.png")

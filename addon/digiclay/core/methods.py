@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .quantity import Parameters
+from .set_point import SetPoint
 
 __all__ = ["METHODS", "ControlParameters", "Method"]
 
@@ -15,8 +16,8 @@ class ControlParameters(Parameters):
     """Base of every method's parameters."""
 
     @property
-    def total_setpoint(self) -> float | None:
-        """Total force the finger should feel, N; None where the method asks for none."""
+    def set_point(self) -> SetPoint | None:
+        """Force asked for; None where the method asks for none."""
         return None
 
 

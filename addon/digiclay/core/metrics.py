@@ -18,6 +18,7 @@ from .metrics_force import contact_loss_share, first_touch, rfd, touchdown
 from .metrics_path import in_contact, lag, lag_of_sums, ridge_errors, surface_under
 from .metrics_signal import deviation, mean, weights
 from .metrics_trace import Trace, trace_of
+from .set_point import SetPoint, asked
 from .surface import grid_shape
 
 __all__ = [
@@ -41,7 +42,7 @@ ALL = slice(None)
 #: Every key of `summary`: its unit and its meaning.
 METRICS: dict[str, tuple[str, str]] = {
     "duration": ("s", "simulated time from the first row to the last"),
-    "set_point": ("N", "total force the finger should feel"),
+    "set_point": ("N", "total force asked for; one that changes from row to row: its mean while shaping"),
     "rfd": ("N", "rms over time of (total force - set point) while the finger touches"),
     "rfd_shaping": ("N", "the same, only while a cell follows the force: without touching down"),
     "rfd_session": ("N", "the same over the whole session; without contact the force is 0"),
@@ -93,7 +94,7 @@ def cell_area(position: ArrayLike) -> float | None:
     return area or None
 
 
-def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, float | None]:
+def summary(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
     """Return every metric of a session.
 
     Parameters
@@ -101,8 +102,8 @@ def summary(history: Mapping[str, ArrayLike], set_point: float) -> dict[str, flo
     history : mapping
         The arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and
         position.
-    set_point : float
-        Force the finger should feel, N.
+    set_point : SetPoint or None
+        Force asked for; None where none is.
 
     Returns
     -------
@@ -126,7 +127,7 @@ def composed(
     time: Floats,
     fingertip: Floats,
     position: Floats,
-    set_point: float,
+    set_point: SetPoint | None,
     near: NDArray[np.intp] | slice = ALL,
 ) -> dict[str, float | None]:
     """Return every metric of the session a trace is of.
@@ -141,8 +142,8 @@ def composed(
         Lowest point, m, and quaternion.
     position : ndarray, shape (n, 2)
         m; ordered row by row.
-    set_point : float
-        Force the finger should feel, N.
+    set_point : SetPoint or None
+        Force asked for; None where none is.
     near : ndarray of int or slice, optional
         The cells that are the nearest to the finger at some time, where they are known: only they can
         be left behind in a ridge.
@@ -158,14 +159,15 @@ def composed(
     above = surface_under(total, trace.height, fingertip)
     ridge = ridge_errors(position[near], trace.last[near], fingertip, rows)
     each = np.ones(len(ridge))
-    beyond, settled = touchdown(time, total, float(set_point))
+    wanted = asked(set_point, trace.following)
+    beyond, settled = touchdown(time, total, wanted)
     formed, area = trace.last - trace.first, cell_area(position)
     found: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
-        "set_point": float(set_point),
-        "rfd": rfd(time, total, set_point),
-        "rfd_shaping": rfd(time, total, set_point, rows),
-        "rfd_session": rfd(time, total, set_point, np.ones(len(time), dtype=bool)),
+        "set_point": _typical(set_point, wanted[rows], weight[rows]),
+        "rfd": rfd(time, total, wanted),
+        "rfd_shaping": rfd(time, total, wanted, rows),
+        "rfd_session": rfd(time, total, wanted, np.ones(len(time), dtype=bool)),
         "contact_share": mean(felt.astype(np.float64), weight),
         "contact_loss_share": contact_loss_share(time, total),
         "lag_mean": mean(behind, weight[felt]),
@@ -188,3 +190,10 @@ def composed(
     return {
         name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
     }
+
+
+def _typical(set_point: SetPoint | None, wanted: Floats, weight: Floats) -> float | None:
+    """Return a set point as one number, N: its mean in the rows that shape, if it changes."""
+    if set_point is None:
+        return None
+    return mean(wanted, weight) if set_point.per_cell else set_point.force

@@ -16,10 +16,12 @@ Floats = NDArray[np.float64]
 BAND = 0.1
 
 
-def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | None = None) -> float | None:
+def rfd(
+    time: ArrayLike, total_force: ArrayLike, set_point: ArrayLike, rows: Rows | None = None
+) -> float | None:
     """Return the reference force deviation, N.
 
-    ``RFD = sqrt(sum w_i (F_i - F_ref)² / sum w_i)`` with the `weights` of the rows.
+    ``RFD = sqrt(sum w_i (F_i - F_ref,i)² / sum w_i)`` with the `weights` of the rows.
 
     Parameters
     ----------
@@ -27,8 +29,8 @@ def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | 
         s.
     total_force : array_like, shape (t,)
         N.
-    set_point : float
-        Force the finger should feel, N.
+    set_point : array_like, shape (t,) or ()
+        Total force asked for, N; rows in which it is NaN are left out.
     rows : ndarray of bool, shape (t,), optional
         Rows to judge; those in contact by default. They include touching down, and leave out
         the gaps when the finger is lost: read it next to `contact_loss_share`.
@@ -39,8 +41,9 @@ def rfd(time: ArrayLike, total_force: ArrayLike, set_point: float, rows: Rows | 
         None when there is no such row.
     """
     force = np.asarray(total_force, dtype=np.float64)
-    chosen = in_contact(force) if rows is None else rows
-    square = mean(((force - set_point) ** 2)[chosen], weights(time)[chosen])
+    wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
+    chosen = (in_contact(force) if rows is None else rows) & ~np.isnan(wanted)
+    square = mean((force - wanted)[chosen] ** 2, weights(time)[chosen])
     return None if square is None else float(np.sqrt(square))
 
 
@@ -78,26 +81,31 @@ def first_touch(total_force: ArrayLike) -> slice:
     return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
 
 
-def touchdown(time: Floats, total_force: Floats, set_point: float) -> tuple[float | None, float | None]:
-    """Return overshoot and settling time of the force at first touch; None at a set point of 0.
+def touchdown(time: Floats, total_force: Floats, set_point: Floats) -> tuple[float | None, float | None]:
+    """Return overshoot and settling time of the force at first touch; None where no force is asked for.
 
     Parameters
     ----------
     time, total_force : ndarray, shape (t,)
         s, N.
-    set_point : float
-        N.
+    set_point : ndarray, shape (t,)
+        Total force asked for, N; NaN in rows that ask for none: in them the force is not settled.
 
     Returns
     -------
-    beyond : float or None
-        Share of the set point.
+    passed : float or None
+        Largest force beyond the set point, as a share of its mean over the first touch.
     settled : float or None
         s.
     """
     first = first_touch(total_force)
     if first.stop == first.start:
         return None, None
-    moment, force = time[first], total_force[first]
-    beyond = overshoot(np.concatenate([[0.0], force]), set_point)
-    return beyond, settling_time(moment, force, set_point, BAND * set_point)
+    beyond, wanted = total_force[first] - set_point[first], set_point[first]
+    known = ~np.isnan(wanted)
+    typical = mean(wanted[known], weights(time[first])[known])
+    if typical is None:
+        return None, None
+    # Without contact the force is below its set point by all of it.
+    passed = overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
+    return passed, settling_time(time[first], beyond / wanted, 0.0, BAND)

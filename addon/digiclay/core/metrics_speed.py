@@ -10,9 +10,11 @@ import numpy as np
 from .errors import ParameterError
 from .metrics_force import rfd
 from .metrics_path import lag
+from .metrics_trace import trace_of
 from .metrics_trial import Trial, trial
 from .quantity import Parameters, quantity
 from .scene import Path, Scene, Waypoint
+from .set_point import asked
 
 __all__ = ["Criterion", "Drag", "Follows", "Lift", "followed", "largest", "largest_speed"]
 
@@ -24,10 +26,8 @@ REST = 0.3
 class Criterion(Parameters):
     """When a finger counts as followed: never lost, always touched, its blister near, its force near."""
 
-    lag: float = quantity(
-        4e-3, "largest lag of the blister, half the fingertip's half width", unit="m", above=0.0
-    )
-    deviation: float = quantity(0.5, "largest RFD", unit="N", above=0.0)
+    lag: float = quantity(3e-3, "largest lag of the blister, a pitch", unit="m", above=0.0)
+    deviation: float = quantity(0.2, "largest RFD, half of Method I's set point", unit="N", above=0.0)
 
     def __str__(self) -> str:
         return (
@@ -51,7 +51,7 @@ class Follows:
     lag : float
         Largest distance of the blister, m; infinite without contact.
     rfd : float
-        N, over all rows, those without contact too.
+        N, over all rows that ask for a force, those without contact too.
     """
 
     speed: float
@@ -135,7 +135,8 @@ def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Tri
     part = done.between(start, end)
     total, lost = part["total_force"], done.loss_times
     behind = lag(part["position"], part["force"], part["fingertip"])
-    deviates = rfd(part["time"], total, scene.set_point or 0.0, np.ones(len(total), dtype=bool))
+    wanted = asked(scene.set_point, trace_of(part).following)
+    deviates = rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
     losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
     judged = Follows(
         speed,

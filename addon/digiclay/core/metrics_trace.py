@@ -28,8 +28,8 @@ class Trace:
         Sums over the cells of the force times place, and times height, N m.
     strongest : ndarray (t,)
         Largest force on a cell, N.
-    following : ndarray of bool (t,)
-        Whether some cell follows the force.
+    following : ndarray of int (t,)
+        How many cells follow the force.
     first, last : ndarray (n,)
         Heights in the first and in the last row, m.
     """
@@ -39,7 +39,7 @@ class Trace:
     y: Floats
     height: Floats
     strongest: Floats
-    following: Rows
+    following: NDArray[np.intp]
     first: Floats
     last: Floats
 
@@ -51,7 +51,7 @@ class Trace:
     @property
     def shaping(self) -> Rows:
         """Which rows shape the clay, shape (t,): in contact, and a cell follows the force."""
-        rows: Rows = self.touching & self.following
+        rows: Rows = self.touching & (self.following > 0)
         return rows
 
 
@@ -69,5 +69,5 @@ def trace_of(history: Mapping[str, ArrayLike]) -> Trace:
     )
     x, y = (force @ position).T
     lifted = np.einsum("tn,tn->t", force, height)
-    following = np.any(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
+    following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
     return Trace(total, x, y, lifted, force.max(axis=1), following, height[0], height[-1])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .metrics import METRICS, summary
 from .recorder import Recorder
 from .scene import Scene
-from .session import FORCE_DEVIATIONS, run
+from .session import run
 from .state import State
 
 __all__ = ["TRIAL_METRICS", "Trial", "trial"]
@@ -54,12 +54,9 @@ class Trial:
     @property
     def metrics(self) -> dict[str, float | None]:
         """The keys of `TRIAL_METRICS`; SI. None where there is nothing to compute from."""
-        judged = summary(self.history, self.scene.set_point or 0.0)
-        if self.scene.set_point is None:
-            judged |= dict.fromkeys(FORCE_DEVIATIONS)
         simulated = float(self.history["time"][-1])
         return {
-            **judged,
+            **summary(self.history, self.scene.set_point),
             "losses": self.losses,
             "run_time": self.run_time,
             "real_time_factor": simulated / self.run_time,

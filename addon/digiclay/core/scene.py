@@ -12,6 +12,7 @@ import numpy as np
 from .errors import ParameterError
 from .methods import METHODS, ControlParameters
 from .quantity import Parameters, quantity
+from .set_point import SetPoint
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from .actuator import Actuator
@@ -252,6 +253,6 @@ class Scene:
         return self.layout.rows * self.layout.columns
 
     @property
-    def set_point(self) -> float | None:
-        """Total force the finger should feel, N; None where the control does not say."""
-        return self.control.total_setpoint if self.control else None
+    def set_point(self) -> SetPoint | None:
+        """Force the control asks for; None where it asks for none."""
+        return self.control.set_point if self.control else None

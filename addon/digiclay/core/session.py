@@ -25,12 +25,9 @@ from .state import State
 from .system import System
 from .trajectory import Trajectory
 
-__all__ = ["FORCE_DEVIATIONS", "Ended", "Result", "fits", "judged", "run", "save"]
+__all__ = ["Ended", "Result", "fits", "judged", "run", "save"]
 
 History = dict[str, NDArray[Any]]
-
-#: Metrics that say nothing where no force is asked for.
-FORCE_DEVIATIONS = ("set_point", "rfd", "rfd_shaping", "rfd_session")
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,9 +212,7 @@ def _metrics(
     }
     units = {"simulated": "s", "run_time": "s", "real_time_factor": "1"}
     if history is not None:
-        judged = summary(history, scene.set_point or 0.0)
-        if scene.set_point is None:  # nothing was asked of the force, so nothing deviates
-            judged = {name: None if name in FORCE_DEVIATIONS else value for name, value in judged.items()}
+        judged = summary(history, scene.set_point)
         known |= judged
         units |= {name: METRICS[name][0] for name in judged}
     return {**known, "units": units}

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .modes import Mode
+from .set_point import SetPoint, asked
 from .state import State
 from .system import System
 
@@ -53,7 +55,7 @@ class Trace:
 
     @property
     def set_point(self) -> Floats:
-        """Total force asked for, shape (k,), N; NaN where the method asks for none."""
+        """Total force asked for, shape (k,), N; NaN where none is."""
         return self.rows[:, 2]
 
     @property
@@ -86,15 +88,15 @@ def felt(system: System, state: State) -> float:
     return float(held.block[system.rows.force, : held.near].sum())
 
 
-def row(system: System, state: State, set_point: float | None, pins: Sequence[int]) -> list[float]:
+def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
     """Return what a trace keeps of a state."""
     held = state.gathered
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
         (at,) = np.nonzero(held.cells == pin)
         heights[column] = float(held.block[0, at[0]] if at.size else state.rows[0, pin])
-    wanted = math.nan if set_point is None else set_point
-    return [state.period * system.period, felt(system, state), wanted, *heights]
+    wanted = asked(set_point, np.count_nonzero(held.mode == Mode.FORCE_FOLLOW))
+    return [state.period * system.period, felt(system, state), float(wanted), *heights]
 
 
 def extended(trace: Trace, rows: list[list[float]]) -> Trace:

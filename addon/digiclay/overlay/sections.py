@@ -42,7 +42,7 @@ class Told:
     errors : tuple of float or None
         Estimated errors of the heights, m, and of a cell's force, N; None before there is an estimate.
     set_point : float or None
-        Total force asked for, N.
+        Total force asked for now, N.
     time, force : ndarray (t,)
         The last seconds: simulated time, s, and total force, N.
     pins : tuple of int

@@ -14,6 +14,7 @@ import numpy as np
 from .. import preferences
 from ..compat import bpy
 from ..core.modes import Mode
+from ..core.set_point import asked
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import on_screen
@@ -71,7 +72,7 @@ def _again() -> float:
 def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:
     """Return what the overlay tells of a bed and its session."""
     trace, scene = session.trace, session.scene
-    asked = float(trace.set_point[-1]) if len(trace.rows) else math.nan
+    wanted = float(trace.set_point[-1] if len(trace.rows) else asked(scene.set_point, 0))
     errors = session.errors
     return Told(
         name=bed.name,
@@ -79,7 +80,7 @@ def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, fl
         paused=session.paused,
         factor=session.factor or None,
         errors=None if errors is None else (errors.height, errors.force),
-        set_point=asked if math.isfinite(asked) else scene.set_point,
+        set_point=wanted if math.isfinite(wanted) else None,
         time=trace.time,
         force=trace.force,
         pins=trace.pins,

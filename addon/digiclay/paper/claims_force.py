@@ -46,8 +46,9 @@ def deviations(results: Results) -> Claim:
     each = getattr(control, "force_setpoint", 0.0)
     why = (
         f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {known.followers:.1f} cells follow it on "
-        f"average: they ask for {known.followers * each:.2f} N together, and their number changes as the "
-        "finger passes from cell to cell."
+        f"average. Its set point, {each:g} N times the cells that follow at the moment, is "
+        f"{_newton(known.metrics['set_point'])} on average and changes as the finger passes from cell to "
+        "cell: the total force varies with it, and deviates less from it than it varies."
     )
     return Claim(
         "Method II's deviations of height and force are much greater",
@@ -63,15 +64,14 @@ def reference_force(results: Results) -> Claim:
         known = results.session[method].metrics
         drag = results.simple[method, "a ridge 15 mm high"]
         told.append(
-            f"{SHORT[method]}: {_newton(known['rfd'])} in contact, "
+            f"{SHORT[method]}, set point {_newton(known['set_point'])}: {_newton(known['rfd'])} in contact, "
             f"{_newton(known['rfd_shaping'])} while shaping, "
             f"{drag.rfd:.3f} N dragging a ridge at {PAPER_SPEED * MM:g} mm/s"
         )
     ratio = _ratio(results, "rfd")
     return Claim(
         "RFD of both methods, Method I's being the smaller",
-        f"Session{times(results)}, set point {_newton(results.session[ONE].metrics['set_point'])}: "
-        + "; ".join(told),
+        f"Session{times(results)}: " + "; ".join(told),
         verdict([ratio is not None and ratio > 1.0]),
         "The paper's own values are not among what this project has of it, so ours stand alone.",
     )

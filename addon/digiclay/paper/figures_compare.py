@@ -26,7 +26,7 @@ PANELS = (
 
 def comparison(
     found: Mapping[str, Mapping[str, float | None]],
-    forces: Mapping[str, tuple[Any, Any, float | None]],
+    forces: Mapping[str, tuple[Any, Any, Any]],
     name: str,
 ) -> Any:
     """Draw the total force over time, and a bar a method for each metric.
@@ -36,7 +36,7 @@ def comparison(
     found : mapping
         Metrics by method.
     forces : mapping
-        Time, s, total force, N, and its set point or None, by method.
+        Time, s, total force, N, and the total force asked for, NaN where none is, by method.
     name : str
         Of the scene.
     """
@@ -48,8 +48,10 @@ def comparison(
         force = place("force", 0.85, height - 3.6, 11.3, 2.5)
         for method, (time, total, _) in forces.items():
             force.plot(time, total, color=colours[method], linewidth=1.4, label=method)
-        for set_point in sorted({point for _, _, point in forces.values() if point is not None}):
-            force.axhline(set_point, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
+        for method, (time, _, wanted) in forces.items():
+            if not np.all(np.isnan(wanted)):
+                force.plot(time, wanted, color=colours[method], linewidth=1.0, linestyle=(0, (5, 3)))
+        force.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="set points")
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)

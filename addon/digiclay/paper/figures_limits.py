@@ -72,7 +72,8 @@ def _details(axes: Any, results: Results, position_gain: float) -> float:
             done.history["time"] - quick, done.history["total_force"], color=colour,
             linewidth=1.4, label=f"$K_f$ = {gain:g} 1/N",
         )  # fmt: skip
-    return float(done.scene.set_point or 0.0)
+    assert done.scene.set_point is not None  # Method I has one
+    return done.scene.set_point.force
 
 
 def tracking(results: Results) -> Any:

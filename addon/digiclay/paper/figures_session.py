@@ -25,7 +25,7 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
     strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
     with canvas(13.5, 7.4, title) as (figure, place):
         for column, method in enumerate(METHODS):
-            history, scene = sessions[method].history, sessions[method].scene
+            history = sessions[method].history
             left = 0.85 + 6.5 * column
             heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
             force = place(f"{method} force", left, 0.7, 5.75, 2.0)
@@ -41,7 +41,8 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             heights.set(ylim=(lowest, highest), title=NAMES[method])
             heights.tick_params(labelbottom=False)
             force.plot(history["time"], history["total_force"], color=INK, linewidth=1.2)
-            force.axhline(scene.set_point, color=LINES[1], linestyle=(0, (5, 3)), label="set point")
+            asked = {"color": LINES[1], "linewidth": 1.2, "linestyle": (0, (5, 3)), "label": "set point"}
+            force.plot(history["time"], history["set_point"], **asked)
             force.fill_between([], [], color=SHADE, label="in contact")
             force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force")
             legend_above(force)

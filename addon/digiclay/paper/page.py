@@ -49,8 +49,8 @@ def _lines(
     )
     yield (
         f"A finger counts as followed when {results.criterion}. The paper's own limits are not known to this "
-        "project. These are ours, chosen with measurements in view: narrower ones came first, and were "
-        "widened because Method II did not keep to them. The remarks tell what those come to.\n"
+        "project. These are a pitch, and half of Method I's set point. Method II's set point is F_ref times "
+        "the cells that follow at the moment.\n"
     )
     yield "## Claims\n"
     yield "| The paper | Measured here | | Remarks |"

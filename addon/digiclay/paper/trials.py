@@ -16,6 +16,7 @@ from ..core.metrics_trial import Trial, trial
 from ..core.modes import Mode
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
+from ..core.set_point import asked
 from . import scenes
 from .scenes import METHODS, QUICKER, SINK, TALL, Device
 
@@ -115,7 +116,8 @@ class Session(NamedTuple):
     ----------
     scene : Scene
     history : dict of ndarray
-        Every `THINNED`-th row of time, height, total force and fingertip; and the positions.
+        Every `THINNED`-th row of time, height, total force, total force asked for (``set_point``)
+        and fingertip; and the positions.
     metrics : dict
         As `Trial.metrics`.
     lost : list of float
@@ -259,6 +261,8 @@ def _boiled_down(done: Trial) -> Session:
         name: np.concatenate([done.history[name][:-1:THINNED], done.history[name][-1:]])
         for name in ("time", "height", "total_force", "fingertip")
     }
+    wanted = asked(done.scene.set_point, follow)
+    kept["set_point"] = np.concatenate([wanted[:-1:THINNED], wanted[-1:]])
     kept["position"] = done.history["position"]
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     return Session(done.scene, kept, done.metrics, scenes.unintended(done), followers)
@@ -268,7 +272,8 @@ def _swing(gain: float, position_gain: float, device: Device | None = None) -> t
     """Hold still after a quick press, and look whether the force comes to rest; also when it ended, s."""
     case, quick = scenes.held(gain, position_gain, device)
     done = trial(case)
-    set_point = case.set_point or 0.0
+    assert case.set_point is not None  # Method I has one
+    set_point = case.set_point.force
     end = float(done.history["time"][-1])
     late, after = done.between(end - WATCHED, end), done.between(quick, end)
     settled = settling_time(after["time"], after["total_force"], set_point, 0.1 * set_point)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.metrics import in_contact, summary
+from ..core.metrics_trace import trace_of
+from ..core.set_point import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
 
@@ -30,7 +32,7 @@ FIGURES = (
 )
 
 
-def session(history: History, out: str | Path, set_point: float) -> Path:
+def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
     """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written."""
     return save(session_figure(history, set_point), out)
 
@@ -62,15 +64,15 @@ def session_cells(history: History) -> list[int]:
     return list(dict.fromkeys(nearest.tolist()))
 
 
-def session_figure(history: History, set_point: float) -> Figure:
+def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
 
     Parameters
     ----------
     history : mapping
         The arrays of ``history.npz``.
-    set_point : float
-        Force the finger should feel, N.
+    set_point : SetPoint or None
+        Force asked for; None where none is: then neither it nor a deviation from it is shown.
 
     Returns
     -------
@@ -95,7 +97,7 @@ def session_figure(history: History, set_point: float) -> Figure:
         heights.set(ylabel="height (mm)", title="Heights of cells", xlim=ends(time, 0.1))
         heights.tick_params(labelbottom=False)
         force.plot(time, total, color=INK, linewidth=1.3, label="total force")
-        force.axhline(set_point, color=LINES[1], linestyle=(0, (5, 3)), label=f"set point {set_point:g} N")
+        _draw_set_point(force, history, set_point)
         force.fill_between([], [], color=SHADE, label="in contact")
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
         force.set_title("Total force on the finger")
@@ -104,6 +106,18 @@ def session_figure(history: History, set_point: float) -> Figure:
             axes.yaxis.set_label_coords(-0.075, 0.5)
         _write_figures(figures, summary(history, set_point))
     return figure
+
+
+def _draw_set_point(axes: Axes, history: History, set_point: SetPoint | None) -> None:
+    """Draw the total force asked for over time, dashed; one per cell is none while no cell follows."""
+    if set_point is None:
+        return
+    wanted = set_point.total(trace_of(history).following)
+    per_cell = " a cell" if set_point.per_cell else ""
+    axes.plot(
+        array(history, "time"), wanted, color=LINES[1], linewidth=1.3, linestyle=(0, (5, 3)),
+        label=f"set point {set_point.force:g} N{per_cell}",
+    )  # fmt: skip
 
 
 def surface_figure(history: History) -> Figure:
@@ -126,7 +140,8 @@ def _write_figures(axes: Axes, found: dict[str, float | None]) -> None:
     """Write the figures a session is judged by."""
     axes.set_axis_off()
     axes.set_title("In figures")
-    for line, (label, name, factor, form) in enumerate(FIGURES):
+    told = [row for row in FIGURES if found["set_point"] is not None or not row[1].startswith("rfd")]
+    for line, (label, name, factor, form) in enumerate(told):
         value, y = found[name], 0.92 - 0.158 * line
         axes.text(0.0, y, label, va="top")
         axes.text(1.0, y, "–" if value is None else form.format(value * factor), va="top", ha="right")

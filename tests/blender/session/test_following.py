@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.keeping import packed
+from digiclay.core.set_point import SetPoint
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 
@@ -118,7 +119,7 @@ def test_a_parameter_that_is_changed_in_mid_session_takes_effect(bed: Any, clock
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
     assert clock.tick(tick.LOOK) == []
-    assert running.of(bed).scene.set_point == 0.8
+    assert running.of(bed).scene.set_point == SetPoint(0.8)
 
 
 def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> None:

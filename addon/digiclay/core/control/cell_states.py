@@ -20,6 +20,7 @@ from ..layout import ON_THE_SIDE
 from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
+from ..set_point import SetPoint
 from ..some import some
 from .bench import Bench
 from .blister import Blister
@@ -32,9 +33,6 @@ __all__ = ["CellStates", "CellStatesControl", "Patch", "assembled"]
 
 Floats = NDArray[np.float64]
 Modes = NDArray[np.int8]
-
-#: Cells under a fingertip on the default bed, about.
-PATCH = 10
 
 
 class Patch(NamedTuple):
@@ -102,9 +100,9 @@ class CellStates(Tracking):
     )
 
     @property
-    def total_setpoint(self) -> float:
-        """Total force the finger should feel, N: what a patch of `PATCH` cells is asked for."""
-        return PATCH * self.force_setpoint
+    def set_point(self) -> SetPoint:
+        """Force asked of every cell that follows the finger."""
+        return SetPoint(self.force_setpoint, per_cell=True)
 
     def check(self) -> None:
         """A blister cell starts to follow before one at rest does, and is critical below that."""

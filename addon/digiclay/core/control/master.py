@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from ..quantity import quantity
+from ..set_point import SetPoint
 from .tracking import Tracking
 from .travel import Heading
 
@@ -110,6 +111,6 @@ class VirtualMaster(Tracking):
     )
 
     @property
-    def total_setpoint(self) -> float:
-        """Total force the finger should feel, N."""
-        return self.force_setpoint
+    def set_point(self) -> SetPoint:
+        """Force asked of all cells together."""
+        return SetPoint(self.force_setpoint)

@@ -15,7 +15,7 @@ from ..assembly import assemble
 from ..errors import DigiclayError
 from ..metrics import METRICS
 from ..scene import Scene
-from ..session import FORCE_DEVIATIONS, Result, fits, judged
+from ..session import Result, fits, judged
 from ..system import System
 from .assembly import put_together
 from .beds import Beds
@@ -244,9 +244,7 @@ def judge_together(
             if same not in ways:
                 times = trace.period * scene.simulation.control_period
                 ways[same] = way_over(systems[run].grid, scene.trajectory.trajectory(), times)
-            found = summary(trace, ways[same], systems[run].grid, scene.set_point or 0.0)
-            if scene.set_point is None:  # nothing was asked of the force, so nothing deviates
-                found |= dict.fromkeys(FORCE_DEVIATIONS)
+            found = summary(trace, ways[same], systems[run].grid, scene.set_point)
             result = _judged(now, place, scene, None, {})
             units = {name: METRICS[name][0] for name in found}
             metrics = {**result.metrics, **found, "units": {**result.metrics["units"], **units}}

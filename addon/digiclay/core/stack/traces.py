@@ -12,6 +12,7 @@ from ..metrics import composed
 from ..metrics_trace import Trace
 from ..modes import Mode
 from ..recorder import Recorder
+from ..set_point import SetPoint
 from ..state import Rows
 from .beds import Beds, Gathered
 from .columns import Floats
@@ -54,7 +55,7 @@ class StackTraces:
         self._every, self._rows, self._runs = recorder.every, rows, runs
         self._first = state.row(0)
         self._felt = np.zeros((count, 5, len(runs)))
-        self._following = np.zeros((count, len(runs)), np.bool_)
+        self._following = np.zeros((count, len(runs)), np.intp)
         self._present, self._columns = runs, list(range(len(runs)))
 
     def observe(self, state: Beds, runs: tuple[int, ...]) -> None:
@@ -63,7 +64,8 @@ class StackTraces:
             self._present, self._columns = runs, [self._runs.index(run) for run in runs]
         held, started = state.gathered, state.period - 1
         if started % self._every == 0:
-            self._following[started // self._every, self._columns] = (held.mode == FORCE_FOLLOW).any(axis=0)
+            following = np.count_nonzero(held.mode == FORCE_FOLLOW, axis=0)
+            self._following[started // self._every, self._columns] = following
         if state.period % self._every == 0:
             self._felt[state.period // self._every, :, self._columns] = _felt(held, self._rows).T
 
@@ -103,7 +105,7 @@ def _felt(held: Gathered, rows: Rows) -> Floats:
     return felt
 
 
-def summary(trace: Trace, way: Way, grid: Grid, set_point: float) -> dict[str, float | None]:
+def summary(trace: Trace, way: Way, grid: Grid, set_point: SetPoint | None) -> dict[str, float | None]:
     """Return what `metrics.summary` makes of the history that a trace is of.
 
     Parameters
@@ -112,7 +114,7 @@ def summary(trace: Trace, way: Way, grid: Grid, set_point: float) -> dict[str, f
     way : Way
         The finger's, at the times of the trace's rows.
     grid : Grid
-    set_point : float
-        Force the finger should feel, N.
+    set_point : SetPoint or None
+        Force asked for.
     """
     return composed(trace, way.time, way.fingertip, grid.positions, set_point, way.cells)

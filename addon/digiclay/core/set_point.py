@@ -1,0 +1,50 @@
+"""The force a control method asks for: of all cells together, or of each cell that follows the finger."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["SetPoint", "asked"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """A force asked for.
+
+    Attributes
+    ----------
+    force : float
+        F_ref, N.
+    per_cell : bool
+        Whether every cell that follows the finger is asked for it, and not all cells together.
+    """
+
+    force: float
+    per_cell: bool = False
+
+    def total(self, following: ArrayLike) -> Floats:
+        """Return the total force asked for while so many cells follow the finger, N.
+
+        ``F_ref`` for all cells together, ``n F_ref`` for n cells that follow; NaN where none does,
+        since then no force is asked for.
+
+        Parameters
+        ----------
+        following : array_like of int
+            Numbers of cells in the mode `FORCE_FOLLOW`.
+        """
+        count = np.asarray(following, dtype=np.float64)
+        if not self.per_cell:
+            return np.full(count.shape, self.force)
+        total: Floats = np.where(count > 0.0, self.force * count, np.nan)
+        return total
+
+
+def asked(set_point: SetPoint | None, following: ArrayLike) -> Floats:
+    """Return the `SetPoint.total`, N; NaN throughout for a method that asks for no force."""
+    return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)
