@@ -12,9 +12,13 @@ import pytest
 from digiclay import bridge
 from digiclay.core.errors import DigiclayError
 from digiclay.core.modes import Mode
+from digiclay.core.shadow import LiveErrors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
+from digiclay.overlay.layout import laid_out
+from digiclay.overlay.look import look
+from digiclay.panels.session import error_line
 from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -129,6 +133,17 @@ def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Runnin
     stopped = views.told(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
     assert stopped.paused
     assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
+
+
+@pytest.mark.parametrize("errors", [None, LiveErrors(2.1e-6, 4.6e-4), LiveErrors(9e-12, 0.0)])
+def test_panel_and_overlay_say_the_same_of_the_error(
+    bed: Any, session: running.Running, errors: LiveErrors | None
+) -> None:
+    known = replace(session, errors=errors)
+    told = views.told(bed, known, palettes.PALETTES["okabe_ito"])
+    chosen = look((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
+    written = [words.text for words in laid_out(told, chosen, (0.0, 0.0, 900.0, 700.0), 1.0).words]
+    assert error_line(known) in written
 
 
 def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: Any) -> None:

@@ -83,7 +83,7 @@ def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
 
 def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
     words = said(laid_out(session(errors=(9e-12, 0.0)), look(DARK, LIGHT), ROOM, 1.0))
-    assert "Solver error (estimate): < 0.01 µm, < 0.01 mN" in words
+    assert "Solver error: about 0.01 µm or less, 0.01 mN or less" in words
 
 
 def test_the_colours_of_the_force_are_explained_while_pins_wear_them() -> None:

@@ -16,7 +16,7 @@ from ..device import heat
 from .look import Colour, Look
 from .picture import Box, Dot, Floats, Line, Picture, Words, axis, scaled
 
-__all__ = ["SECTIONS", "Pen", "Told"]
+__all__ = ["SECTIONS", "Pen", "Told", "error_words"]
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
@@ -119,6 +119,13 @@ class Pen:
             self.picture.lines.append(Line(points, colour, 1.5 * self.scale))
 
 
+def error_words(errors: tuple[float, float] | None) -> str:
+    """Say how large the solver's errors of a height, m, and of a cell's force, N, are estimated to be."""
+    if errors is None:
+        return "Solver error: not estimated yet"
+    return f"Solver error: about {_size(errors[0] * 1e6, 'µm')}, {_size(errors[1] * 1e3, 'mN')}"
+
+
 def head_height(told: Told) -> float:
     """Return the height of the head, pixels at a UI scale of 1."""
     return 3 * ROW + GAP
@@ -129,11 +136,7 @@ def head(told: Told, pen: Pen, top: float) -> None:
     speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
     top = pen.row(top, told.name, "paused" if told.paused else speed)
     top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
-    if told.errors is None:
-        pen.row(top, "Solver error: not estimated yet", small=True)
-    else:
-        height, force = _size(told.errors[0] * 1e6), _size(told.errors[1] * 1e3)
-        pen.row(top, f"Solver error (estimate): {height} µm, {force} mN", small=True)
+    pen.row(top, error_words(told.errors), small=True)
 
 
 def force_height(told: Told) -> float:
@@ -219,9 +222,9 @@ def modes(told: Told, pen: Pen, top: float) -> None:
         _entry(pen, x, y, told.colours[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
 
 
-def _size(error: float) -> str:
+def _size(error: float, unit: str) -> str:
     """Say how large an error is."""
-    return f"{error:.2g}" if error >= 0.01 else "< 0.01"
+    return f"{error:.2g} {unit}" if error >= 0.01 else f"0.01 {unit} or less"
 
 
 def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], text: str) -> None:

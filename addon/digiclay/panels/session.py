@@ -7,6 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..live import bed_state, running
 from ..live.running import Running
+from ..overlay.sections import error_words
 from .base import Panel, bed_of, lines
 
 __all__ = ["CLASSES", "Session"]
@@ -64,11 +65,15 @@ def _numbers(layout: Any, session: Running) -> None:
         slow = session.factor < 0.9
         words = f"Speed: {session.factor:.2f} × real time"
         column.label(text=words, icon="ERROR" if slow else "NONE")
-    if session.errors:
-        height, force = session.errors.height * 1e6, session.errors.force * 1e3
-        column.label(text=f"Solver error: {height:.2g} µm, {force:.2g} mN")
+    column.label(text=error_line(session))
     if session.path is not None:
         column.label(text=f"Recording: {(len(session.path) - 1) * period:.1f} s", icon="REC")
+
+
+def error_line(session: Running) -> str:
+    """Return what is said of a session's error, here as in the overlay."""
+    errors = session.errors
+    return error_words(errors and (errors.height, errors.force))
 
 
 CLASSES = (Session,)
