@@ -23,12 +23,14 @@ CORE = PACKAGE / "core"
 LEVELS = (
     "body feature_region skin_spline errors modes png closed_form filled some control.travel metrics_signal "
     "set_point stack.columns",
-    "keeping_memory quantity run_folder mesh_file_* surface control.transitions metrics_path sweep_axis",
+    "keeping_memory quantity run_folder mesh_file_* mesh_in_limits surface control.transitions "
+    "metrics_path sweep_axis",
+    "mesh_in_placed mesh_in_checks mesh_in_obj "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export metrics_force metrics_trace control.servo control.blister",
-    "feature_crest pins_solid skin_membrane metrics "
+    "mesh_in_gltf mesh_in_threemf feature_crest pins_solid skin_membrane metrics "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
+    "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene stack.control",
     "features system observer steppers.bernoulli_plan steppers.explicit "
     "control.bench control.master control.master_cell scene_table "

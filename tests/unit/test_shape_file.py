@@ -10,7 +10,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 import trimesh
+from digiclay.core import export
 from digiclay.core.actuator import Actuator
+from digiclay.core.body import Body
 from digiclay.core.errors import DigiclayError
 from digiclay.core.layout import Layout, grid
 from digiclay.core.scene_file import load
@@ -80,13 +82,16 @@ def test_every_sample_mesh_is_closed_and_turned_outwards(name: str) -> None:
 # Files
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb", "off"])
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb", "off", "3mf"])
 def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> None:
     solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
     path = tmp_path / f"Ein Körper mit Blank.{kind}"
     unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in metres, y up
     turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind == "glb" else solid.vertices
-    trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
+    if kind == "3mf":
+        export.write([Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path)
+    else:
+        trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
     bare = read(Shape(file=str(path)))
     left, front, right, back = bare.box
     # 32-bit numbers, or 8 digits.
@@ -111,8 +116,8 @@ def test_an_array_is_taken_with_its_first_row_at_the_lowest_y(tmp_path: Path) ->
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must "),
         ("nan.obj", b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "must have vertices that are finite numbers"),
         ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "must "),
-        ("half.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "must be a mesh, a picture or an array"),
-        ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be a mesh, a picture or an array"),
+        ("half.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "must be a PLY file that can be read"),
+        ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be whole"),
         ("notes.txt", b"hello", "must be a mesh, a picture or an array"),
         ("empty.npy", b"", "must hold one array of numbers"),
         ("rubbish.npy", b"rubbish", "must hold one array of numbers"),

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from . import mesh_in
 from .actuator import Actuator
 from .errors import ParameterError, SceneError
 from .heightmap import HeightMap, height_map
 from .heightmap_picture import PICTURES, pixels
 from .layout import Grid
+from .mesh_in import MESHES
 from .relief import Relief
 from .sample_file import found, named
 from .shape import AUTO, LENGTHS, Shape
@@ -23,13 +23,9 @@ __all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "read", "sam
 
 #: Where the sample shapes are.
 SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "shapes"
-#: Meshes by extension; whatever else trimesh can read is welcome too.
-MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")
 ARRAY = ".npy"
 #: What a file of this kind of shape may end with.
 KINDS = (*MESHES, *PICTURES, ARRAY)
-#: Formats whose standard says metres, and y upwards.
-GLTF = (".glb", ".gltf")
 
 
 def sample_shapes() -> list[str]:
@@ -92,27 +88,21 @@ def _array(path: Path) -> HeightMap:
 
 
 def _mesh(path: Path, shape: Shape) -> ShapeMesh:
-    """Read a mesh with trimesh, which knows the formats."""
+    """Read a mesh."""
+    if path.suffix.lower() not in MESHES:
+        rule = f"must be a mesh, a picture or an array ({', '.join(KINDS)})"
+        raise ParameterError("shape", "file", rule, str(path))
     try:
-        trimesh: Any = importlib.import_module("trimesh")
-    except ImportError:
-        raise ParameterError(
-            "shape", "file", "must be a picture or an array where trimesh is not installed", str(path),
-            "Run 'pip install trimesh'.",
-        ) from None  # fmt: skip
-    try:
-        read = trimesh.load_mesh(str(path), process=False)
-        vertices, faces = np.asarray(read.vertices, np.float64), np.asarray(read.faces)
+        mesh = mesh_in.read(path)
+    except (ParameterError, MemoryError):
+        raise
     except OSError as error:
         said = error.strerror or error
         raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
-    # Its readers raise whatever a broken file makes them trip over.
+    # Readers raise whatever a broken file makes them trip over.
     except Exception as error:
         said = " ".join(str(error).split())[:120] or type(error).__name__
-        raise ParameterError(
-            "shape", "file", f"must be a mesh, a picture or an array ({', '.join(KINDS)})", f"{path}: {said}"
-        ) from None
-    gltf = path.suffix.lower() in GLTF
-    up = shape.up if shape.up != AUTO else "y" if gltf else "z"
-    unit = shape.unit if shape.unit != AUTO else "m" if gltf else "mm"
-    return shape_mesh(path.name, vertices, faces, up, LENGTHS[unit])
+        raise ParameterError("shape", "file", "must be a mesh that can be read", f"{path}: {said}") from None
+    up = shape.up if shape.up != AUTO else mesh.up
+    length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
+    return shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)
