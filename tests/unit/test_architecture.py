@@ -21,7 +21,7 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "body feature_region skin_spline errors modes png closed_form filled some control.travel metrics_signal "
+    "body feature_region spline errors modes png closed_form filled some control.travel metrics_signal "
     "set_point stack.columns",
     "keeping_memory quantity run_folder mesh_file_* mesh_in_limits surface control.transitions "
     "metrics_path sweep_axis",

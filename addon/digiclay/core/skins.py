@@ -5,8 +5,8 @@ that are shifted against each other the points shift along. Every pin top is one
 
 *bilinear* is straight between pins: the bilinear patch over four pins of an aligned bed, the triangle
 over three of a staggered or hexagonal one;
-*smooth* is a natural cubic spline along each row, and then across the rows: without a crease, and through
-every pin, but it overshoots a little beside a step;
+*smooth* is a monotone cubic spline along each row, and then across the rows: through every pin, and nowhere
+above or below the pins it stands between;
 *membrane* is what a thin stretched skin does that lies on the flat end of every pin: level over the ends,
 and harmonic, as a soap film is at small slopes, between them.
 """
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .formed import Formed
 from .skin_membrane import membrane
-from .skin_spline import natural
+from .spline import monotone
 
 __all__ = ["SKINS", "nearest_pin", "over", "places"]
 
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 #: Skins by name, with what is said of them in the help.
 SKINS: dict[str, str] = {
     "bilinear": "straight between the pins",
-    "smooth": "cubic splines through the pin tops",
+    "smooth": "monotone cubic splines through the pin tops",
     "membrane": "a thin skin stretched over the flat ends of the pins",
 }
 
@@ -127,6 +127,24 @@ def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
         at_rows = np.empty((formed.rows, point.shape[1]))
         for start in range(2 if formed.shift else 1):
             step = slice(start, None, 2 if formed.shift else 1)
-            at_rows[step] = natural(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
-        fine[some] = natural(first[:, 0, 1], at_rows, point[some, 0, 1])
+            at_rows[step] = monotone(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
+        fine[some] = monotone(first[:, 0, 1], at_rows, point[some, 0, 1])
+    return _held(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
+
+
+def _held(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> Floats:
+    """Return a skin that goes no further than the pins where it lies beyond the end of a shifted row.
+
+    There its rows are continued straight, so that a tilted bed has a plane skin; `x` is that of its points.
+    """
+    row = np.minimum(np.arange(len(fine)) // parts, formed.rows - 2)
+    along = formed.position.reshape(formed.rows, formed.columns, 2)[..., 0]
+    way = np.sign(along[0, 1] - along[0, 0])
+    for end, inner in ((0, 1), (-1, -2)):
+        # The nearer end of the two rows a line is between, and the four pins of the last cell.
+        ends = np.stack([along[row, end], along[row + 1, end]]) * way
+        beyond = x * way < ends.max(axis=0)[:, None] if end == 0 else x * way > ends.min(axis=0)[:, None]
+        cell = np.stack([pins[row, end], pins[row, inner], pins[row + 1, end], pins[row + 1, inner]])
+        bounded = np.clip(fine, cell.min(axis=0)[:, None], cell.max(axis=0)[:, None])
+        fine = np.where(beyond, bounded, fine)
     return fine

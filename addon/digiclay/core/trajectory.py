@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .errors import ParameterError
 from .fingertip import LEVEL
+from .spline import inner_slopes
 
 __all__ = ["Trajectory", "along", "between", "level"]
 
@@ -83,7 +84,7 @@ class Trajectory:
         start, end = self.positions[piece], self.positions[piece + 1]
         poses[:, :3] = start + (end - start) * part
         if self.interpolation == "smooth":
-            slopes = _monotone_slopes(self.times, self.positions)
+            slopes = inner_slopes(np.diff(self.times), self.positions)
             first, last = slopes[piece] * span[:, None], slopes[piece + 1] * span[:, None]
             bend = part * (1.0 - part)
             poses[:, :3] += bend * ((1.0 - part) * (first - end + start) - part * (last - end + start))
@@ -129,20 +130,6 @@ def along(path: Floats, parts: Floats) -> Floats:
     poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
     poses[:, 3:] = _turned(start[:, 3:], end[:, 3:], part)
     return poses.reshape(count, parts.size, 7)
-
-
-def _monotone_slopes(times: Floats, values: Floats) -> Floats:
-    """Return slopes (w, d) for cubics through values (w, d) that do not overshoot (Fritsch and Carlson)."""
-    span = np.diff(times)[:, None]
-    secant = np.diff(values, axis=0) / span
-    slopes = np.zeros_like(values)
-    before, after = secant[:-1], secant[1:]
-    weight_before, weight_after = 2.0 * span[1:] + span[:-1], span[1:] + 2.0 * span[:-1]
-    level_out = before * after <= 0.0
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        harmonic = (weight_before + weight_after) / (weight_before / before + weight_after / after)
-    slopes[1:-1] = np.where(level_out, 0.0, harmonic)
-    return slopes
 
 
 def _turned(start: Floats, end: Floats, part: Floats) -> Floats:
