@@ -67,7 +67,7 @@ def test_pins_stay_within_their_stroke(spots: list[tuple[float, float, float]], 
     assert height.max() <= 100e-3
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(points, steppers)
 def test_no_force_pulls(spots: list[tuple[float, float, float]], stepper: str) -> None:
     assert shaped(spots, stepper=stepper).force.min() >= 0.0
@@ -169,7 +169,7 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: di
     )
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(points, steppers)
 def test_a_locked_cell_does_not_move_however_it_is_pressed(
     spots: list[tuple[float, float, float]], stepper: str

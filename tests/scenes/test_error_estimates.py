@@ -12,7 +12,7 @@ from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import History, run
 
 #: Shorter than the longest session, but with a press and a lift in it.
-LASTS = 1.5
+LASTS = 0.9
 #: Errors below this are rounding and the reference's own, m and N.
 NOTHING = {"height": 1e-11, "force": 1e-9}
 #: Every sample scene, and those that meet every method.

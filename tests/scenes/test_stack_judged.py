@@ -55,7 +55,7 @@ def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str
     for i in range(3):
         x, y, z = first.position
         way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
-        lasting = replace(known.simulation, duration=2.5 - 0.4 * i)
+        lasting = replace(known.simulation, duration=1.5 - 0.2 * i)
         scenes.append(replace(known, trajectory=replace(known.trajectory, waypoints=way), simulation=lasting))
     assert_judged_as_alone(scenes)
 

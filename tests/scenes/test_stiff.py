@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -32,19 +33,34 @@ def at_shared_ends(height: NDArray[np.float64], exact: NDArray[np.float64], peri
 @pytest.fixture(scope="module")
 def commands() -> dict[str, NDArray[np.float64]]:
     """The recorded commands of every case."""
+    return {name: recorded(name) for name in CASES}
+
+
+@cache
+def recorded(name: str) -> NDArray[np.float64]:
+    """Return the recorded commands of a case."""
     with stiff.strict():
-        return {name: stiff.commands_of(case) for name, case in CASES.items()}
+        return stiff.commands_of(CASES[name])
+
+
+@cache
+def reference(name: str) -> tuple[NDArray[np.float64], float]:
+    """Return the heights of a case under its recorded commands, and how far they may be off, m."""
+    return stiff.reference(CASES[name], recorded(name), stiff.ROUGH)
+
+
+@cache
+def replayed(name: str, step: float) -> NDArray[np.float64]:
+    """Return the heights of the default stepper under the recorded commands, (t, n), m."""
+    with stiff.strict():
+        return stiff.replayed(CASES[name], recorded(name), "bernoulli", step, stiff.period_of(step))
 
 
 @pytest.mark.parametrize("step", stiff.STEPS)
 @pytest.mark.parametrize("name", CASES)
-def test_the_default_stepper_does_not_blow_up_under_recorded_commands(
-    name: str, step: float, commands: dict[str, NDArray[np.float64]]
-) -> None:
-    # No warning, all finite, heights within the stroke, no negative force: `replayed` asserts it.
-    with stiff.strict():
-        heights = stiff.replayed(CASES[name], commands[name], "bernoulli", step, stiff.period_of(step))
-    assert np.isfinite(heights).all()
+def test_the_default_stepper_does_not_blow_up_under_recorded_commands(name: str, step: float) -> None:
+    # No warning, all finite, heights within the stroke, no negative force: `stiff.replayed` asserts it.
+    assert np.isfinite(replayed(name, step)).all()
 
 
 @pytest.mark.parametrize("step", stiff.STEPS)
@@ -56,16 +72,9 @@ def test_the_default_stepper_does_not_blow_up_under_its_own_controller(name: str
 
 
 @pytest.mark.parametrize("name", WELL)
-def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(
-    name: str, commands: dict[str, NDArray[np.float64]]
-) -> None:
-    case = CASES[name]
-    exact, off = stiff.reference(case, commands[name], stiff.ROUGH)
-    errors = []
-    for step in stiff.STEPS:
-        period = stiff.period_of(step)
-        height = stiff.replayed(case, commands[name], "bernoulli", step, period)
-        errors.append(at_shared_ends(height, exact, period))
+def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name: str) -> None:
+    exact, off = reference(name)
+    errors = [at_shared_ends(replayed(name, step), exact, stiff.period_of(step)) for step in stiff.STEPS]
     floor = max(off, 1e-12)
     known = errors[:-1] if name in SWINGS else errors
     assert all(finer <= max(coarser, floor) for finer, coarser in pairwise(known)), errors
@@ -77,13 +86,19 @@ def test_no_explicit_stepper_is_wrong_without_telling(
 ) -> None:
     # It stops, or its estimate is at least half its error; up to 0.1 mm is no failure.
     case = CASES[name]
-    exact, _ = stiff.reference(case, commands[name], stiff.ROUGH)
+    exact, _ = reference(name)
     said = {
         (stepper, step): stiff.outcome(case, commands[name], exact, stepper, step)
         for stepper in EXPLICIT
         for step in stiff.STEPS
     }
     assert [key for key, one in said.items() if one.silent] == []
+
+
+@cache
+def calls(name: str) -> float:
+    """Return the numpy calls a control period of a case takes."""
+    return stiff.calls_of(CASES[name], recorded(name))
 
 
 @pytest.mark.parametrize("stepper", EXPLICIT)
@@ -97,11 +112,8 @@ def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_no_case_takes_ten_times_the_calls_of_the_easy_one(
-    name: str, commands: dict[str, NDArray[np.float64]]
-) -> None:
-    easy = stiff.calls_of(CASES[EASY], commands[EASY])
-    assert 0.0 < stiff.calls_of(CASES[name], commands[name]) < MOST * easy
+def test_no_case_takes_ten_times_the_calls_of_the_easy_one(name: str) -> None:
+    assert 0.0 < calls(name) < MOST * calls(EASY)
 
 
 def test_the_deep_press_reaches_what_it_is_there_for(commands: dict[str, NDArray[np.float64]]) -> None:

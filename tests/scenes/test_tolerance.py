@@ -14,14 +14,14 @@ SCENES = ("ridge_mound_valley", "slow_press", "tap")
 
 
 def scene_of(name: str, tolerance: float) -> Scene:
-    """Return a sample scene of at most 3 s, with whole control periods as steps."""
+    """Return a sample scene of at most 1.2 s, with whole control periods as steps."""
     settings = [
         Setting("simulation.stepper", '"adaptive"'),
         Setting("simulation.physics_step", "5e-3"),
         Setting("simulation.tolerance", str(tolerance)),
     ]
     scene = load(find(name), settings)
-    short = min(scene.simulation.duration, 3.0)
+    short = min(scene.simulation.duration, 1.2)
     return replace(scene, simulation=replace(scene.simulation, duration=short))
 
 

@@ -20,7 +20,17 @@ from digiclay.core.sweep_axis import Axis, axis
 from tests.scene_files import folder_with, scene_text
 
 ADDON = Path(__file__).parents[2] / "addon"
-GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd", "--quiet"]
+GAINS = [
+    "sweep",
+    "my.toml",
+    "--vary",
+    "control.force_gain=2,5",
+    "--metric",
+    "rfd",
+    "--workers",
+    "1",
+    "--quiet",
+]
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.05, 0.037), (0.1, 0.05))
 
 

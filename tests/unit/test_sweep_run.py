@@ -32,6 +32,8 @@ SHORT = [Setting("simulation.duration", "0.1")]
 ADDON = Path(__file__).parents[2] / "addon"
 #: Beds of different sizes, which run one at a time.
 MANY = ["sweep", "slow_press", "--vary", "layout.rows=20:29:10", "--workers", "2", "--quiet"]
+#: The same, each a second long.
+QUICK = [*MANY, "--set", "simulation.duration=1"]
 
 
 @pytest.fixture(autouse=True)
@@ -135,6 +137,14 @@ def test_workers_that_die_are_told_in_one_line() -> None:
         finished(Broken(), evaluate_all, some(), stopped=never)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The table of a sweep that nobody stopped."""
+    out = tmp_path_factory.mktemp("sweep") / "whole"
+    assert main([*QUICK, "--workers", "1", "--out", str(out)]) == 0
+    return (out / "sweep.csv").read_bytes()
+
+
 def interrupted(out: Path, number: int) -> tuple[int, str]:
     """Run a sweep that gets a signal as soon as it has kept its second point; return exit code and stderr."""
     script = (
@@ -150,7 +160,7 @@ def interrupted(out: Path, number: int) -> tuple[int, str]:
         "from digiclay.cli import console; console()\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script, *MANY, "--out", str(out)], capture_output=True, text=True,
+        [sys.executable, "-c", script, *QUICK, "--out", str(out)], capture_output=True, text=True,
         timeout=HANGS, env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
     return done.returncode, done.stderr
@@ -158,16 +168,17 @@ def interrupted(out: Path, number: int) -> tuple[int, str]:
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(number: int, here: Path) -> None:
+def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
+    number: int, here: Path, whole: bytes
+) -> None:
     assert interrupted(here / "out", number) == (130, "")
     files = {path: path.stat().st_mtime_ns for path in (here / "out").glob("points/*")}
     assert 2 <= len(files) < 10
     assert all("figures" in json.loads(path.read_text(encoding="utf-8")) for path in files)
     assert not (here / "out" / "sweep.csv").exists()
-    assert main([*MANY, "--out", "out"]) == 0
+    assert main([*QUICK, "--out", "out"]) == 0
     assert {path: path.stat().st_mtime_ns for path in files} == files
-    assert main([*MANY, "--out", "whole"]) == 0
-    assert (here / "out" / "sweep.csv").read_bytes() == (here / "whole" / "sweep.csv").read_bytes()
+    assert (here / "out" / "sweep.csv").read_bytes() == whole
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to signal")
