@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from .commands.exit_codes import STOPPED, WRONG
 from .commands.stop import undisturbed
-from .core.errors import DigiclayError
+from .core.errors import DigiclayError, one_line
 
 __all__ = ["console", "main"]
 
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as done:  # --help, --version, or arguments that make no sense
         return done.code if isinstance(done.code, int) else 0
     except DigiclayError as error:
-        return _wrong(" ".join(str(error).split()))
+        return _wrong(error)
     except MemoryError:
         return _wrong("There is not enough memory: use fewer cells, or a higher recorder.every.")
     except BrokenPipeError:
@@ -55,9 +55,9 @@ def _parsed(argv: Sequence[str] | None) -> Any:
         return parser().parse_args(argv)
 
 
-def _wrong(said: str) -> int:
+def _wrong(said: object) -> int:
     """Tell in a line what is wrong, and return the exit code."""
-    print(said, file=sys.stderr)
+    print(one_line(said), file=sys.stderr)
     return WRONG
 
 

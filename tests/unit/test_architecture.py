@@ -22,13 +22,13 @@ CORE = PACKAGE / "core"
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
     "body feature_region spline errors modes png closed_form filled some control.travel metrics_signal "
-    "set_point stack.columns",
-    "keeping_memory quantity run_folder mesh_file_* mesh_in_limits surface control.transitions "
+    "set_point stack.columns processes safe_names",
+    "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
     "metrics_path sweep_axis",
     "mesh_in_placed mesh_in_checks mesh_in_obj "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods export metrics_force metrics_trace control.servo control.blister",
-    "mesh_in_gltf mesh_in_threemf feature_crest pins_solid skin_membrane metrics "
+    "formed methods export run_folder metrics_force metrics_trace control.servo control.blister",
+    "mesh_in_gltf mesh_in_threemf feature_crest pins_solid skin_membrane metrics series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene stack.control",

@@ -18,6 +18,7 @@ from digiclay.commands.worker import Worker
 from digiclay.core.errors import OutputError
 from digiclay.core.jobs import batch
 
+from tests.other_process import dead
 from tests.patience import HANGS, until
 
 ADDON = Path(__file__).parents[2] / "addon"
@@ -127,7 +128,7 @@ def test_a_folder_that_was_half_written_does_not_count() -> None:
     jobs(TWO)
     main(["batch", "two.toml", "--quiet"])
     Path("two/runs/tap-slow/job.toml").unlink()  # as if it had not come so far
-    leftover = Path("two/runs/.tap-quick.4711.part")
+    leftover = Path(f"two/runs/.tap-quick.{dead()}.part")
     shutil.move("two/runs/tap-quick", leftover)
     assert main(["batch", "two.toml", "--quiet"]) == 0
     assert runs() == ["tap-quick", "tap-slow"]
@@ -187,7 +188,7 @@ def test_two_batches_cannot_work_in_one_folder() -> None:
     made = batch(Path("two.toml"))
     with (
         opened(Path("two"), made),
-        pytest.raises(OutputError, match="being worked in by another batch"),
+        pytest.raises(OutputError, match="being worked in by another digiclay"),
         opened(Path("two"), made),
     ):
         pass

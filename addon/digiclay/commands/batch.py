@@ -125,7 +125,6 @@ def _work(
         while running or (waiting and not stop()):
             while waiting and len(running) < count and not stop():
                 job = waiting.pop()
-                folder.clear(job)
                 running[job.name] = job, _started(folder, job)
             time.sleep(LOOK)
             for job, worker in list(running.values()):
@@ -151,6 +150,8 @@ def _started(folder: Folder, job: Job) -> Worker:
     arguments = [
         "job",
         str(folder.job(job).resolve()),
+        "--out",
+        str(folder.run(job).resolve()),
         "--overwrite",
         "--follow",
         "--since",

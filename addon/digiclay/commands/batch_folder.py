@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import json
-import os
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,10 +12,14 @@ from typing import Any
 from .. import __version__
 from ..core.errors import OutputError
 from ..core.export import write_whole
+from ..core.finished import is_whole
 from ..core.jobs import JOB, SCENE, Batch, Job
+from ..core.run_folder import inside
 from ..core.scene_table import text
+from ..core.series_folder import Kind, read_json, series
+from ..core.unfinished import remove_abandoned
 from .gallery import Card, page
-from .job import RUNS, TIMING
+from .job import FILES, RUNS, TIMING
 from .progress import duration
 from .thumbnail import NAMES
 
@@ -50,15 +50,15 @@ class Folder:
 
     def job(self, job: Job) -> Path:
         """Return the folder of a job's files."""
-        return self.path / JOBS / job.name
+        return inside(self.path, JOBS, job.name)
 
     def run(self, job: Job) -> Path:
         """Return the folder of a job's run."""
-        return self.path / RUNS / job.name
+        return inside(self.path, RUNS, job.name)
 
     def log(self, job: Job) -> Path:
         """Return the file of what a job's process said."""
-        return self.path / LOGS / f"{job.name}.log"
+        return inside(self.path, LOGS, f"{job.name}.log")
 
     def files(self, job: Job) -> dict[str, bytes]:
         """Return the files that describe a job."""
@@ -66,15 +66,15 @@ class Folder:
         return {SCENE: text(job.scene).encode(), JOB: self.batch.outputs.text().encode()}
 
     def is_done(self, job: Job) -> bool:
-        """Tell whether there is a finished run of just this job, and not of one it once was."""
+        """Tell whether there is a whole run of just this job, and not of one it once was."""
         if job.scene is None:
             return False
+        run = self.run(job)
         try:
-            return all(
-                (self.run(job) / name).read_bytes() == content for name, content in self.files(job).items()
-            )
+            same = all((run / name).read_bytes() == content for name, content in self.files(job).items())
         except OSError:
             return False
+        return same and is_whole(run, job.scene, (read_json(run / TIMING) or {}).get(FILES))
 
     def describe(self, job: Job) -> None:
         """Write the files of a job."""
@@ -84,19 +84,13 @@ class Folder:
             self.job(job).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"{self.job(job)} cannot be made: {error.strerror or error}.") from None
+        remove_abandoned(self.job(job))
         for name, content in self.files(job).items():
             write_whole(self.job(job) / name, content)
 
-    def clear(self, job: Job) -> None:
-        """Take away what a killed process left of a job."""
-        for path in self.run(job).parent.glob(f".{job.name}.*"):
-            name, _, ending = path.name[1:].rpartition(".")
-            if ending in ("part", "old") and name.rpartition(".")[0] == job.name:
-                shutil.rmtree(path, ignore_errors=True)
-
     def start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
-        timings = (_json(self.run(job) / TIMING) for job in self.batch.jobs)
+        timings = (read_json(self.run(job) / TIMING) or {} for job in self.batch.jobs)
         known = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
         return median(known) if known else None
 
@@ -121,7 +115,7 @@ class Folder:
         """Return what the page says of a finished job."""
         run = self.run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
-        metrics, timing = _json(run / "metrics.json"), _json(run / TIMING)
+        metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
         facts = [(said, _value(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts += [
@@ -145,46 +139,11 @@ def opened(path: Path, batch: Batch) -> Iterator[Folder]:
     Raises
     ------
     OutputError
-        When it holds other things, cannot be written, or another batch works in it.
+        When it holds other things, cannot be written, or another process works in it.
     """
-    try:
-        if path.exists() and not path.is_dir():
-            raise OutputError(f"{path} is a file: choose another folder with --out.")
-        if path.exists() and any(path.iterdir()) and not (path / MARK).is_file():
-            raise OutputError(f"{path} holds other things than a batch: choose another folder with --out.")
-        for name in (JOBS, RUNS, LOGS):
-            (path / name).mkdir(parents=True, exist_ok=True)
-        with (path / ".lock").open("ab") as lock:
-            if not _locked(lock):
-                raise OutputError(f"{path} is being worked in by another batch: wait until it has ended.")
-            known = {"batch": batch.name, "digiclay": __version__}
-            write_whole(path / MARK, (json.dumps(known, indent=1, ensure_ascii=False) + "\n").encode())
-            yield Folder(path, batch)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be used: {error.strerror or error}.") from None
-
-
-def _locked(file: Any) -> bool:
-    """Take a lock that ends with this process, however it ends; tell whether it was to be had."""
-    try:
-        if os.name == "nt":
-            windows = importlib.import_module("msvcrt")
-            windows.locking(file.fileno(), windows.LK_NBLCK, 1)
-        else:
-            unix = importlib.import_module("fcntl")
-            unix.flock(file, unix.LOCK_EX | unix.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
-def _json(path: Path) -> dict[str, Any]:
-    """Return what a small file says; nothing where it cannot be read."""
-    try:
-        read = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return read if isinstance(read, dict) else {}
+    known = {"batch": batch.name, "digiclay": __version__}
+    with series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), known):
+        yield Folder(path, batch)
 
 
 def _value(value: Any, factor: float, unit: str) -> str:

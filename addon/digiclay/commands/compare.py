@@ -16,6 +16,7 @@ from ..core.metrics_trace import trace_of
 from ..core.metrics_trial import TRIAL_METRICS, Trial, trial
 from ..core.quantity import nearest
 from ..core.run_folder import may_be_written, written
+from ..core.safe_names import name_of
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find, load
 from ..core.set_point import asked
@@ -78,9 +79,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if arguments.method is not None:
         raise SceneError("--method names one method: compare takes --methods.")
     path = find(arguments.scene)
-    out: Path = arguments.out or Path(
-        f"{path.parent.name if path.name == 'scene.toml' else path.stem}_compare"
-    )
+    out: Path = arguments.out or Path(f"{name_of(path)}_compare")
     may_be_written(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
     from ..paper.figures_compare import comparison

@@ -16,12 +16,13 @@ from ..core.export_model import KINDS, Model, bodies
 from ..core.features import Finding
 from ..core.finished import read
 from ..core.formed import of_history
+from ..core.run_folder import claimed_files
 from ..core.scene import Scene
 from .arguments import add_run, millimetres, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
-__all__ = ["add", "exported", "formats"]
+__all__ = ["add", "exported", "file_names", "formats"]
 
 EXAMPLES = """\
 examples:
@@ -63,6 +64,11 @@ def formats(text: str) -> list[str]:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
 
+def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
+    """Return the names of the files of a kind of mesh in several formats."""
+    return [f"{STEMS[kind]}{suffix(one)}" for one in kinds]
+
+
 def exported(
     scene: Scene,
     history: Mapping[str, NDArray[Any]],
@@ -74,7 +80,9 @@ def exported(
     """Write one row of a history in several formats, as the solid unless told otherwise; return the files."""
     made = model or Model(cap=scene.actuator.bore / 2.0)
     parts = bodies(of_history(history, row), made, Finding())
-    return [write(parts, folder / f"{STEMS[made.kind]}{suffix(kind)}", "mm", kind) for kind in kinds]
+    known = list(kinds)
+    names = file_names(known, made.kind)
+    return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, known, strict=True)]
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
@@ -90,13 +98,12 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if arguments.separate:
         files = [(body.name, [body]) for body in made]
     folder = arguments.out or arguments.run
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from None
-    for stem, some in files:
-        for kind in arguments.format:
-            path = write(some, folder / f"{stem}{suffix(kind)}", arguments.unit, kind)
+    targets = [
+        (some, kind, folder / f"{stem}{suffix(kind)}") for stem, some in files for kind in arguments.format
+    ]
+    with claimed_files([path for _, _, path in targets]):
+        for some, kind, path in targets:
+            write(some, path, arguments.unit, kind)
             if not arguments.quiet:
                 print(path)
     return 0

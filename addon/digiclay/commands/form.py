@@ -17,7 +17,8 @@ from ..core.assembly import assemble
 from ..core.errors import OutputError
 from ..core.form import GESTURES, shaped
 from ..core.layout import grid
-from ..core.run_folder import may_be_written, written
+from ..core.run_folder import claimed, may_be_written
+from ..core.safe_names import name_of
 from ..core.scene import Scene
 from ..core.scene_file import Setting
 from ..core.session import Result, run, save
@@ -25,7 +26,8 @@ from ..core.shape_file import Fitted, find_shape, fitted_to, sample_shapes
 from ..core.shape_text import packed
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
-from .export import exported, formats
+from .export import formats
+from .extras import Extra, make_extras, meshes, tell_left_out
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface
 from .stop import Stop, undisturbed
@@ -73,7 +75,7 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and tell in a few lines what came of it."""
     file = find_shape(arguments.shape)
-    out: Path = arguments.out or Path(file.stem)
+    out: Path = arguments.out or Path(name_of(file))
     may_be_written(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
@@ -83,17 +85,20 @@ def carry_out(arguments: argparse.Namespace) -> int:
         print(laid.told())
     if arguments.finger != "scene":
         scene = shaped(scene, assemble(scene), arguments.finger)
-    with Stop() as stop:
+    with claimed(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
             versions = {"digiclay": __version__}
             progress = None if arguments.quiet else bar
             result = run(scene, progress=progress, stopped=stop, versions=versions)
         result, lines = _judged(result, laid)
-        with written(out, overwrite=arguments.overwrite) as folder:
+        with claim.written() as folder:
             save(result, folder)
-            _export(result, arguments.export, folder)
+            left_out, wrong = make_extras(_exports(result, arguments.export), folder, stop)
     if not arguments.quiet:
         print("\n".join([*lines, result.summary(), f"written to {out}"]))
+    tell_left_out(left_out, out)
+    if wrong:
+        raise wrong[0]
     return STOPPED if stop() else 0
 
 
@@ -147,10 +152,11 @@ def _judged(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
     return replace(result, metrics=metrics), lines
 
 
-def _export(result: Result, kinds: list[str], folder: Path) -> None:
-    """Write the formed surface, and the displayed one."""
+def _exports(result: Result, kinds: list[str]) -> list[Extra]:
+    """Return the formed surface, and the displayed one."""
     assert result.history is not None
-    exported(result.scene, result.history, -1, kinds, folder)
-    before = folder / "displayed"
-    before.mkdir()
-    exported(result.scene, result.history, max(before_the_finger(result), 0), kinds, before)
+    row = max(before_the_finger(result), 0)
+    return [
+        meshes(result.scene, result.history, kinds),
+        meshes(result.scene, result.history, kinds, row, "displayed"),
+    ]

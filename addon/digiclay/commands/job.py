@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import sys
@@ -15,13 +14,14 @@ from typing import Any
 
 from .. import __version__
 from ..core.accuracy import can_be_estimated, estimated
-from ..core.errors import DigiclayError, OutputError
+from ..core.errors import DigiclayError, OutputError, one_line
 from ..core.export import write_whole
 from ..core.job_outputs import Outputs
 from ..core.jobs import JOB, SCENE, job_outputs
-from ..core.run_folder import may_be_written, written
+from ..core.run_folder import written
 from ..core.scene import Scene
 from ..core.scene_file import load
+from ..core.series_folder import as_json
 from ..core.session import Result, run, save
 from .arguments import add_command
 from .exit_codes import STOPPED, WRONG
@@ -33,7 +33,7 @@ from .stop import Stop
 from .thumbnail import of_heights, of_picture
 from .worker import ERROR, PROGRESS, follow
 
-__all__ = ["RUNS", "TIMING", "add", "check_outputs"]
+__all__ = ["FILES", "RUNS", "TIMING", "add", "check_outputs"]
 
 EXAMPLES = """\
 examples:
@@ -43,10 +43,10 @@ examples:
 
 A job is a folder with scene.toml, every parameter of its session, and job.toml, what is made of it.
 """
-#: Where a batch keeps its runs, beside its jobs; and what each took.
-RUNS, TIMING = "runs", "timing.json"
-#: Seconds between two lines of progress.
-PAUSE = 0.2
+#: Where a batch keeps its runs, beside its jobs; what each took; and in there, the size of each file.
+RUNS, TIMING, FILES = "runs", "timing.json", "files"
+#: Seconds between two lines of progress, and those the process of a batch that was killed gets to end.
+PAUSE, GRACE = 0.2, 20.0
 
 #: Told of a step, and of how much of the whole job is done.
 Tell = Callable[[str, float], None]
@@ -81,14 +81,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return STOPPED
     except DigiclayError as error:
-        print(f"{ERROR}{' '.join(str(error).split())}", flush=True)
+        print(f"{ERROR}{one_line(error)}", flush=True)
         return WRONG
     except MemoryError:
         print(f"{ERROR}There is not enough memory: use fewer cells, or a higher recorder.every.", flush=True)
         return WRONG
     except Exception as error:  # the batch goes on, and has to tell what this was
         traceback.print_exc()
-        print(f"{ERROR}{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
+        print(f"{ERROR}{type(error).__name__}: {one_line(error)}", flush=True)
         return 1
 
 
@@ -113,20 +113,21 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
         raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
     scene, outputs = load(folder / SCENE), job_outputs(folder / JOB)
     name = folder.resolve().name
-    out: Path = arguments.out or folder.resolve().parents[1] / RUNS / name
-    may_be_written(out, overwrite=arguments.overwrite)
+    out: Path = arguments.out or folder.resolve().parent.parent / RUNS / name
     check_outputs(scene, outputs)
     started = time.time()
-    timing = {"start_up": started - arguments.since if arguments.since else None}
-    with written(out, overwrite=arguments.overwrite) as staged:
+    timing: dict[str, Any] = {"start_up": started - arguments.since if arguments.since else None}
+    patience = GRACE if arguments.follow else 0.0
+    with written(out, overwrite=arguments.overwrite, patience=patience) as staged:
         for step, work in _steps(scene, outputs, staged, stopped, tell):
             began = time.perf_counter()
             if stopped() or not work():
                 raise KeyboardInterrupt
             timing[step] = time.perf_counter() - began
-        write_whole(staged / TIMING, (json.dumps(timing, indent=1) + "\n").encode())
         for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
             shutil.copyfile(folder / file, staged / file)
+        timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
+        write_whole(staged / TIMING, as_json(timing))
     return out
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import re
+import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .. import __version__
+from ..core.errors import one_line
+from ..core.quantity import nearest
 from . import (
     batch,
     benchmark,
@@ -17,6 +21,7 @@ from . import (
     form,
     job,
     paper,
+    plot,
     render,
     run,
     sweep,
@@ -37,18 +42,51 @@ examples:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
+    """A parser whose errors are one line, with what was probably meant."""
+
+    _given: Sequence[str] = ()
+    _hint = ""
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong with the arguments, and stop."""
-        self.exit(WRONG, f"{self.prog}: {message}. See '{self.prog} --help'.\n")
+        told = one_line(f"{self.prog}: {message}")
+        self.exit(WRONG, f"{told}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
+
+    def _misspelt(self) -> str:
+        """Ask for the option that was probably meant by one that there is not."""
+        words = list(self._given)
+        for word in words[: words.index("--")] if "--" in words else words:
+            name = word.partition("=")[0]
+            if re.fullmatch("--?[A-Za-z][A-Za-z-]+", name) and name not in self._option_string_actions:
+                asked = _asked(name, list(self._option_string_actions))
+                return asked.replace("?", f" (not {name})?")
+        return ""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is not among the choices, and say which one is near."""
+        if action.choices is not None and value not in action.choices:
+            choices = [str(choice) for choice in action.choices]
+            self._hint = _asked(str(value), choices)
+            raise argparse.ArgumentError(
+                action, f"invalid choice: {value!r} (choose from {', '.join(choices)})"
+            )
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse what is not known here and now: later, nobody knows which command it was for."""
+        self._given = sys.argv[1:] if args is None else args
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return known, unknown
+
+
+def _asked(word: str, known: Sequence[str]) -> str:
+    """Ask whether a known word was meant: the only one that begins so, or the nearest."""
+    bare = {one.lstrip("-").lower(): one for one in known}  # dashes say nothing about who is near
+    meant = word.lstrip("-").lower()
+    longer = [one for one in bare if len(meant) > 1 and one.startswith(meant)]
+    close = longer[0] if len(longer) == 1 else nearest(meant, list(bare), alike=0.6)
+    return f" Did you mean {bare[close]}?" if close else ""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -62,7 +100,9 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
-    every = (run, batch, job, form, describe, export, features, render, benchmark, sweep, compare, paper)
+    every = (
+        run, batch, job, form, describe, export, features, plot, render, benchmark, sweep, compare, paper,
+    )  # fmt: skip
     for command in every:
         command.add(commands)
     return top

@@ -14,6 +14,7 @@ from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.finished import last_touch, read, row_at
 from ..core.metrics import summary
+from ..core.run_folder import claimed_files
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
@@ -22,7 +23,7 @@ from .progress import Counted
 from .refusals import refuse_file, refuse_without_blender
 from .stop import Stop
 
-__all__ = ["ARRAYS", "add", "draw_film", "draw_still", "draw_turntable", "picture"]
+__all__ = ["ARRAYS", "PICTURE", "add", "draw_film", "draw_still", "draw_turntable", "picture"]
 
 EXAMPLES = """\
 examples:
@@ -31,6 +32,8 @@ examples:
   digiclay render ridge_mound_valley --film --speed 2 --colour force
   digiclay render ridge_mound_valley --turntable --frames 48 --engine cycles
 """
+#: What a picture is called unless told otherwise.
+PICTURE = "pins.png"
 #: What drawing needs of a history.
 ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force")
 #: Options of one kind of picture only.
@@ -82,14 +85,14 @@ def _drawn(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> in
     """Draw, and say where it is."""
     name, ending = ("film" if isinstance(looks, Film) else "turntable"), ".mp4"
     if isinstance(looks, Still):
-        name, ending = "pins", ".png"
+        name, ending = Path(PICTURE).stem, ".png"
     out: Path = arguments.out or arguments.run / f"{name}{ending}"
     refuse_file(out, ending)
     refuse_without_blender()
     run = read(arguments.run, *ARRAYS)
     row = None if arguments.time is None else row_at(run.history, arguments.time, "--time")
     path: Path | None
-    with Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
+    with claimed_files([out]), Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
         told = None if arguments.quiet else bar
         if isinstance(looks, Film):
             path = draw_film(run.scene, run.history, looks, out, told, stop)

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..core.accuracy import can_be_estimated, estimated
-from ..core.errors import DigiclayError, OutputError, ParameterError, SceneError
-from ..core.finished import last_touch
-from ..core.run_folder import may_be_written, written
+from ..core.errors import OutputError, ParameterError, SceneError
+from ..core.run_folder import claimed
+from ..core.safe_names import name_of
 from ..core.scene import Scene
 from ..core.session import Result, run, save
 from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
 from .exit_codes import STOPPED
-from .export import exported, formats
+from .export import formats
+from .extras import Extra, as_typed, drawn, make_extras, meshes, pictured, tell_left_out
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
-from .render import picture
 from .stop import Stop
 
 __all__ = ["add"]
@@ -69,30 +68,30 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run, write, and tell in a line what came of it."""
     scene, path = scene_of(arguments)
-    out: Path = arguments.out or Path(path.parent.name if path.name == "scene.toml" else path.stem)
-    may_be_written(out, overwrite=arguments.overwrite)
+    out: Path = arguments.out or Path(name_of(path))
     _refuse_early(arguments, scene)
-    found = within(scene, arguments.budget, quiet=arguments.quiet) if arguments.budget is not None else None
-    scene = found.scene if found else scene
-    with Stop() as stop:
-        result = _simulated(scene, _blamed(arguments, path), stop, quiet=arguments.quiet)
-        if not arguments.no_errors:
-            result = _judged(result, stop, quiet=arguments.quiet)
-        if found:
-            result = replace(result, metrics={**result.metrics, "budget": noted(found)})
-        wrong: list[DigiclayError] = []
-        with written(out, overwrite=arguments.overwrite) as folder:
-            save(result, folder)
-            for extra in _extras(arguments, result, folder):
-                if stop():
-                    break
-                try:
-                    extra()
-                except DigiclayError as error:  # the session itself is worth keeping
-                    wrong.append(error)
+    with claimed(out, overwrite=arguments.overwrite) as claim:
+        found = None
+        if arguments.budget is not None:
+            found = within(scene, arguments.budget, quiet=arguments.quiet)
+            scene = found.scene
+        with Stop() as stop:
+            result = _simulated(scene, _blamed(arguments, path), stop, quiet=arguments.quiet)
+            unjudged = False
+            if not arguments.no_errors:
+                result, unjudged = _judged(result, stop, quiet=arguments.quiet)
+            if found:
+                result = replace(result, metrics={**result.metrics, "budget": noted(found)})
+            with claim.written() as folder:
+                save(result, folder)
+                left_out, wrong = make_extras(_extras(arguments, result), folder, stop)
     if not arguments.quiet:
         print(result.summary())
         print(f"written to {out}")
+    if unjudged:
+        again = as_typed(["run", str(out), "--out", str(out), "--overwrite"])
+        print(f"The estimates of its errors are missing: {again}", file=sys.stderr)
+    tell_left_out(left_out, out)
     if wrong:
         raise wrong[0]
     return STOPPED if stop() else 0
@@ -131,26 +130,20 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
         raise SceneError(f"{origin}: {error}") from None
 
 
-def _judged(result: Result, stop: Stop, *, quiet: bool) -> Result:
-    """Return the result with its errors, where they can be estimated, under a progress bar."""
+def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
+    """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
     if result.history is None or result.incomplete or not can_be_estimated(result.scene):
-        return result
+        return result, False
     with Bar(sys.stderr, "errors", result.scene.simulation.control_period) as bar:
         errors = estimated(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
-    return result.with_errors(errors) if errors else result
+    return (result.with_errors(errors), False) if errors else (result, True)
 
 
-def _extras(arguments: argparse.Namespace, result: Result, folder: Path) -> Iterator[Callable[[], object]]:
-    """Give what the options ask for besides the session."""
+def _extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
+    """Return what the options ask for besides the session."""
     scene, history = result.scene, result.history
     if history is None:
-        return
-    if arguments.export:
-        yield lambda: exported(scene, history, -1, arguments.export, folder)
-    if arguments.plots:
-        from ..plots.run import session, surface
-
-        yield lambda: session(history, folder / "session.png", scene.set_point)
-        yield lambda: surface(history, folder / "surface.png")
-    if arguments.render:
-        yield lambda: picture(scene, history, last_touch(history), folder / "pins.png")
+        return []
+    wanted = [meshes(scene, history, arguments.export)] if arguments.export else []
+    wanted += [drawn(scene, history)] if arguments.plots else []
+    return wanted + ([pictured(scene, history)] if arguments.render else [])

@@ -21,7 +21,7 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     shown = "; ".join(f"{name}: {said}" for name, said in SKINS.items())
     parser.add_argument("--skin", choices=tuple(SKINS), default="bilinear", help=f"{shown}; default bilinear")
     parser.add_argument(
-        "--resolution", metavar="N", type=int, default=0, help="points a pitch; default 1, or 4 if curved"
+        "--resolution", metavar="N", type=_points, default=0, help="points a pitch; default 1, or 4 if curved"
     )
     known = Finding()
     parser.add_argument(
@@ -37,6 +37,13 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
         "--former", metavar="T", default="0",
         help="the instant, s, whose surface features are measured from, or 'rest'; default the start",
     )  # fmt: skip
+
+
+def _points(text: str) -> int:
+    """Read points a pitch: a whole number from 1 on; 0 stands for the default in files alone."""
+    if not text.isdecimal() or int(text[:9]) < 1:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to 64 (got {text!r})")
+    return int(text[:9])
 
 
 def finding_of(arguments: argparse.Namespace) -> Finding:

@@ -22,9 +22,10 @@ from ..core.scene import Scene
 from ..core.scene_file import Setting, find
 from ..core.sweep import ERRORS, Point, Record, figure, finish, points
 from ..core.sweep_axis import Axis, axis
-from ..core.sweep_bundles import Bundles, bundles, evaluate_all
+from ..core.sweep_bundles import Bundles, bundles, evaluate_all, fallen_apart
 from ..core.sweep_folder import Folder, columns, grid, opened, table
 from .arguments import add_scene, settings_of
+from .exit_codes import STOPPED
 from .progress import PAUSE, WIDTH
 from .stop import Stop
 
@@ -81,16 +82,28 @@ def carry_out(arguments: argparse.Namespace) -> int:
     every = points(find(arguments.scene), _settings(arguments, axes), axes)
     if not any(point.scene and point.scene.recorder for point in every):
         raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
-    folder = opened(arguments.out, every, axes, __version__)
     errors = any(name in ERRORS for name in names)
     parts = bundles(every, errors=errors)
-    with Stop() as stop:
-        done = _finished(arguments, folder, parts, axes, stop, errors=errors)
-        if stop() and len(done) < len(every):
-            if not arguments.quiet:
-                said = f"Stopped: {len(done)} of {len(every)} points are done and kept in {arguments.out}."
-                print(f"{said} The same command goes on from there.")
-            return 130
+    with opened(arguments.out, every, axes, __version__) as folder:
+        with Stop() as stop:
+            done = _finished(arguments, folder, parts, axes, stop, errors=errors)
+            if stop() and len(done) < len(every):
+                if not arguments.quiet:
+                    said = f"Stopped: {len(done)} of {len(every)} points are done and kept in {folder.path}."
+                    print(f"{said} The same command goes on from there.")
+                return STOPPED
+        return _told(arguments, every, parts, axes, names, done)
+
+
+def _told(
+    arguments: argparse.Namespace,
+    every: Sequence[Point],
+    parts: Bundles,
+    axes: Sequence[Axis],
+    names: Sequence[str],
+    done: dict[int, Record],
+) -> int:
+    """Write the table and the pictures, and tell what came of the sweep; return the exit code."""
     write_whole(arguments.out / "sweep.csv", table(every, columns(every, axes), done, names).encode("utf-8"))
     notes = _pictures(arguments.out, every, axes, done, names)
     failed = [record["error"] for _, record in sorted(done.items()) if "error" in record]
@@ -98,7 +111,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
     if not arguments.quiet:
         tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-        told = [*parts.told(), *notes, f"written to {arguments.out}"]
+        told = [*parts.told(), *fallen_apart(done), *notes, f"written to {arguments.out}"]
         print(f"{len(every)} points{tail}", *told, sep="\n")
     return 0
 

@@ -15,6 +15,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import one_line
+
 __all__ = ["ERROR", "PROGRESS", "Worker", "cores", "follow"]
 
 #: What the lines of a log start with that are meant for the process that started the job.
@@ -95,12 +97,12 @@ class Worker:
         lines = self._last_lines()
         told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
         if told:
-            return told[-1]
+            return one_line(told[-1])
         others = [line for line in lines if line.strip() and not line.startswith(PROGRESS)]
         said = f": {others[-1].strip()}" if others else ""
         code = self._process.returncode
         how = f"signal {-code}" if code < 0 else f"code {code}"
-        return f"The process ended with {how}{said}"
+        return one_line(f"The process ended with {how}{said}")
 
     def stop(self) -> None:
         """Ask the process to stop."""

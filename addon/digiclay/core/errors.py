@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
-__all__ = ["DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError", "StateError"]
+__all__ = [
+    "DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError", "StateError",
+    "one_line",
+]  # fmt: skip
+
+#: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
+BEGINNING, END = 300, 160
+
+
+def one_line(said: object) -> str:
+    """Return a text as one line of a sane length, without what would steer a terminal."""
+    line = " ".join(str(said).split())
+    line = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line)
+    if len(line) <= BEGINNING + END:
+        return line
+    return f"{line[:BEGINNING]} ... {line[-END:]}"
 
 
 class DigiclayError(Exception):

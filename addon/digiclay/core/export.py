@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import BinaryIO
 from . import mesh_file_glb, mesh_file_obj, mesh_file_ply, mesh_file_stl, mesh_file_threemf
 from .body import Body
 from .errors import OutputError, ParameterError
+from .unfinished import unfinished
 
 __all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write", "write_whole"]
 
@@ -108,14 +108,14 @@ def write_whole(path: Path, content: bytes) -> None:
 @contextmanager
 def _whole(path: Path) -> Iterator[BinaryIO]:
     """Give a file under a temporary name to write into; on leaving it well, it becomes `path`."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = unfinished(path)
     try:
-        with unfinished.open("wb") as file:
+        with part.open("wb") as file:
             yield file
-        unfinished.replace(path)
+        part.replace(path)
     except BaseException as error:
         with suppress(OSError):  # what went wrong first is what the user has to hear
-            unfinished.unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
         raise

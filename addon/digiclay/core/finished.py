@@ -13,11 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import OutputError
+from .run_folder import MARK
 from .scene import Scene
 from .scene_file import load
+from .series_folder import read_json
 
-__all__ = ["Run", "last_touch", "read", "row_at"]
+__all__ = ["SHAPES", "Run", "is_whole", "last_touch", "read", "row_at"]
 
+#: The file of the arrays.
+HISTORY = "history.npz"
 #: Shape of each array of a history, t rows of n cells.
 SHAPES: dict[str, tuple[str | int, ...]] = {
     "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
@@ -41,7 +45,7 @@ def read(folder: Path, *names: str) -> Run:
     OutputError
         When there is no run, or its files do not belong together.
     """
-    path = folder / "history.npz"
+    path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
     if not path.is_file():
@@ -58,6 +62,27 @@ def read(folder: Path, *names: str) -> Run:
         if array.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {array.shape}).")
     return Run(scene, history)
+
+
+def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:
+    """Tell whether a run's folder has all that belongs into it: copies break off half way.
+
+    Parameters
+    ----------
+    folder : Path
+    scene : Scene
+        Of the run.
+    sizes : dict of str to int, optional
+        Bytes of each file, as they were written; older runs have not noted them.
+    """
+    if isinstance(sizes, dict):
+        try:
+            return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
+        except OSError:
+            return False
+    whole = read_json(folder / MARK) is not None
+    # The names of an archive's parts stand at its end.
+    return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
 def row_at(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:

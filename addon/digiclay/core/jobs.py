@@ -9,16 +9,17 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .errors import ParameterError, SceneError
+from .errors import ParameterError, SceneError, one_line
 from .job_outputs import KEYS, Outputs, outputs, word
 from .layout import grid
 from .methods import METHODS
 from .part_table import refuse_unknown, shown
+from .safe_names import name_of, unique_names
 from .sample_file import found, named
 from .scene import Scene
 from .scene_file import SAMPLES, Setting, find, load, read_table
@@ -29,8 +30,8 @@ __all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_ou
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
-#: More jobs than this, or a longer name of one, are a slip of the keyboard.
-MOST, LONGEST = 10_000, 120
+#: More jobs than this are a slip of the keyboard.
+MOST = 10_000
 #: Where the sample batches are.
 BATCHES = SAMPLES.parent / "batches"
 #: What decides which jobs there are; all other keys say what is made of each.
@@ -85,11 +86,14 @@ def batch(path: Path) -> Batch:
         files = [_found(path, said) for said in words]
         for file in files:
             load(file)  # what is wrong without any change is told of first
-        jobs = tuple(_job(*parts) for parts in itertools.product(files, methods, changes.items()))
-        _refuse_one_name_for_two(jobs)
+        _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
+        _refuse_twice("methods", methods, methods)
+        parts = list(itertools.product(files, methods, changes.items()))
+        names = unique_names([_name(file, method, label) for file, method, (label, _) in parts])
+        jobs = tuple(_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
-    return Batch(path.stem, jobs, made)
+    return Batch(name_of(path), jobs, made)
 
 
 def find_jobs(said: str) -> Path:
@@ -168,18 +172,18 @@ def _found(jobs: Path, said: str) -> Path:
     return find(str(beside)) if os.path.exists(beside) else find(said)
 
 
-def _job(file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
+def _name(file: Path, method: str, label: str) -> str:
+    """Return what a job is called by its parts."""
+    return "-".join(part for part in (name_of(file, SCENE), method, label) if part)
+
+
+def _job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
     """Make one job."""
-    label, changes = setting
-    stem = file.parent.name if file.name == SCENE else file.stem
-    name = "-".join(re.sub(r"[^\w.+-]", "_", part) for part in (stem, method, label) if part)
-    if len(name) > LONGEST:
-        raise ParameterError("settings", label, f"must make names of at most {LONGEST} letters", repr(name))
     chosen = [Setting("control.method", word(method), "methods")] if method else []
     try:
-        return Job(name, _alone(load(file, [*chosen, *changes])))
+        return Job(name, _alone(load(file, [*chosen, *setting[1]])))
     except (SceneError, ParameterError) as error:
-        return Job(name, None, " ".join(str(error).split()))
+        return Job(name, None, one_line(error))
 
 
 def _alone(scene: Scene) -> Scene:
@@ -190,10 +194,8 @@ def _alone(scene: Scene) -> Scene:
     return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
 
 
-def _refuse_one_name_for_two(jobs: tuple[Job, ...]) -> None:
-    """Refuse jobs that would share a folder; some file systems do not tell A from a."""
-    seen: set[str] = set()
-    for job in jobs:
-        if job.name.casefold() in seen:
-            raise ParameterError("scenes", "", "must give every job a name of its own", f"{job.name} twice")
-        seen.add(job.name.casefold())
+def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:
+    """Refuse a list in which two words mean the same: it would make the same jobs twice."""
+    for place, one in enumerate(meant):
+        if one in meant[:place]:
+            raise ParameterError(key, "", "must not name one thing twice", f"{words[place]} twice")

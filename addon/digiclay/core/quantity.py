@@ -168,6 +168,6 @@ def parse(text: str, unit: str) -> float:
     return value * factor
 
 
-def nearest(name: str, known: list[str]) -> str:
-    """Return the known name a misspelt one is nearest to, or ``""``."""
-    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.5)), "")
+def nearest(name: str, known: list[str], alike: float = 0.5) -> str:
+    """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common."""
+    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")

@@ -1,16 +1,21 @@
-"""A run's folder: it appears whole, under its own name, or not at all."""
+"""A run's folder: claimed when the run starts, it appears whole, under its own name, or not at all."""
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import OutputError
+from .file_lock import held
+from .unfinished import remove_abandoned, unfinished
 
-__all__ = ["MARK", "may_be_written", "written"]
+__all__ = [
+    "MARK", "Claim", "busy", "claimed", "claimed_files", "inside", "lock_beside", "may_be_written", "written",
+]  # fmt: skip
 
 #: The file by which a folder is known as a run's.
 MARK = "metrics.json"
@@ -50,30 +55,135 @@ def may_be_written(out: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{out} cannot be made: {above} cannot be written to.")
 
 
-@contextmanager
-def written(out: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Give a folder under a temporary name to write into; on leaving it well, it becomes `out`.
+def inside(folder: Path, *parts: str) -> Path:
+    """Return a path in a folder, and refuse one that leads out of it, by its name or by a link.
 
-    An older run is replaced only then. When something is raised, all is as it was before.
+    Raises
+    ------
+    OutputError
+    """
+    path = folder.joinpath(*parts)
+    end = path.resolve()
+    if folder.resolve() not in end.parents:
+        raise OutputError(f"{path} leads out of {folder}, to {end}: nothing is written there.")
+    return path
+
+
+def lock_beside(folder: Path) -> Path:
+    """Return the lock of whoever makes a folder of this name."""
+    target = folder.resolve()
+    return target.with_name(f".{target.name}.lock")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """The right to write a folder, while the block of `claimed` lasts."""
+
+    out: Path
+    overwrite: bool
+
+    @contextmanager
+    def written(self) -> Iterator[Path]:
+        """Give a folder under a temporary name to write into; on leaving it well, it becomes `out`.
+
+        An older run is replaced only then. When something is raised, all is as it was before.
+        """
+        target = self.out.resolve()
+        staged, former = unfinished(target), unfinished(target, "old")
+        try:
+            staged.mkdir(parents=True)
+            yield staged
+            may_be_written(self.out, overwrite=self.overwrite)
+            if target.exists():
+                target.rename(former)
+            staged.rename(target)
+        except OSError as error:
+            raise OutputError(f"{self.out} cannot be written: {error.strerror or error}.") from None
+        finally:
+            if former.exists() and not target.exists():
+                former.rename(target)
+            shutil.rmtree(former, ignore_errors=True)
+            shutil.rmtree(staged, ignore_errors=True)
+
+
+@contextmanager
+def claimed(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Claim]:
+    """Claim a folder before any work is done: nobody else may write it until the block ends.
+
+    What runs of this name have left that were killed is taken away.
+
+    Parameters
+    ----------
+    out : Path
+    overwrite : bool
+        See `may_be_written`.
+    patience : float, optional
+        Seconds to wait for somebody else who is about to end.
+
+    Raises
+    ------
+    OutputError
+        When it is claimed already, or could not be used in the end.
     """
     may_be_written(out, overwrite=overwrite)
     target = out.resolve()
-    staged, former = (target.with_name(f".{target.name}.{os.getpid()}.{word}") for word in ("part", "old"))
+    with ExitStack() as until_the_end:
+        until_the_end.enter_context(_folders_kept_if_filled(target))
+        try:
+            until_the_end.enter_context(held(lock_beside(out), busy(out, "being written"), patience))
+        except OSError as error:
+            raise OutputError(f"{out} cannot be made: {error.strerror or error}.") from None
+        remove_abandoned(target.parent, target.name)
+        may_be_written(out, overwrite=overwrite)  # somebody else may just have ended
+        yield Claim(out, overwrite)
+
+
+def busy(path: Path, how: str) -> str:
+    """Say that somebody else is at a path."""
+    return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
+
+
+@contextmanager
+def _folders_kept_if_filled(target: Path) -> Iterator[None]:
+    """Take away in the end those folders above a path that were not there, unless there is something in."""
     made = [folder for folder in target.parents if not folder.exists()]
     try:
-        staged.mkdir(parents=True)
-        yield staged
-        if target.exists():
-            target.rename(former)
-        staged.rename(target)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
+        yield
     finally:
-        if former.exists() and not target.exists():
-            former.rename(target)
-        shutil.rmtree(former, ignore_errors=True)
-        shutil.rmtree(staged, ignore_errors=True)
-        if not target.exists():
-            for folder in made:
-                with suppress(OSError):  # not made after all, or somebody else put something in
-                    folder.rmdir()
+        for folder in made:
+            with suppress(OSError):  # not made after all, or not empty
+                folder.rmdir()
+
+
+@contextmanager
+def claimed_files(files: Sequence[Path]) -> Iterator[None]:
+    """Claim files in folders that are there already, such as a run's: nobody else writes them meanwhile.
+
+    What killed processes have left unfinished of them is taken away.
+
+    Raises
+    ------
+    OutputError
+        When one is claimed already, its folder is being written anew, or it cannot be made.
+    """
+    with ExitStack() as until_the_end:
+        try:
+            for folder in dict.fromkeys(file.parent for file in files):
+                if folder.exists() and os.access(folder.resolve().parent, os.W_OK):
+                    with held(lock_beside(folder), busy(folder, "being written")):
+                        pass
+                until_the_end.enter_context(_folders_kept_if_filled(folder.resolve() / "file"))
+            for file in files:
+                until_the_end.enter_context(held(lock_beside(file), busy(file, "being written")))
+                remove_abandoned(file.parent, file.name)
+        except OSError as error:
+            folder = files[0].parent
+            raise OutputError(f"{folder} cannot be written to: {error.strerror or error}.") from None
+        yield
+
+
+@contextmanager
+def written(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
+    """Claim a folder and give one to write into, which becomes it: see `claimed` and `Claim.written`."""
+    with claimed(out, overwrite=overwrite, patience=patience) as claim, claim.written() as folder:
+        yield folder

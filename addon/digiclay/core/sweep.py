@@ -15,7 +15,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from .accuracy import can_be_estimated, estimated
-from .errors import DigiclayError, OutputError, ParameterError, SceneError
+from .errors import DigiclayError, OutputError, ParameterError, SceneError, one_line
 from .metrics import METRICS
 from .quantity import nearest
 from .scene import Scene
@@ -140,11 +140,11 @@ def evaluate(
                 return None
             result = result.with_errors(found)
     except DigiclayError as error:
-        return {"error": " ".join(str(error).split())}
+        return {"error": one_line(error)}
     except MemoryError:
         return {"error": "There is not enough memory."}
     except Exception as error:  # whatever is wrong with one point, the others are worth having
-        return {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+        return {"error": f"{type(error).__name__}: {one_line(error)}"}
     return None if result.incomplete else recorded(result, errors=errors)
 
 

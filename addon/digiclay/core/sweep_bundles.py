@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from .errors import DigiclayError, ParameterError
+from .errors import DigiclayError, ParameterError, one_line
 from .scene import Scene
 from .stack.assembly import structure, why_not
 from .stack.session import judge_of, judge_together
 from .sweep import Point, Record, evaluate, recorded
 
-__all__ = ["RUNS", "Bundles", "bundles", "evaluate_all"]
+__all__ = ["RUNS", "Bundles", "StackWarning", "bundles", "evaluate_all", "fallen_apart"]
 
 #: Fewer points than this are as quick one at a time.
 LEAST = 4
@@ -21,6 +22,8 @@ RUNS = 32
 #: Bytes a stack may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
 #: by unseen.
 BUDGET, BYTES_A_ROW = 2**30, 41
+#: Where a record says why its point was run by itself although it stood in a stack.
+ALONE = "alone"
 
 
 @dataclass(frozen=True)
@@ -105,24 +108,49 @@ def _some(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
+class StackWarning(RuntimeWarning):
+    """A stack failed as a whole for a reason that is no user's to mend."""
+
+
 def evaluate_all(
     scenes: Sequence[Scene], stopped: Callable[[], bool] | None = None, *, errors: bool = False
 ) -> list[Record | None]:
     """Run a bundle; return the record of each of its points, None for one that was stopped.
 
-    What goes wrong with a stack as a whole is found out with its points one by one. See `sweep.evaluate`.
+    When a stack fails as a whole, its points are run one by one, and each record says why under
+    ``alone``. See `sweep.evaluate`.
+
+    Warns
+    -----
+    StackWarning
+        When that was neither a lack of memory nor an error a user can cause.
     """
     records: list[Record | None] = [None] * len(scenes)
+    why = ""
     if len(scenes) > 1:
         try:
             for number, result in judge_together(scenes, errors=errors, stopped=stopped):
                 if isinstance(result, DigiclayError):
-                    records[number] = {"error": " ".join(str(result).split())}
+                    records[number] = {"error": one_line(result)}
                 else:
                     records[number] = recorded(result, errors=errors)
-        except Exception:  # each point meets it again by itself, and says what it is
+        except MemoryError:
+            why = "there is not enough memory for a stack"
+        except DigiclayError as error:
+            why = one_line(error)
+        except Exception as error:  # each point meets it again by itself, and says what it is
+            why = f"{type(error).__name__}: {one_line(error)}"
+            warnings.warn(f"A stack of {len(scenes)} runs failed: {why}", StackWarning, stacklevel=2)
+        if why:
             records = [None] * len(scenes)
     for number, scene in enumerate(scenes):
         if records[number] is None and not (stopped and stopped()):
-            records[number] = evaluate(scene, stopped, errors=errors)
+            record = evaluate(scene, stopped, errors=errors)
+            records[number] = {**record, ALONE: why} if record and why else record
     return records
+
+
+def fallen_apart(done: Mapping[int, Record]) -> list[str]:
+    """Return a line a reason for points that were run one by one because their stack failed."""
+    why = [record[ALONE] for record in done.values() if record.get(ALONE)]
+    return [f"{_some(why.count(one), 'point')} one at a time: {one}" for one in dict.fromkeys(why)]

@@ -6,7 +6,8 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,14 @@ from .export import write_whole
 from .quantity import quantities
 from .scene import Scene
 from .scene_table import text
+from .series_folder import Kind, as_json, series
 from .sweep import FIGURES, Point, Record
 from .sweep_axis import Axis
 
 __all__ = ["MARK", "Column", "Folder", "columns", "grid", "opened", "table"]
 
-#: The file by which a folder is known as a sweep's.
-MARK = "sweep.json"
+#: The file by which a folder is known as a sweep's, and the folder of its points.
+MARK, POINTS = "sweep.json", "points"
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Folder:
     def done(self) -> dict[int, Record]:
         """Return the points that are finished, by their index."""
         found = {}
-        for path in self.path.glob("points/*.json"):
+        for path in self.path.glob(f"{POINTS}/*.json"):
             try:
                 record = json.loads(path.read_text(encoding="utf-8"))
             except (OSError, ValueError):
@@ -49,16 +51,17 @@ class Folder:
     def keep(self, point: Point, axes: Sequence[Axis], record: Record) -> None:
         """Write the file of a finished point, whole or not at all."""
         values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
-        write_whole(self.path / "points" / f"{point.index:06d}.json", _json({"values": values, **record}))
+        write_whole(self.path / POINTS / f"{point.index:06d}.json", as_json({"values": values, **record}))
 
 
-def opened(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Folder:
-    """Make a sweep's folder, or go on with one that holds the same sweep.
+@contextmanager
+def opened(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Iterator[Folder]:
+    """Make a sweep's folder, or go on with one that holds the same sweep; nobody else works in it meanwhile.
 
     Raises
     ------
     OutputError
-        When it holds anything else, or cannot be written.
+        When it holds anything else, cannot be written, or another process works in it.
     """
     identity = hashlib.sha256(version.encode())
     for point in points:
@@ -69,38 +72,19 @@ def opened(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: s
         "points": len(points),
         "identity": identity.hexdigest(),
     }
-    mark = path / MARK
-    try:
-        if path.exists() and not path.is_dir():
-            raise OutputError(f"{path} is a file: choose another folder with --out.")
-        if mark.exists():
-            _refuse_another(path, mark, known)
-            return Folder(path)
-        if path.exists() and any(path.iterdir()):
-            raise OutputError(f"{path} holds other things than a sweep: choose another folder with --out.")
-        (path / "points").mkdir(parents=True)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be used: {error.strerror or error}.") from None
-    write_whole(mark, _json(known))
-    return Folder(path)
 
-
-def _refuse_another(path: Path, mark: Path, known: Mapping[str, Any]) -> None:
-    """Refuse a folder that holds another sweep than the one asked for."""
-    try:
-        held = json.loads(mark.read_text(encoding="utf-8"))
-        if held == known:
-            (path / "points").mkdir(exist_ok=True)
+    def refuse_another(there: Any) -> None:
+        if there == known:
             return
-        varied = " and ".join(one["key"] for one in held["axes"])
-        said = f"{held['points']} points over {varied}, digiclay {held['digiclay']}"
-    except (ValueError, KeyError, TypeError):
-        said = f"its {MARK} cannot be read"
-    raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
+        try:
+            varied = " and ".join(one["key"] for one in there["axes"])
+            said = f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
+        except (KeyError, TypeError):
+            said = f"its {MARK} cannot be read"
+        raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
 
-
-def _json(value: object) -> bytes:
-    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    with series(path, Kind("sweep", MARK, (POINTS,)), known, refuse_another):
+        yield Folder(path)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 from ..compat import bpy, quiet, strips, to_video
 from ..core.errors import OutputError
 from ..core.shots import Moving
+from ..core.unfinished import unfinished
 from .render import why_not
 
 __all__ = ["encoded", "frames_beside", "whole_film"]
@@ -20,7 +21,7 @@ __all__ = ["encoded", "frames_beside", "whole_film"]
 @contextmanager
 def frames_beside(out: Path) -> Iterator[Path]:
     """Give a folder for the frames beside the film, and take it away again."""
-    folder = out.with_name(f".{out.name}.{os.getpid()}.frames")
+    folder = unfinished(out, "frames")
     try:
         folder.mkdir(parents=True)
         yield folder

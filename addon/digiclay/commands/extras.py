@@ -1,0 +1,104 @@
+"""What is made of a session besides its folder; what a stop has left out is named, with what makes it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from ..core.errors import DigiclayError
+from ..core.finished import last_touch
+from ..core.scene import Scene
+from .export import exported, file_names
+from .plot import PLOTS, plotted
+from .render import PICTURE, picture
+
+__all__ = ["Extra", "as_typed", "drawn", "make_extras", "meshes", "pictured", "tell_left_out"]
+
+History = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Extra:
+    """Files made of a session.
+
+    Attributes
+    ----------
+    files : sequence of str
+        Seen from the run's folder.
+    make : callable
+        Makes them in a folder.
+    later : callable
+        Returns the arguments of the command that makes them in the finished run's folder.
+    """
+
+    files: Sequence[str]
+    make: Callable[[Path], object]
+    later: Callable[[Path], list[str]]
+
+
+def meshes(scene: Scene, history: History, kinds: Sequence[str], row: int = -1, within: str = "") -> Extra:
+    """Return the surface of one row as mesh files, in the run's folder or in one within it."""
+
+    def make(folder: Path) -> None:
+        (folder / within).mkdir(exist_ok=True)
+        exported(scene, history, row, kinds, folder / within)
+
+    def later(run: Path) -> list[str]:
+        instant = [] if row == -1 else ["--time", repr(float(history["time"][row]))]
+        place = ["--out", str(run / within)] if within else []
+        return ["export", str(run), "--format", ",".join(kinds), *instant, *place]
+
+    return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
+
+
+def drawn(scene: Scene, history: History) -> Extra:
+    """Return the plots of a session."""
+    return Extra(PLOTS, lambda folder: plotted(scene, history, folder), lambda run: ["plot", str(run)])
+
+
+def pictured(scene: Scene, history: History) -> Extra:
+    """Return the picture of the last touch."""
+    return Extra(
+        [PICTURE],
+        lambda folder: picture(scene, history, last_touch(history), folder / PICTURE),
+        lambda run: ["render", str(run)],
+    )
+
+
+def make_extras(
+    extras: Iterable[Extra], folder: Path, stopped: Callable[[], bool]
+) -> tuple[list[Extra], list[DigiclayError]]:
+    """Make one after the other; return those left out because of a stop, and what went wrong."""
+    left_out: list[Extra] = []
+    wrong: list[DigiclayError] = []
+    for extra in extras:
+        if stopped():
+            left_out.append(extra)
+            continue
+        try:
+            extra.make(folder)
+        except DigiclayError as error:  # the session itself is worth keeping
+            wrong.append(error)
+    return left_out, wrong
+
+
+def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
+    """Say which files a stop has left out, and the command that makes them."""
+    for extra in left_out:
+        verb = "is" if len(extra.files) == 1 else "are"
+        said = f"{', '.join(extra.files)} {verb} missing: {as_typed(extra.later(run))}"
+        print(said, file=sys.stderr)
+
+
+def as_typed(arguments: Sequence[str]) -> str:
+    """Return a command of this program as it is typed into a terminal."""
+    words = ["digiclay", *arguments]
+    return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)

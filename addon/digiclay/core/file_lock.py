@@ -1,0 +1,185 @@
+"""A lock that one process holds at a time, and that ends with it however it ends."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from .errors import OutputError
+from .processes import host, may_have_made
+
+__all__ = ["held", "held_by_record"]
+
+#: Seconds between two attempts.
+PAUSE = 0.05
+#: A record without a name is one that is being written, unless it is older than this, s.
+BEING_WRITTEN = 10.0
+#: What a drive says that has no locks, such as some network drives.
+NO_LOCKS = {
+    getattr(errno, name, None) for name in ("ENOLCK", "ENOTSUP", "EOPNOTSUPP", "ENOSYS", "EINVAL")
+} - {None}
+
+
+class NoLocksHere(Exception):
+    """The drive has no locks."""
+
+
+@contextmanager
+def held(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
+    """Hold a lock file, which is made with its folder and taken away again.
+
+    The system's own lock is taken, which no crash leaves behind; where a drive has none, a record of
+    the process. Processes that are started meanwhile do not inherit it.
+
+    Parameters
+    ----------
+    path : Path
+    refusal : str
+        What is said when another process holds it; it may hold ``{lock}``.
+    patience : float, optional
+        Seconds to wait for the other process.
+
+    Raises
+    ------
+    OutputError
+        When another process holds it.
+    OSError
+        When the file cannot be made.
+    """
+    deadline = time.monotonic() + patience
+    while True:
+        try:
+            taken = _taken(path)
+        except NoLocksHere:
+            with held_by_record(path.with_name(f"{path.name}.owner"), refusal, patience):
+                yield
+            return
+        if taken is not None:
+            break
+        if time.monotonic() >= deadline:
+            raise OutputError(refusal)
+        time.sleep(PAUSE)
+    try:
+        yield
+    finally:
+        if os.name == "nt":  # an open file cannot be removed there; one that somebody waits for stays
+            os.close(taken)
+        with suppress(OSError):
+            path.unlink()
+        if os.name != "nt":
+            os.close(taken)
+
+
+def _taken(path: Path) -> int | None:
+    """Open and lock a file; None when another process holds it."""
+    while True:
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+        try:
+            file = os.open(path, flags, 0o666)
+        except FileNotFoundError:  # whoever made the folder has just taken it away again
+            path.parent.mkdir(parents=True, exist_ok=True)
+            continue
+        try:
+            if not _locked(file):
+                os.close(file)
+                return None
+            if _is_at(file, path):
+                return file
+        except BaseException:
+            os.close(file)
+            raise
+        os.close(file)  # it was taken away between opening and locking: the next one is another file
+
+
+def _locked(file: int) -> bool:
+    """Take the system's lock on an open file; tell whether it was to be had."""
+    if os.name == "nt":
+        windows: Any = importlib.import_module("msvcrt")
+        try:
+            windows.locking(file, windows.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    unix: Any = importlib.import_module("fcntl")
+    try:
+        unix.flock(file, unix.LOCK_EX | unix.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            raise NoLocksHere from None
+        raise
+    return True
+
+
+def _is_at(file: int, path: Path) -> bool:
+    """Tell whether an open file is the one that has this name now."""
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+@contextmanager
+def held_by_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
+    """Hold a file that names this process and machine; one whose process is gone does not count.
+
+    What another machine holds has to be removed by hand when that one has crashed: the refusal says so.
+    The parameters are those of `held`.
+    """
+    deadline = time.monotonic() + patience
+    while not _recorded(path):
+        if time.monotonic() >= deadline:
+            owner = _owner(path)
+            away = owner is not None and owner[0] != host()
+            hint = f" It was begun on {owner[0]}; if nothing runs there, remove {path}." if owner else ""
+            raise OutputError(refusal + (hint if away else ""))
+        time.sleep(PAUSE)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+
+
+def _recorded(path: Path) -> bool:
+    """Make the record; tell whether there was none before of a process that may still run."""
+    try:
+        changed, owner = path.stat().st_mtime, _owner(path)
+        if owner is None:
+            gone = time.time() - changed > BEING_WRITTEN
+        else:
+            gone = owner[0] == host() and not may_have_made(owner[1], changed)
+        if not gone:
+            return False
+        path.unlink()
+    except FileNotFoundError:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError:
+        return False
+    try:
+        os.write(file, f"{host()} {os.getpid()}\n".encode())
+    except BaseException:
+        with suppress(OSError):
+            path.unlink()
+        raise
+    finally:
+        os.close(file)
+    return True
+
+
+def _owner(path: Path) -> tuple[str, int] | None:
+    """Return the machine and the process a record names; None where it names none."""
+    try:
+        machine, pid = path.read_text(encoding="utf-8").split()
+        return machine, int(pid)
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,68 @@
+"""Names of folders from whatever a user names: safe on every file system, and no two alike."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import unicodedata
+from collections.abc import Sequence
+from pathlib import Path
+
+__all__ = ["alike", "name_of", "safe_name", "unique_names"]
+
+#: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
+LONGEST = 120
+#: Names that stand for devices in Windows, whatever follows behind a full stop.
+DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)", re.IGNORECASE)
+
+
+def safe_name(text: str) -> str:
+    """Return a text as the name of a folder: a word of letters, digits and ``. _ + -``.
+
+    It does not begin or end with a full stop, is no device in Windows, and is short enough.
+    """
+    name = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", text))
+    name = name.lstrip(".-").rstrip(".") or "scene"
+    if DEVICES.fullmatch(name.partition(".")[0]):
+        name = f"_{name}"
+    if len(name.encode(errors="replace")) <= LONGEST:
+        return name
+    digest = hashlib.sha256(name.encode(errors="replace")).hexdigest()[:8]
+    kept = name.encode(errors="replace")[: LONGEST - 9].decode(errors="ignore")
+    return f"{kept}-{digest}"
+
+
+def name_of(path: Path, general: str = "scene.toml") -> str:
+    """Return what a file describes by name: the file's stem, or its folder's name where that says nothing.
+
+    Parameters
+    ----------
+    path : Path
+        However it leads to the file: its own name and its folder's real one count.
+    general : str
+        The name of a file that says nothing.
+    """
+    full = Path(os.path.abspath(path))
+    name = full.parent.name if full.name == general else full.stem
+    return name if name.strip(". ") else "scene"
+
+
+def alike(name: str) -> str:
+    """Return what names have in common that some file systems take for one: ``a`` and ``A``."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def unique_names(texts: Sequence[str]) -> list[str]:
+    """Return safe names of texts, in their order; where several would be alike, the later get numbers."""
+    names = [safe_name(text) for text in texts]
+    taken = {alike(name) for name in names}
+    given: set[str] = set()
+    for place, name in enumerate(names):
+        number, chosen = 1, name
+        while alike(chosen) in given or (number > 1 and alike(chosen) in taken):
+            number += 1
+            chosen = safe_name(f"{name[:LONGEST]}-{number}")
+        names[place] = chosen
+        given.add(alike(chosen))
+    return names

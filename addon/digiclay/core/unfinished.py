@@ -1,0 +1,66 @@
+"""What is being written stands under a name of its own, and is taken away when its process is gone."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+from .processes import host, may_have_made
+
+__all__ = ["is_unfinished", "remove_abandoned", "unfinished"]
+
+#: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
+UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)")
+
+
+def unfinished(target: Path, kind: str = "part") -> Path:
+    """Return the name under which this process prepares a file or folder, beside it.
+
+    Parameters
+    ----------
+    target : Path
+    kind : {"part", "old", "frames"}
+        What becomes the target; what the target was; the frames of a film.
+    """
+    return target.with_name(f".{target.name}.{os.getpid()}@{host()}.{kind}")
+
+
+def is_unfinished(path: Path) -> bool:
+    """Tell by its name whether something was still being prepared."""
+    return UNFINISHED.fullmatch(path.name) is not None
+
+
+def remove_abandoned(folder: Path, name: str = "") -> None:
+    """Take away what processes of this machine that are gone have left unfinished.
+
+    What was moved aside to be replaced is put back when nothing has come in its place. What other
+    machines prepare on a shared drive stays: nothing here tells whether they are at it.
+
+    Parameters
+    ----------
+    folder : Path
+        Nothing happens when there is none.
+    name : str, optional
+        Of what it was to become; by default anything.
+    """
+    try:
+        found = sorted(folder.iterdir())
+    except OSError:
+        return
+    for path in found:
+        known = UNFINISHED.fullmatch(path.name)
+        if known is None or (name and known["name"] != name) or known["host"] not in (None, host()):
+            continue
+        with suppress(OSError):
+            if may_have_made(int(known["pid"]), path.lstat().st_mtime):
+                continue
+            target = path.with_name(known["name"])
+            if known["kind"] == "old" and not os.path.lexists(target):
+                path.rename(target)
+            elif path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink()

@@ -1,0 +1,17 @@
+"""Other processes, for tests of what they leave behind."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from tests.patience import HANGS
+
+__all__ = ["dead"]
+
+
+def dead() -> int:
+    """Return the number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait(HANGS)
+    return process.pid

@@ -1,0 +1,156 @@
+"""Locks, the processes that hold them, and what those leave behind that are gone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from digiclay.core.errors import OutputError
+from digiclay.core.file_lock import held, held_by_record
+from digiclay.core.processes import host, may_have_made, running_since
+from digiclay.core.unfinished import is_unfinished, remove_abandoned, unfinished
+
+from tests.other_process import dead
+from tests.patience import HANGS, until
+
+ADDON = Path(__file__).parents[2] / "addon"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def names(folder: Path = Path()) -> list[str]:
+    """Return what lies in a folder, hidden things too."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away() -> None:
+    gone = dead()
+    left = [f".o.{gone}.part", f".o.{gone}@{host()}.part"]
+    kept = [
+        f".o.{os.getpid()}@{host()}.part",  # this one lives
+        f".o.{gone}@elsewhere.part",  # nobody knows
+        f".p.{gone}.part",  # another one's
+        ".o.part", "o.1.part", f".o.{gone}.doc",
+    ]  # fmt: skip
+    for name in left + kept:
+        Path("d", name).mkdir(parents=True)
+    remove_abandoned(Path("d"), "o")
+    assert names(Path("d")) == sorted(kept)
+
+
+def test_a_number_that_another_process_has_got_since_counts_as_gone() -> None:
+    path = Path(f".o.{os.getpid()}.part")
+    path.mkdir()
+    since = running_since(os.getpid())
+    assert since is not None
+    os.utime(path, (since - 3600.0, since - 3600.0))  # before this process was started
+    remove_abandoned(Path(), "o")
+    assert not path.exists()
+
+
+def test_a_process_is_known_by_the_time_it_was_started() -> None:
+    before = time.time()
+    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1000)"])
+    try:
+        since = running_since(process.pid)
+        assert since is not None
+        # The system counts in hundredths of a second from when it was booted, which it knows to a second.
+        assert before - 2.0 <= since <= time.time() + 2.0
+        assert may_have_made(process.pid, since + 1.0)
+        assert not may_have_made(process.pid, since - 3600.0)
+    finally:
+        process.kill()
+        process.wait(HANGS)
+    assert running_since(process.pid) is None
+    assert not may_have_made(process.pid, time.time())
+
+
+def test_a_process_that_nobody_has_asked_how_it_ended_is_gone() -> None:
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    until(lambda: running_since(process.pid) is None)
+    process.wait(HANGS)
+
+
+def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
+    record = here / "record"
+    with (
+        held_by_record(record, "It is held."),
+        pytest.raises(OutputError, match=r"^It is held\.$"),
+        held_by_record(record, "It is held."),
+    ):
+        pass
+    assert not record.exists()
+    record.write_text(f"{host()} {dead()}\n", encoding="utf-8")  # left by a crash
+    with held_by_record(record, "It is held."):
+        assert record.read_text(encoding="utf-8").split() == [host(), str(os.getpid())]
+    record.write_text("", encoding="utf-8")  # the disk was full, long ago
+    os.utime(record, (0.0, 0.0))
+    with held_by_record(record, "It is held."):
+        pass
+    record.write_text("elsewhere 1\n", encoding="utf-8")
+    with (
+        pytest.raises(OutputError, match=r"begun on elsewhere; if nothing runs there, remove .*record"),
+        held_by_record(record, "It is held."),
+    ):
+        pass
+
+
+def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
+    # Of hundreds of owners in four processes there is one at a time: a file tells who is inside.
+    script = (
+        "import os\n"
+        "from pathlib import Path\n"
+        "from digiclay.core.file_lock import held\n"
+        "for _ in range(60):\n"
+        "    with held(Path('d/lock'), 'no', 100.0):\n"
+        "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
+        "        os.unlink('inside')\n"
+    )
+    several = [
+        subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": str(ADDON)})
+        for _ in range(3)
+    ]
+    assert [process.wait(HANGS) for process in several] == [0, 0, 0]
+    assert names(Path("d")) == []
+
+
+def test_what_is_unfinished_is_known_by_its_name() -> None:
+    for kind in ("part", "old", "frames"):
+        assert is_unfinished(unfinished(Path("a/b c.stl"), kind))
+    assert not is_unfinished(Path("a/.b.stl"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from digiclay.core.file_lock import held\n"
+        "with held(Path('lock'), 'no'):\n"
+        "    print('here', flush=True)\n"
+        "    sys.stdin.readline()\n"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(ADDON)},
+    )  # fmt: skip
+    assert other.stdout is not None
+    assert other.stdout.readline() == "here\n"
+    with pytest.raises(OutputError, match="taken"), held(Path("lock"), "taken"):
+        pass
+    other.send_signal(signal.SIGKILL)
+    other.communicate(timeout=HANGS)
+    assert Path("lock").exists()
+    with held(Path("lock"), "taken"):
+        pass
+    assert not Path("lock").exists()
