@@ -21,8 +21,8 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "body feature_region spline errors modes png closed_form filled some control.travel metrics_signal "
-    "set_point stack.columns processes safe_names",
+    "body npz toml_text feature_region spline errors modes png closed_form filled some "
+    "control.travel metrics_signal set_point stack.columns processes safe_names",
     "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
     "metrics_path sweep_axis",
     "mesh_in_placed mesh_in_checks mesh_in_obj "

@@ -49,7 +49,7 @@ def test_parameters_cannot_be_changed() -> None:
         ({"length": 10.0}, "Lever.length must be below 10 m (got 10 m)."),
         ({"length": math.nan}, "Lever.length must be a finite number (got nan m)."),
         ({"length": -math.inf}, "Lever.length must be a finite number (got -inf m)."),
-        ({"length": 10**400}, "Lever.length must be a finite number (got a whole number beyond all floats)."),
+        ({"length": 10**400}, "Lever.length must be a finite number (got a whole number of 401 digits)."),
         ({"length": "long"}, "Lever.length must be a number (got 'long')."),
         ({"length": True}, "Lever.length must be a number (got True)."),
         ({"length": None}, "Lever.length must be a number (got None)."),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import OutputError
+from .npz import BROKEN_ZIP, Head, array, heads
+from .recorder import Recorder, available_memory
 from .run_folder import MARK
 from .scene import Scene
 from .scene_file import load
@@ -52,16 +53,32 @@ def read(folder: Path, *names: str) -> Run:
         raise OutputError(f"{folder} has no history.npz: its scene kept no record.")
     scene = load(folder / "scene.toml")
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            history = {name: stored[name] for name in ("time", *names)}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        with zipfile.ZipFile(path) as archive:
+            held = heads(archive, ("time", *names))
+            _refuse(path, scene, held)
+            return Run(scene, {name: array(archive, name) for name in held})
+    except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
-    known = {"n": scene.cells, "t": len(history["time"])}
-    for name, array in history.items():
+
+
+def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
+    """Refuse arrays that a run of this scene does not leave, before they are unpacked."""
+    rows = held["time"].shape[0] if held["time"].shape else 0
+    most = (scene.recorder or Recorder()).rows(scene.periods)
+    if not 0 < rows <= most:
+        rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
+        raise OutputError(f"{path} {rule} (got {rows:,}).")
+    known = {"n": scene.cells, "t": rows}
+    for name, head in held.items():
         shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
-        if array.shape != shape:
-            raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {array.shape}).")
-    return Run(scene, history)
+        if head.shape != shape:
+            raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
+        if head.kind.kind not in "if" or head.kind.itemsize > 8:
+            raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
+    size, free = sum(head.size for head in held.values()), available_memory()
+    if size > free:
+        rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
+        raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(held)}).")
 
 
 def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:

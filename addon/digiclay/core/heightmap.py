@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ParameterError
+from .heightmap_picture import MOST
 from .layout import ON_THE_SIDE, Grid
 from .relief import Placement, Tops
 
@@ -75,6 +76,9 @@ def height_map(name: str, values: NDArray[np.generic], value_length: float | Non
     shown = " x ".join(map(str, values.shape)) or "a single number"
     if values.ndim != 2 or min(values.shape) < 2:
         rule = "must hold at least 2 x 2 heights"
+        raise ParameterError("shape", "file", rule, f"{name}: {shown}")
+    if values.size > MOST:
+        rule = f"must hold at most {MOST // 1_000_000} million heights"
         raise ParameterError("shape", "file", rule, f"{name}: {shown}")
     if values.dtype.kind not in "biuf":
         raise ParameterError("shape", "file", "must hold numbers", f"{name}: {values.dtype}")

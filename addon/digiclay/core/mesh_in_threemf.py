@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import posixpath
 import zipfile
-import zlib
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from .mesh_in_limits import refusal, refuse_many_triangles, refuse_size
 from .mesh_in_placed import IDENTITY, joined, nested
+from .npz import BROKEN_ZIP
 
 __all__ = ["UNITS", "read"]
 
@@ -96,7 +96,7 @@ def read(path: Path) -> tuple[Floats, Indices, float]:
                 named = _take_in(archive, waiting.pop(), name, model, root) - known
                 waiting += sorted(named)
                 known |= named
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, KeyError) as error:
+    except (*BROKEN_ZIP, EOFError, KeyError) as error:
         said = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
         raise refusal(UNREADABLE, name, said) from None
     return *_placed(model, name), model.unit

@@ -29,6 +29,13 @@ UNITS: dict[str, tuple[float, str]] = {
     "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
 }  # fmt: skip
 
+#: How small, unless it is 0, and how large a number of a unit can be: far beyond all devices, and near enough
+#: to 1 that products of some of them stay finite and do not vanish.
+EXTENTS: dict[str, tuple[float, float]] = {
+    "m": (1e-12, 1e3), "s": (1e-9, 1e6), "Pa": (1e-6, 1e10), "N": (1e-12, 1e6), "N/m": (1e-6, 1e9),
+    "1/m": (1e-6, 1e9), "1/N": (1e-6, 1e9), "m/s": (1e-12, 1e6), "kg/m3": (1e-3, 1e6), "m2/s": (1e-12, 1e3),
+    "N s/m": (1e-9, 1e9), "": (1e-9, 1e9),
+}  # fmt: skip
 #: A number, and what stands behind it.
 WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
@@ -56,6 +63,8 @@ class Quantity:
         """Write `value` the way messages do, with the unit."""
         if isinstance(value, str):
             return repr(value)
+        if isinstance(value, int) and abs(value) > 10**18:
+            return f"a whole number of {int(value.bit_length() * math.log10(2.0)) + 1} digits"
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
         return f"{text} {self.unit}".rstrip()
 
@@ -65,7 +74,7 @@ class Quantity:
             return "must be one of " + ", ".join(self.choices)
         if not isinstance(value, (int, float)):
             return ""
-        if not math.isfinite(value):
+        if not _finite(value):
             return "must be a finite number"
         if self.above is not None and not value > self.above:
             return f"must be above {self.show(self.above)}"
@@ -75,6 +84,17 @@ class Quantity:
             return f"must be below {self.show(self.below)}"
         if self.at_most is not None and not value <= self.at_most:
             return f"must be at most {self.show(self.at_most)}"
+        return self._out_of_extent(value)
+
+    def _out_of_extent(self, value: float) -> str:
+        """Return the rule broken by a number within its bounds that is beyond all devices, or ``""``."""
+        least, most = EXTENTS[self.unit]
+        if self.at_most is None and self.below is None and value > most:
+            return f"must be at most {self.show(most)}"
+        if self.at_least is None and self.above is None and value < -most:
+            return f"must be at least {self.show(-most)}"
+        if self.above == 0.0 and value < least:
+            return f"must be at least {self.show(least)}"
         return ""
 
 
@@ -118,7 +138,7 @@ def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: A
     kind = type(default)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if kind is float and number:
-        return _finite(owner, name, known, value)
+        return float(value) if _finite(value) else value
     if kind is int and number and not isinstance(value, int) and math.isfinite(value) and value == int(value):
         return int(value)
     if kind is tuple and isinstance(value, (list, tuple)) and value:
@@ -130,13 +150,12 @@ def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: A
     raise ParameterError(type(owner).__name__, name, rule, repr(value))
 
 
-def _finite(owner: Parameters, name: str, known: Quantity, value: float) -> float:
-    """Return `value` as a float; a whole number too large for one is refused as not finite."""
+def _finite(value: float) -> bool:
+    """Tell whether a number is finite as a float; a whole number can be too large for one."""
     try:
-        return float(value)
+        return math.isfinite(value)
     except OverflowError:
-        rule, shown = "must be a finite number", "a whole number beyond all floats"
-        raise ParameterError(type(owner).__name__, name, rule, shown) from None
+        return False
 
 
 def parse(text: str, unit: str) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ from .errors import ParameterError, SceneError
 from .sample_file import found, named
 from .scene import Scene
 from .scene_table import resolve
+from .toml_text import LARGEST, tables
 
 __all__ = ["SAMPLES", "Setting", "find", "load", "read_table", "sample_names"]
 
@@ -80,8 +80,12 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
 def read_table(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
     try:
-        text = path.read_text(encoding="utf-8")
-        return tomllib.loads(text)
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise SceneError(f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB).")
+        # A byte order mark at the beginning is no part of the text.
+        text = path.read_text(encoding="utf-8-sig")
+        return tables(text)
     except OSError as error:
         raise SceneError(f"{path} cannot be read: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:
@@ -120,7 +124,7 @@ def _overridden(table: dict[str, Any], settings: Sequence[Setting]) -> dict[str,
 def _value(text: str) -> Any:
     """Read the value of a setting: TOML, or else a bare text."""
     try:
-        read = tomllib.loads(f"value = {text}")
+        read = tables(f"value = {text}")
     except (ValueError, RecursionError):
         return text.strip()
     return read["value"] if len(read) == 1 else text.strip()

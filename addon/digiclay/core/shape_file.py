@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from . import mesh_in
 from .actuator import Actuator
 from .errors import ParameterError, SceneError
@@ -13,6 +11,7 @@ from .heightmap import HeightMap, height_map
 from .heightmap_picture import PICTURES, pixels
 from .layout import Grid
 from .mesh_in import MESHES
+from .npz import mapped
 from .relief import Relief
 from .sample_file import found, named
 from .shape import AUTO, LENGTHS, Shape
@@ -76,14 +75,12 @@ def read(shape: Shape) -> Relief:
 def _array(path: Path) -> HeightMap:
     """Read an array of heights, m; its first row lies at the lowest y."""
     try:
-        values = np.load(path, allow_pickle=False, mmap_mode="r")
+        values = mapped(path)
     except OSError as error:
         said = error.strerror or "not an array"
         raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
-    except (ValueError, TypeError, EOFError):
+    except ValueError:
         raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
-    if not isinstance(values, np.ndarray):
-        raise ParameterError("shape", "file", "must hold one array of numbers", str(path))
     return height_map(path.name, values, value_length=1.0)
 
 

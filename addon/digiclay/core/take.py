@@ -8,7 +8,6 @@ the end is kept as well, so that a replay can prove that it came to the same.
 from __future__ import annotations
 
 import io
-import tomllib
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,11 +19,13 @@ from .assembly import assemble
 from .errors import OutputError, ParameterError
 from .keeping import packed, unpacked
 from .live import lived
+from .npz import BROKEN_ZIP, array, heads
 from .scene import Path, Scene, Waypoint
 from .scene_table import resolve, text
 from .simulation import begin
 from .state import State
 from .system import System
+from .toml_text import tables
 
 __all__ = ["Take", "as_scene", "finer", "from_bytes", "states", "to_bytes"]
 
@@ -32,6 +33,8 @@ Floats = NDArray[np.float64]
 
 #: Waypoints that lie this near to the straight way between their neighbours are left out, m and 1.
 STRAIGHT = 1e-12
+#: The arrays of a take.
+PARTS = ("scene", "start", "poses", "end")
 #: Most parts a physics step is cut into when a take is simulated once more.
 MOST_PARTS = 64
 
@@ -176,8 +179,13 @@ def from_bytes(data: bytes) -> Take:
         When it is damaged.
     """
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as read:
-            scene, start, poses, end = (read[name] for name in ("scene", "start", "poses", "end"))
-        return Take(resolve(tomllib.loads(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile, ParameterError) as error:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            held = heads(archive, PARTS)
+            # `to_bytes` does not compress: a take unpacks to no more than it is.
+            size = sum(head.size for head in held.values())
+            if size > len(data):
+                raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
+            scene, start, poses, end = (array(archive, name) for name in PARTS)
+        return Take(resolve(tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
+    except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError
 from ..layout import Grid
+from ..npz import mapped
 
 __all__ = ["FILE", "SHAPES", "check_shape", "from_file", "named"]
 
@@ -129,17 +130,19 @@ def from_file(field: str, path: str, grid: Grid, low: float, high: float, unit: 
     """
     plan = grid.layout
     try:
-        read = np.load(Path(path), allow_pickle=False)
-        values = np.asarray(read, dtype=np.float64)
+        read = mapped(Path(path))
+        shape = read.shape
+        # Only what fits the bed is read.
+        values = np.asarray(read if shape == (plan.rows, plan.columns) else 0.0, dtype=np.float64)
     except OSError as error:
         said = error.strerror or "not an array"
         raise ParameterError("control", field, "must be a file that can be read", f"{path}: {said}") from None
-    except (ValueError, TypeError, EOFError):
+    except (ValueError, TypeError):
         rule = "must be a file that holds one array of numbers"
         raise ParameterError("control", field, rule, path) from None
     if values.shape != (plan.rows, plan.columns):
         rule = f"must hold an array of the bed's {plan.rows} x {plan.columns} cells"
-        shown = " x ".join(map(str, values.shape)) or "a single number"
+        shown = " x ".join(map(str, shape)) or "a single number"
         raise ParameterError("control", field, rule, f"{path}: {shown}")
     wrong = values[~((values >= low) & (values <= high))]
     if wrong.size:

@@ -1,0 +1,104 @@
+"""Arrays in numpy's files, looked at by their heads before anything of them is unpacked."""
+
+from __future__ import annotations
+
+import math
+import struct
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["BROKEN_ZIP", "Head", "array", "heads", "mapped"]
+
+#: All that is raised over a zip that is damaged.
+BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError)
+#: All that numpy's readers raise over a head that makes no sense.
+BROKEN = (
+    ValueError, TypeError, KeyError, SyntaxError, RecursionError, MemoryError, OverflowError, EOFError,
+    tokenize.TokenError,
+)  # fmt: skip
+
+
+class Head(NamedTuple):
+    """What an array is, as its head says it."""
+
+    shape: tuple[int, ...]
+    kind: np.dtype[Any]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its numbers."""
+        return math.prod(self.shape) * self.kind.itemsize
+
+
+def heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
+    """Return what arrays of a file .npz are.
+
+    Raises
+    ------
+    KeyError
+        When one is not there.
+    ValueError
+        When a head cannot be read, or promises more, or less, than there is.
+    """
+    found = {}
+    for name in names:
+        entry = archive.getinfo(f"{name}.npy")
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{name} must be stored or deflated")
+        with archive.open(entry) as file:
+            head = _head(file, name)
+            held = entry.file_size - file.tell()
+        if head.size != held:
+            raise ValueError(f"{name} must have {head.size:,} bytes, as its head says (got {held:,})")
+        found[name] = head
+    return found
+
+
+def _head(file: IO[bytes], name: str) -> Head:
+    """Read the head of an array."""
+    try:
+        version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
+        readers: dict[Any, Any] = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }
+        shape, _, kind = readers[version](file)
+        if kind.hasobject or not all(isinstance(side, int) and side >= 0 for side in shape):
+            raise ValueError("no numbers")
+        return Head(tuple(shape), kind)
+    except BROKEN:
+        raise ValueError(f"{name} has no head of an array of numbers") from None
+
+
+def array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Read an array whose head has been looked at."""
+    with archive.open(f"{name}.npy") as file:
+        read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
+        return read
+
+
+def mapped(path: Path) -> NDArray[Any]:
+    """Return the array of a file .npy, still in the file: nothing is read before it is used.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    ValueError
+        When it holds no array of numbers.
+    """
+    try:
+        read = np.load(path, allow_pickle=False, mmap_mode="r")
+    except BROKEN:
+        raise ValueError("no array of numbers") from None
+    if not isinstance(read, np.ndarray):
+        read.close()
+        raise ValueError("no array of numbers")
+    return read

@@ -1,0 +1,47 @@
+"""TOML from outside: what would take a reader much more memory than the text has letters is refused first."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+__all__ = ["LARGEST", "tables"]
+
+#: Most bytes of a text: the heights of the largest bed, 20 million cells, packed, take 107 MB of them.
+LARGEST = 128_000_000
+#: Most names of a dotted key, each of which is kept with all before it; most letters of a word or a number.
+PARTS, LETTERS = 16, 1000
+_NAME = r'(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|\'[^\'\n]*+\')'
+#: What a text is made of, as far as it matters here: a key of too many names, a word, texts, a comment.
+#: Nothing is gone over twice: a text without an end reaches as far as it can.
+_PIECES = re.compile(
+    rf"(?P<key>{_NAME}(?:[ \t]*+\.[ \t]*+{_NAME}){{{PARTS}}})|(?P<word>[A-Za-z0-9_-]++)"
+    r'|"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?|\'\'\'(?:[^\']|\'(?!\'\'))*+(?:\'\'\')?'
+    r'|"(?:[^"\\\n]|\\.)*+"?|\'[^\'\n]*+\'?|#[^\n]*+',
+    re.DOTALL,
+)
+
+
+def tables(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises
+    ------
+    ValueError
+        When it is no TOML, or too long; the message ends with ``(at line ...)`` where that is known.
+    RecursionError
+        When lists or tables are nested too deeply.
+    """
+    if len(text) > LARGEST:
+        raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
+    for piece in _PIECES.finditer(text):
+        if piece["key"]:
+            said = f"a key must have at most {PARTS} names, got {piece['key'][:20]}..."
+        elif piece["word"] and len(piece["word"]) > LETTERS:
+            said = f"a word or number must have at most {LETTERS} letters, got {len(piece['word'])}"
+        else:
+            continue
+        line = text.count("\n", 0, piece.start()) + 1
+        raise ValueError(f"{said} (at line {line})")
+    return tomllib.loads(text)

@@ -1,0 +1,275 @@
+"""Small files that would take much memory are refused by what they say of themselves."""
+
+from __future__ import annotations
+
+import io
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.control.shapes import from_file
+from digiclay.core.errors import DigiclayError, OutputError, ParameterError, SceneError
+from digiclay.core.finished import read
+from digiclay.core.heightmap import height_map
+from digiclay.core.keeping import packed
+from digiclay.core.layout import Layout, grid
+from digiclay.core.recorder import available_memory
+from digiclay.core.scene_file import Setting, find, load, read_table
+from digiclay.core.scene_table import resolve, text
+from digiclay.core.shape import Shape
+from digiclay.core.shape_file import read as read_shape
+from digiclay.core.simulation import begin
+from digiclay.core.take import Take, from_bytes, to_bytes
+from digiclay.core.toml_text import LARGEST
+
+#: What refusing may take, bytes.
+LITTLE = 4_000_000
+
+
+def refused(work: Callable[[], Any]) -> str:
+    """Return what is said where something is refused; it is one line, and took little memory."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(DigiclayError) as caught:
+            work()
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(caught.value)
+    assert most < LITTLE
+    return str(caught.value)
+
+
+# Scene files
+
+
+@pytest.mark.parametrize(
+    "bomb",
+    [
+        ".".join(20_000 * ["a"]) + " = 1",
+        "[" + ".".join(20_000 * ["a"]) + "]",
+        "x = { " + " . ".join(20_000 * ['"a"']) + " = 1 }",
+        'x = """a\nb"""\n' + ".".join(20_000 * ["'a'"]) + " = 1",
+    ],
+)
+def test_a_key_of_20_000_names_is_refused_with_its_line(tmp_path: Path, bomb: str) -> None:
+    path = tmp_path / "bomb.toml"
+    path.write_text(f"# fine so far\n{bomb}\n", encoding="utf-8")
+    said = refused(lambda: load(path))
+    line = 2 + bomb.count("\n")
+    assert f"bomb.toml, line {line}: a key must have at most 16 names" in said
+
+
+@pytest.mark.parametrize(
+    "harmless",
+    [
+        'description = "a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t"',
+        "description = '''\\na.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t'''",
+        "# a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t",
+        "[shape]\nheights = '" + 5000 * "a" + "'",
+        'description = "\\"a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t"',
+    ],
+)
+def test_what_stands_in_a_text_is_no_key(tmp_path: Path, harmless: str) -> None:
+    (tmp_path / "my.toml").write_text(harmless, encoding="utf-8")
+    assert read_table(tmp_path / "my.toml").keys() <= {"description", "shape"}
+
+
+@pytest.mark.parametrize("quote", ['"\\', "'''a", '"""\\"', '"""a', "'a"])
+def test_a_text_without_an_end_is_not_gone_over_again_and_again(tmp_path: Path, quote: str) -> None:
+    # Quadratic, half a megabyte would take minutes: the whole run's limit of time would strike.
+    (tmp_path / "my.toml").write_text(100_001 * quote, encoding="utf-8")
+    assert refused(lambda: read_table(tmp_path / "my.toml"))
+
+
+def test_an_option_with_a_key_of_20_000_names_is_refused() -> None:
+    bomb = "{ " + ".".join(20_000 * ["a"]) + " = 1 }"
+    assert "fluid.density must be a number" in refused(
+        lambda: load(find("slow_press"), [Setting("fluid.density", bomb)])
+    )
+
+
+def test_a_scene_file_beyond_all_sizes_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "hole.toml").open("wb") as file:
+        file.truncate(LARGEST + 1)  # takes no room on the disk
+    assert "hole.toml must have at most 128 MB (got 128 MB)." in refused(lambda: load(tmp_path / "hole.toml"))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path: Path) -> None:
+    (tmp_path / "my.toml").write_text("name = 'marked'\n", encoding="utf-8-sig")
+    assert load(tmp_path / "my.toml").name == "marked"
+
+
+# Histories
+
+
+def history(folder: Path, **arrays: np.ndarray) -> Path:
+    """Leave what a run of four cells and ten periods leaves, with some arrays in place of its own."""
+    scene = resolve({"layout": {"rows": 2, "columns": 2}, "simulation": {"duration": 0.05}, "blister": SMALL})
+    (folder / "scene.toml").write_text(text(scene), encoding="utf-8")
+    own = {"time": np.arange(11) * 5e-3, "height": np.zeros((11, 4)), "force": np.zeros((11, 4))}
+    np.savez_compressed(folder / "history.npz", **(own | arrays))
+    return folder
+
+
+SMALL = {"radius": 2e-3, "edge_radius": 2.5e-3, "flat_radius": 1e-3}
+
+
+def test_a_history_as_its_scene_leaves_it_is_read(tmp_path: Path) -> None:
+    run = read(history(tmp_path), "height", "force")
+    assert {name: array.shape for name, array in run.history.items()} == {
+        "time": (11,), "height": (11, 4), "force": (11, 4),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [
+        ({"time": np.zeros(5_000_000)}, "the 11 rows of its scene's 10 control periods (got 5,000,000)"),
+        ({"time": np.zeros(0)}, "(got 0)"),
+        ({"height": np.zeros((11, 500_000))}, "the shape (11, 4) of its scene (got (11, 500000))"),
+        ({"height": np.zeros((500_000, 4))}, "height must have the shape (11, 4)"),
+        ({"height": np.zeros((11, 4), "V900")}, "height must hold numbers of at most 8 bytes"),
+        ({"height": np.zeros((11, 4), "c16")}, "height must hold numbers of at most 8 bytes"),
+    ],
+)  # fmt: skip
+def test_a_history_that_is_not_its_scenes_is_not_unpacked(
+    tmp_path: Path, arrays: dict[str, np.ndarray], said: str
+) -> None:
+    folder = history(tmp_path, **arrays)
+    assert (folder / "history.npz").stat().st_size < 200_000
+    assert said in refused(lambda: read(folder, "height"))
+
+
+def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path: Path) -> None:
+    # 20 million cells over 10 000 rows are what such a scene would leave: 1.6 TB.
+    scene = resolve({"layout": {"rows": 4472, "columns": 4472}, "simulation": {"duration": 50.0}})
+    (tmp_path / "scene.toml").write_text(text(scene), encoding="utf-8")
+    with zipfile.ZipFile(tmp_path / "history.npz", "w") as archive:
+        archive.writestr("time.npy", npy(np.zeros(10_001)))
+        archive.writestr("height.npy", head((10_001, 4472 * 4472)))
+    # The directory of a zip can say anything; ours says what the head does.
+    grown(tmp_path / "history.npz", "height.npy", 10_001 * 4472 * 4472 * 8)
+    said = refused(lambda: read(tmp_path, "height"))
+    assert "of free memory (got 1.6e+03 GB of time, height)" in said
+    assert available_memory() < 1.6e12
+
+
+def npy(array: np.ndarray) -> bytes:
+    """Return an array as a file of numpy's."""
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def head(shape: tuple[int, ...]) -> bytes:
+    """Return the head of a file of numpy's, without the numbers."""
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(file, {"shape": shape, "fortran_order": False, "descr": "<f8"})
+    return file.getvalue()
+
+
+def grown(path: Path, name: str, by: int) -> None:
+    """Let the directory of a zip say that a file in it has more bytes than it has."""
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.getinfo(name).file_size += by
+        archive.comment = b"written again"
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda data: data[: len(data) // 2],
+        lambda data: b"",
+        lambda data: data.replace(b"'descr': '<f8'", b"'descr': '|O8'"),
+        lambda data: data.replace(b"NUMPY", b"NIMPY"),
+        lambda data: data.replace(b"(11, 4)", b"(99, 4)"),
+        lambda data: data.replace(b"(11, 4)", b"(-1, 4)"),
+        lambda data: data.replace(b"(11, 4)", b"((((4))"),
+    ],
+)
+def test_a_damaged_history_is_refused(tmp_path: Path, spoil: Callable[[bytes], bytes]) -> None:
+    folder = history(tmp_path)
+    with np.load(folder / "history.npz") as arrays:
+        np.savez(folder / "plain.npz", **arrays)
+    (folder / "history.npz").write_bytes(spoil((folder / "plain.npz").read_bytes()))
+    assert "cannot be read as a run's history" in refused(lambda: read(folder, "height"))
+
+
+# Takes
+
+
+def take() -> bytes:
+    """Return a take of one period."""
+    scene = resolve({"layout": {"rows": 2, "columns": 2}, "blister": SMALL})
+    state = packed(assemble(scene), begin(assemble(scene)))
+    return to_bytes(Take(scene, state, np.tile([0.0, 0, 1, 1, 0, 0, 0], (2, 1)), state))
+
+
+def test_a_take_that_unpacks_to_more_than_it_is_is_refused() -> None:
+    data = io.BytesIO()
+    with np.load(io.BytesIO(take())) as arrays:
+        np.savez_compressed(data, **{**arrays, "poses": np.zeros((1_000_000, 7))})
+    assert len(data.getvalue()) < 100_000
+    said = refused(lambda: from_bytes(data.getvalue()))
+    assert "must unpack to at most its own" in said
+    assert "got 56," in said
+
+
+def test_a_take_with_a_scene_that_is_a_bomb_is_refused() -> None:
+    data = io.BytesIO()
+    bomb = (".".join(20_000 * ["a"]) + " = 1").encode()
+    with np.load(io.BytesIO(take())) as arrays:
+        np.savez(data, **{**arrays, "scene": np.frombuffer(bomb, np.uint8)})
+    assert "a key must have at most 16 names" in refused(lambda: from_bytes(data.getvalue()))
+
+
+def test_a_take_of_bytes_cut_or_turned_anywhere_is_read_or_refused() -> None:
+    whole, chance = take(), np.random.default_rng(5)
+    for _ in range(300):
+        data = bytearray(whole[: chance.integers(1, len(whole)) if chance.random() < 0.3 else None])
+        for place in chance.integers(0, len(data), chance.integers(1, 4)):
+            data[place] = chance.integers(0, 256)
+        try:
+            from_bytes(bytes(data))
+        except OutputError as error:
+            assert "\n" not in str(error)  # noqa: PT017
+
+
+# Arrays of heights
+
+
+@pytest.mark.parametrize(
+    "content",
+    [head((10**9, 10**9)), head((2, 2)), npy(np.zeros((2, 2)))[:-1], b"\x93NUMPY\x01\0\x76\0" + 118 * b"(",
+     b"\x93NUMPY\x01\0\x76\x1e" + 0x1E76 * b"-", b"\x93NUMPY\x09\0", b"PK\5\6" + bytes(18)],
+)  # fmt: skip
+def test_an_array_that_promises_more_than_there_is_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "heights.npy"
+    path.write_bytes(content)
+    assert "heights.npy" in refused(lambda: read_shape(Shape(file=str(path))))
+    bed = grid(Layout(2, 2, 3e-3))
+    assert "heights.npy" in refused(lambda: from_file("shape", str(path), bed, 0.0, 1.0, "m"))
+
+
+def test_an_array_of_too_many_heights_is_refused() -> None:
+    many = np.broadcast_to(np.float32(0.0), (20_000, 20_000))
+    with pytest.raises(ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"):
+        height_map("x.npy", many)
+
+
+def test_an_array_for_another_bed_is_not_read(tmp_path: Path) -> None:
+    np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
+    bed = grid(Layout(2, 2, 3e-3))
+    path = str(tmp_path / "large.npy")
+    assert "2 x 2 cells" in refused(lambda: from_file("shape", path, bed, 0.0, 1.0, "m"))
+
+
+def test_a_missing_scene_file_is_told() -> None:
+    with pytest.raises(SceneError, match="cannot be read"):
+        read_table(Path("nowhere.toml"))
