@@ -14,7 +14,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT / "addon"))
 
 from digiclay.core.methods import METHODS  # noqa: E402
-from digiclay.core.quantity import Parameters, quantities  # noqa: E402
+from digiclay.core.quantity import Parameters, Quantity, quantities  # noqa: E402
 from digiclay.core.scene import SECTIONS, parameters  # noqa: E402
 
 INTRODUCTION = """\
@@ -64,9 +64,10 @@ LEGEND = """\
 ## Parameters
 
 The name is the key in a scene file. Source: P the paper, S another source, D derived, C chosen. A default in
-brackets means several values, one after another.
+brackets means several values, one after another. A range is in the parameter's own unit; rules that join
+several parameters are not in it.
 """
-RULE = "|---|---|---|---|---|---|"
+RULE = "|---|---|---|---|---|---|---|"
 
 
 def shown(value: object) -> str:
@@ -76,16 +77,24 @@ def shown(value: object) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
+def bounds(known: Quantity) -> str:
+    """Write the range a parameter is taken from, ends included unless it says above or below."""
+    ends = (
+        ("above", known.above), ("from", known.at_least), ("below", known.below), ("up to", known.at_most),
+    )  # fmt: skip
+    return " ".join(f"{word} {shown(float(end))}" for word, end in ends if end is not None)
+
+
 def section(name: str, method: str) -> list[str]:
     """Return the lines of one section of a scene file."""
     kind: type[Parameters] = parameters(name, method)
     title = f"### [{name}]" + (f' with method = "{method}"' if name == "control" else "")
-    lines = ["", title, "", "| Symbol | Name | Unit | Meaning | Default | Source |", RULE]
+    lines = ["", title, "", "| Symbol | Name | Unit | Meaning | Range | Default | Source |", RULE]
     defaults = kind()
     for field, known in quantities(kind).items():
         meaning = known.doc + (f" ({', '.join(known.choices)})" if known.choices else "")
         default = shown(getattr(defaults, field))
-        cells = (known.symbol, f"`{name}.{field}`", known.unit, meaning, default, known.source)
+        cells = (known.symbol, f"`{name}.{field}`", known.unit, meaning, bounds(known), default, known.source)
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 
