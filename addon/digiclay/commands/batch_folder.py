@@ -74,7 +74,8 @@ class Folder:
             same = all((run / name).read_bytes() == content for name, content in self.files(job).items())
         except OSError:
             return False
-        return same and is_whole(run, job.scene, (read_json(run / TIMING) or {}).get(FILES))
+        timing = read_json(run / TIMING)
+        return same and timing is not None and is_whole(run, job.scene, timing.get(FILES))
 
     def describe(self, job: Job) -> None:
         """Write the files of a job."""

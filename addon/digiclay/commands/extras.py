@@ -20,7 +20,16 @@ from .export import exported, file_names
 from .plot import PLOTS, plotted
 from .render import PICTURE, picture
 
-__all__ = ["Extra", "as_typed", "drawn", "make_extras", "meshes", "pictured", "tell_left_out"]
+__all__ = [
+    "Extra",
+    "as_typed",
+    "drawn",
+    "make_extras",
+    "meshes",
+    "pictured",
+    "tell_left_out",
+    "tell_stopped_before",
+]
 
 History = Mapping[str, NDArray[Any]]
 
@@ -93,9 +102,12 @@ def make_extras(
 def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
     """Say which files a stop has left out, and the command that makes them."""
     for extra in left_out:
-        verb = "is" if len(extra.files) == 1 else "are"
-        said = f"{', '.join(extra.files)} {verb} missing: {as_typed(extra.later(run))}"
-        print(said, file=sys.stderr)
+        tell_stopped_before(", ".join(extra.files), extra.later(run))
+
+
+def tell_stopped_before(what: str, later: Sequence[str]) -> None:
+    """Say what a stop has left out, and the arguments of the command that makes it."""
+    print(f"Stopped before {what}; to have it: {as_typed(later)}", file=sys.stderr)
 
 
 def as_typed(arguments: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
 from .exit_codes import STOPPED
 from .export import formats
-from .extras import Extra, as_typed, drawn, make_extras, meshes, pictured, tell_left_out
+from .extras import Extra, drawn, make_extras, meshes, pictured, tell_left_out, tell_stopped_before
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
 from .stop import Stop
@@ -89,8 +89,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         print(result.summary())
         print(f"written to {out}")
     if unjudged:
-        again = as_typed(["run", str(out), "--out", str(out), "--overwrite"])
-        print(f"The estimates of its errors are missing: {again}", file=sys.stderr)
+        tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
     tell_left_out(left_out, out)
     if wrong:
         raise wrong[0]

@@ -1,0 +1,177 @@
+"""Stopped between simulating and the end: what is missing is named, and what is named makes it."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.commands import form as form_command
+from digiclay.commands import run as run_command
+from digiclay.commands.extras import as_typed
+
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
+#: A folder whose name a shell would take for several words.
+OUT = "first run"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(SCENE, tmp_path, monkeypatch)
+
+
+def stop_before(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> None:
+    """Send Ctrl-C when a command comes to a step."""
+    step: Callable[..., Any] = getattr(module, name)
+
+    def interrupted(*given: Any, **known: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return step(*given, **known)
+
+    monkeypatch.setattr(module, name, interrupted)
+
+
+def told(said: str) -> dict[str, list[str]]:
+    """Return the commands that stderr names, by the files they make."""
+    pairs = (line.removeprefix("Stopped before ").split("; to have it: ") for line in said.splitlines())
+    return {what: shlex.split(command)[1:] for what, command in pairs}
+
+
+def files(folder: Path) -> set[str]:
+    """Return the files in a folder and below it."""
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_run_stopped_before_its_extras_names_them_and_how_to_make_them(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wanted = ["--export", "stl,obj", "--plots", "--no-errors"]
+    assert main(["run", "my.toml", "--out", "whole", "--quiet", *wanted]) == 0
+    with monkeypatch.context() as patched:
+        stop_before(patched, run_command, "save")
+        assert main(["run", "my.toml", "--out", OUT, "--quiet", *wanted]) == 130
+    commands = told(capsys.readouterr().err)
+    assert list(commands) == ["surface.stl, surface.obj", "session.png, surface.png"]
+    assert files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
+    assert not json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
+    for command in commands.values():
+        assert main(command) == 0
+    assert files(here / OUT) == files(here / "whole")
+    for name in ("surface.stl", "surface.obj", "session.png"):
+        assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
+
+
+def test_a_run_stopped_before_its_errors_are_estimated_says_so(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patched:
+        stop_before(patched, run_command, "estimated")
+        assert main(["run", "my.toml", "--out", OUT]) == 130
+    out, err = capsys.readouterr()
+    assert f"written to {OUT}" in out
+    commands = told(err)
+    assert list(commands) == ["its errors were estimated"]
+    assert "height_error" not in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert main(commands["its errors were estimated"]) == 0
+    assert "height_error" in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert left(here) == [OUT]
+
+
+def test_a_run_stopped_within_its_session_can_be_exported_as_it_says(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begin = run_command.run
+
+    def interrupted(*given: Any, **known: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return begin(*given, **known)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run_command, "run", interrupted)
+        assert main(["run", "my.toml", "--out", OUT, "--quiet", "--export", "ply"]) == 130
+    commands = told(capsys.readouterr().err)
+    assert list(commands) == ["surface.ply"]
+    assert main(commands["surface.ply"]) == 0
+    assert (here / OUT / "surface.ply").is_file()
+
+
+def test_form_ends_at_the_first_signal_and_names_what_is_missing(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
+    assert main(["form", "dome", "--out", "whole", *small]) == 0
+    with monkeypatch.context() as patched:
+        stop_before(patched, form_command, "save")
+        assert main(["form", "dome", "--out", OUT, *small]) == 130
+    commands = told(capsys.readouterr().err)
+    assert list(commands) == ["surface.stl", "displayed/surface.stl"]
+    assert files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
+    for command in commands.values():
+        assert main(command) == 0
+    assert files(here / OUT) == files(here / "whole")
+    for name in ("surface.stl", "displayed/surface.stl"):
+        assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
+
+
+@pytest.mark.parametrize("step", ["scene_of", "fitted_to", "shaped"])
+def test_form_that_is_stopped_before_its_session_writes_nothing(
+    step: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stop_before(monkeypatch, form_command, step)
+    # The session would take hours.
+    assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
+    assert capsys.readouterr().err == "Stopped; no file is half-written.\n"
+    assert left(here) == []
+
+
+def test_plot_draws_what_a_run_with_plots_draws(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", "--plots"]) == 0
+    assert main(["plot", "o", "--out", "new/pictures"]) == 0
+    assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
+    assert files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
+    assert (here / "new/pictures/surface.png").read_bytes() == (here / "o/surface.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("settings", "arguments", "said"),
+    [
+        ([], ["plot", "nowhere"], "nowhere is no run's folder"),
+        (["--set", "layout.rows=1"], ["plot", "o"], "plot needs at least 2 x 2 cells"),
+        (["--set", "recorder=absent"], ["plot", "o"], "o has no history.npz"),
+        ([], ["plot", "o", "--out", "my.toml/x"], "my.toml/x cannot be a folder: my.toml is a file."),
+    ],
+)
+def test_what_cannot_be_plotted_is_told_in_a_line(
+    settings: list[str], arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors", *settings]) == 0
+    assert main(arguments) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_a_command_is_written_as_a_shell_takes_it() -> None:
+    assert as_typed(["export", "it's mine", "--format", "stl,obj"]) == (
+        "digiclay export 'it'\"'\"'s mine' --format stl,obj"
+    )
+
+
+def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) -> None:
+    from digiclay.commands.extras import meshes
+    from digiclay.core.finished import row_at
+    from digiclay.core.scene_file import load
+
+    times = np.arange(2000) * 0.005
+    for row in (1, 777, 1999):
+        later = meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed").later(Path("o"))
+        assert row_at({"time": times}, float(later[later.index("--time") + 1]), "--time") == row

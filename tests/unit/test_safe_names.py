@@ -1,0 +1,199 @@
+"""Names of jobs: safe on every file system, no two alike, and inside the batch's folder whatever is named."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands.batch_folder import opened
+from digiclay.core.errors import OutputError
+from digiclay.core.finished import is_whole
+from digiclay.core.jobs import batch
+from digiclay.core.safe_names import LONGEST, alike, name_of, safe_name, unique_names
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
+#: As a JOBS file's first lines.
+QUICK = 'errors = false\nexport = ["stl"]\n'
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder within an empty one; in both is the same scene."""
+    work = tmp_path / "work"
+    work.mkdir()
+    (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
+    return folder_with(SCENE, work, monkeypatch)
+
+
+@given(st.text())
+@example("..")
+@example(" . ")
+@example("-x")
+@example("con.toml")
+@example("LPT²")
+@example("ü" * 200)
+@example("\ud800")
+def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
+    name = safe_name(text)
+    assert 0 < len(name.encode()) <= LONGEST + 1  # a device's name gets one letter more
+    assert not set(name) & set('/\\:*?"<>|\0 ')
+    assert name[0] not in ".-"
+    assert name[-1] != "."
+    assert name.partition(".")[0].lower() not in ("con", "nul", "lpt²")
+    assert safe_name(name) == name
+
+
+@given(st.lists(st.sampled_from(["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a."])))
+def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) -> None:
+    names = unique_names(texts)
+    assert len({alike(name) for name in names}) == len(texts)
+    safe = [safe_name(text) for text in texts]
+    for place, name in enumerate(names):
+        first = [alike(one) for one in safe].index(alike(safe[place]))
+        assert (name == safe[place]) == (first == place)
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("../scene.toml", "above"),
+        ("scene.toml", "here"),
+        ("./scene.toml", "here"),
+        ("sub/../scene.toml", "here"),
+        ("a b.toml", "a b"),
+        ("/scene.toml", "scene"),
+        ("...toml", "scene"),
+    ],
+)
+def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(
+    path: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "above" / "here"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    assert name_of(Path(path)) == name
+
+
+def test_very_long_names_that_differ_at_their_ends_stay_apart() -> None:
+    names = unique_names(["x" * 300 + end for end in ("a", "b", "b")])
+    assert len(set(names)) == 3
+    assert max(map(len, names)) <= LONGEST
+
+
+ODD = ["../scene.toml", "..", ".", "scene.toml", "my.toml", "ü b .toml", "con.toml", "-x.toml", "MY.toml"]
+
+
+def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("scene.toml", "ü b .toml", "con.toml", "-x.toml", "MY.toml", "x" * 200 + ".toml"):
+        Path(name).write_text(SCENE, encoding="utf-8")
+    absolute = str(here.parent / "scene.toml")
+    for said, name in (
+        *zip(
+            ODD,
+            [safe_name(here.parent.name)] * 2 + ["work"] * 2 + ["my", "ü_b_", "_con", "x", "MY"],
+            strict=True,
+        ),
+        (absolute, safe_name(here.parent.name)),
+        ("x" * 200 + ".toml", safe_name("x" * 200)),
+    ):
+        (job,) = batch(jobs_file(f"scenes = [{said!r}]")).jobs
+        assert job.name == name, said
+    jobs = jobs_file(f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}')
+    assert main(["batch", str(jobs), "--out", "o", "--quiet"]) == 2
+    assert "scenes must not name one thing twice" in capsys.readouterr().err
+    before = set(here.parent.rglob("*"))
+    jobs = jobs_file(f'scenes = ["..", "scene.toml", "MY.toml", "my.toml"]\n{QUICK}')
+    assert main(["batch", str(jobs), "--out", "o", "--jobs", "2"]) == 0
+    assert "4 of 4 jobs done" in capsys.readouterr().out
+    names = sorted(path.name for path in Path("o/runs").iterdir())
+    assert names == sorted([safe_name(here.parent.name), "work", "MY", "my-2"])
+    for name in names:
+        assert (Path("o/runs", name, "surface.stl")).stat().st_size > 84
+    new = {path.relative_to(here) for path in here.parent.rglob("*") if path not in before}
+    assert {path.parts[0] for path in new} == {"o"}
+
+
+def jobs_file(said: str) -> Path:
+    """Write the JOBS file."""
+    path = Path("jobs.toml")
+    path.write_text(said.replace("'", '"'), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("folder", ["jobs", "runs", "logs", "runs/my"])
+def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(
+    folder: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "away").mkdir()
+    assert main(["batch", str(jobs_file('scenes = ["my.toml"]')), "--out", "o", "--prepare", "--quiet"]) == 0
+    link = here / "o" / folder
+    shutil.rmtree(link, ignore_errors=True)
+    link.symlink_to(here / "away")
+    assert main(["batch", "jobs.toml", "--out", "o", "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert f"{Path('o', folder)} leads out of o, to " in said
+    assert said.count("\n") == 1
+    assert list((here / "away").iterdir()) == []
+
+
+def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
+    (here / "away").mkdir()
+    (here / "o").symlink_to(here / "away")
+    assert main(sweep) == 0
+    assert len(list((here / "away" / "points").iterdir())) == 2
+    shutil.rmtree(here / "away" / "points")
+    (here / "else").mkdir()
+    (here / "away" / "points").symlink_to(here / "else")
+    assert main(sweep) == 2
+    assert "points leads out of o" in capsys.readouterr().err
+    assert list((here / "else").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "harm", ["surface.stl", "history.npz", "metrics.json", "thumbnail.png", "timing.json"]
+)
+def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done(harm: str) -> None:
+    made = batch(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
+    (job,) = made.jobs
+    assert main(["batch", "jobs.toml", "--out", "o", "--prepare", "--quiet"]) == 0
+    assert main(["job", "o/jobs/my", "--quiet"]) == 0
+    with opened(Path("o"), made) as folder:
+        assert folder.is_done(job)
+        path = Path("o/runs/my", harm)
+        content = path.read_bytes()
+        path.write_bytes(content[: len(content) // 2])
+        whole_without_sizes = harm not in ("history.npz", "metrics.json")
+        assert not folder.is_done(job)
+        assert job.scene is not None
+        assert is_whole(folder.run(job), job.scene) == whole_without_sizes
+        path.unlink()
+        assert not folder.is_done(job)
+        assert is_whole(folder.run(job), job.scene) == whole_without_sizes
+
+
+def test_a_job_of_which_the_folder_is_no_folder_is_refused(here: Path) -> None:
+    made = batch(jobs_file('scenes = ["my.toml"]'))
+    with opened(Path("o"), made) as folder:
+        Path("o/jobs/my").write_text("a file", encoding="utf-8")
+        with pytest.raises(OutputError, match="cannot be made"):
+            folder.describe(made.jobs[0])
+
+
+@pytest.mark.parametrize("word", [".", "../work", "scene.toml"])
+def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> None:
+    shutil.copy("my.toml", "scene.toml")
+    assert main(["run", word, "--quiet", "--no-errors"]) == 0
+    assert Path("work/metrics.json").is_file()
+    assert not os.path.lexists("metrics.json")
