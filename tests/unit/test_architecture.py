@@ -27,7 +27,8 @@ LEVELS = (
     "metrics_path sweep_axis",
     "mesh_in_placed mesh_in_checks mesh_in_obj "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods export run_folder metrics_force metrics_trace control.servo control.blister",
+    "formed methods export run_folder metrics_force metrics_trace control.servo control.blister "
+    "control.noise_floor",
     "mesh_in_gltf mesh_in_threemf feature_crest pins_solid skin_membrane metrics series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",

@@ -108,7 +108,8 @@ def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     if known.observer == "valve":
         from .observer import valve_observer
 
-        sensors = valve_observer(sensors, cell, line, scene.simulation.control_period)
+        period = scene.simulation.control_period
+        sensors = valve_observer(sensors, cell, line, period, known.motion_floor)
     if known.delay:
         sensors = Delayed(sensors, known.delay, scene.actuator.rest_height)
     return sensors
@@ -120,7 +121,9 @@ def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
         return None
     from .control.bench import Bench
 
-    bench = Bench(bed, cell, scene.simulation.control_period, scene.blister)
+    known = scene.sensors
+    floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
+    bench = Bench(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
     if scene.shape:
         from .shape_file import fitted_to
 

@@ -49,6 +49,9 @@ class ValveObserver:
         Opening at the nodes of a period, then at its end, from the lag's rows and the commands.
     weights : ndarray (nodes,)
         Of the nodes; their sum is 1.
+    doubt : float
+        How far the difference of two heights may be off, m: an estimate that is no larger than what this
+        comes to is none.
     """
 
     inner: Sensors
@@ -57,6 +60,7 @@ class ValveObserver:
     length: int
     response: Floats
     weights: Floats
+    doubt: float = 0.0
 
     @property
     def rows(self) -> int:
@@ -102,12 +106,15 @@ class ValveObserver:
             conductance = self.cell.flow.conductance(opening, pressure - force / actuator.area)
             open_for = np.where(told, weights @ conductance, 1.0)
             found = actuator.area * (weights @ (conductance * pressure) - flow) / open_for
-            force = np.where(told, np.maximum(found, 0.0), held)
+            least = actuator.area**2 * self.doubt / self.period / open_for
+            force = np.where(told, np.where(found > least, found, 0.0), held)
         return force
 
 
-def valve_observer(inner: Sensors, cell: Cell, line: Queue, period: float) -> ValveObserver:
-    """Make an observer for cells whose commands go through `line`."""
+def valve_observer(
+    inner: Sensors, cell: Cell, line: Queue, period: float, doubt: float = 0.0
+) -> ValveObserver:
+    """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)  # type: ignore[no-untyped-call]
     edges = (0.0, line.cut, period) if line.cut else (0.0, period)
     times: list[float] = []
@@ -116,4 +123,4 @@ def valve_observer(inner: Sensors, cell: Cell, line: Queue, period: float) -> Va
         times += (start + (end - start) * 0.5 * (1.0 + nodes)).tolist()
         shares += ((end - start) / period * 0.5 * weights).tolist()
     response = cell.lag.response(line, [*times, period])
-    return ValveObserver(inner, cell, period, line.length, response, np.array(shares))
+    return ValveObserver(inner, cell, period, line.length, response, np.array(shares), doubt)

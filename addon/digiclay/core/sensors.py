@@ -7,6 +7,7 @@ part without an effect is not put in.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ __all__ = ["Delayed", "Noisy", "Quantised", "Sensing", "normals"]
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
+#: Standard deviations from which on a reading is no noise: by chance one in 3.5 million is above.
+SURE = 5.0
 #: Finest step a reading can have: below it, rounding errors are larger than the step.
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
@@ -53,6 +56,24 @@ class Sensing(Parameters):
         choices=("none", "valve"),
     )
     seed: int = quantity(0, "which noise", at_least=0, at_most=2**63 - 1)
+
+    @property
+    def force_floor(self) -> float:
+        """Force from which on the reading of a cell is no noise, N; 0 without noise.
+
+        Rounding takes a reading up by half a step at most.
+        """
+        return SURE * self.force_noise + 0.5 * self.force_step if self.force_noise else 0.0
+
+    @property
+    def height_floor(self) -> float:
+        """Distance from which on a height that is read is not the true one, m; 0 of perfect sensors."""
+        return SURE * self.height_noise + 0.5 * self.height_step
+
+    @property
+    def motion_floor(self) -> float:
+        """Distance from which on the difference of two heights that are read is motion, m."""
+        return SURE * math.sqrt(2.0) * self.height_noise + self.height_step
 
     def check(self) -> None:
         """A step is worth rounding to; an observer leaves no force sensor to be noisy."""

@@ -29,6 +29,10 @@ class Bench:
         For the methods that form one.
     heights : ndarray (n,) or None
         The shape from outside that is to be displayed, m.
+    force_floor : float
+        Force from which on the reading of a cell is no noise, N; see `sensors.Sensing`.
+    height_floor : float
+        How far the reading of a height may be off, m.
     """
 
     grid: Grid
@@ -36,6 +40,8 @@ class Bench:
     period: float
     blister: Blister | None = None
     heights: NDArray[np.float64] | None = None
+    force_floor: float = 0.0
+    height_floor: float = 0.0
 
     @property
     def lift(self) -> float:

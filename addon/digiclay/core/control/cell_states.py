@@ -24,6 +24,7 @@ from ..set_point import SetPoint
 from ..some import some
 from .bench import Bench
 from .blister import Blister
+from .noise_floor import above, check_told
 from .servo import locked_under_overload
 from .tracking import Tracking
 from .transitions import BY_FORCE, BY_PLACE, changed
@@ -129,6 +130,8 @@ class CellStatesControl:
         Force the high reservoir can lift, N.
     period : float
         Control period, s.
+    floor : float
+        Force from which on the reading of a cell is no noise, N.
     """
 
     parameters: CellStates
@@ -136,6 +139,7 @@ class CellStatesControl:
     actuator: Actuator
     lift: float
     period: float
+    floor: float = 0.0
 
     name = "cell_states"
     #: A cell remembers how many periods it has been critical.
@@ -147,7 +151,7 @@ class CellStatesControl:
 
     def attend(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
         """Find where the finger presses, and how far its blister can reach; see `places.Controller`."""
-        pressed = touched.force > 0.0
+        pressed = touched.force > self._least(touched.mode)
         if not some(pressed):
             return memory, None
         force, place = touched.force[pressed], touched.place[:, pressed]
@@ -164,8 +168,9 @@ class CellStatesControl:
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
         """Let every cell follow its arrows, then act as its mode says; see `places.Controller`."""
+        seen = seen._replace(force=above(seen.force, self.floor)) if self.floor else seen
         mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
-        under = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
+        under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
         if some(under):
@@ -178,6 +183,14 @@ class CellStatesControl:
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
         return memory, Orders(target, mode, self._commands(seen, mode, target, under))
+
+    def _least(self, mode: Modes) -> Floats | float:
+        """Return the force above which a cell counts to the patch, N: one that follows keeps what it reads.
+
+        The forces fall below the noise when the finger rises; the few readings that happen not to would
+        draw the centroid to and fro.
+        """
+        return np.where(_under_finger(mode), 0.0, self.floor) if self.floor else 0.0
 
     def _by_force(self, seen: Measurement) -> dict[str, NDArray[np.bool_]]:
         """Return the conditions of `BY_FORCE`."""
@@ -243,7 +256,15 @@ class CellStatesControl:
         return locked_under_overload(command, seen.force, self.lift)
 
 
+def _under_finger(mode: Modes) -> NDArray[np.bool_]:
+    """Tell which cells follow the force, or did until just now."""
+    following: NDArray[np.bool_] = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
+    return following
+
+
 def assembled(parameters: CellStates, bench: Bench) -> CellStatesControl:
     """Put Method II together for a device; the bench has a blister."""
     assert bench.blister is not None
-    return CellStatesControl(parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period)
+    asked, floor = parameters.force_setpoint, bench.force_floor
+    check_told(asked, "force_setpoint", asked, floor)
+    return CellStatesControl(parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, floor)

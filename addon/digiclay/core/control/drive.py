@@ -7,7 +7,8 @@ of a pin without load, and heights come in exponentially.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ..methods import ControlParameters
 from ..physics import Cell
 from ..quantity import quantity
 
-__all__ = ["Drive", "DriveParameters", "TouchParameters", "check_damping", "drive"]
+__all__ = ["Drive", "DriveParameters", "TouchParameters", "check_damping", "drive", "feeling_above"]
 
 Floats = NDArray[np.float64]
 
@@ -41,11 +42,19 @@ class TouchParameters(DriveParameters):
 
     felt_force: float = quantity(
         5e-3,
-        "force from which on a cell counts as touched; five times the sensors' noise or more",
+        "force from which on a cell counts as touched; never below five times the sensors' noise",
         unit="N",
         symbol="F_0",
         above=0.0,
     )
+
+
+Touch = TypeVar("Touch", bound=TouchParameters)
+
+
+def feeling_above(floor: float, parameters: Touch) -> Touch:
+    """Return parameters whose `felt_force` is at least the noise floor, N; with a floor of 0 the same ones."""
+    return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
 
 @dataclass(frozen=True, eq=False)

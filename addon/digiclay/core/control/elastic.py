@@ -12,7 +12,7 @@ from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
 from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive
+from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .servo import locked_under_overload
 
 __all__ = ["Elastic", "ElasticControl", "assembled"]
@@ -69,4 +69,5 @@ class ElasticControl:
 def assembled(parameters: Elastic, bench: Bench) -> ElasticControl:
     """Put the elastic behaviour together for a device."""
     check_damping(parameters.damping, bench.cell, bench.period, parameters.stiffness)
+    parameters = feeling_above(bench.force_floor, parameters)
     return ElasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))

@@ -14,8 +14,9 @@ from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
 from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive
+from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .neighbours import cells_at
+from .noise_floor import check_told
 from .servo import locked_under_overload
 from .shapes import FILE, check_shape, from_file, named
 
@@ -106,6 +107,8 @@ def assembled(parameters: ForceDisplay, bench: Bench) -> ForceDisplayControl:
         When the field asks for more than a pin can press or less than it feels, or its file cannot be used.
     """
     check_damping(parameters.damping, bench.cell, bench.period)
+    check_told(parameters.force, "force", parameters.force, bench.force_floor)
+    parameters = feeling_above(bench.force_floor, parameters)
     if parameters.field.endswith(FILE):
         field = from_file("field", parameters.field, bench.grid, parameters.felt_force, bench.lift, "N")
     else:

@@ -13,7 +13,8 @@ from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
 from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive
+from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
+from .noise_floor import check_told
 from .servo import locked_under_overload
 
 __all__ = ["Plastic", "PlasticControl", "assembled"]
@@ -82,4 +83,6 @@ class PlasticControl:
 def assembled(parameters: Plastic, bench: Bench) -> PlasticControl:
     """Put the plastic behaviour together for a device."""
     check_damping(parameters.damping, bench.cell, bench.period)
+    check_told(parameters.yield_force, "yield_force", parameters.yield_force, bench.force_floor)
+    parameters = feeling_above(bench.force_floor, parameters)
     return PlasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))

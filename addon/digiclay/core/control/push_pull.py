@@ -7,7 +7,7 @@ cycle where it began; a loaded one rises less than it falls, drifts off, and so 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,6 +154,9 @@ def assembled(parameters: PushPull, bench: Bench) -> PushPullControl:
         When a pin's own ripple would be a touch.
     """
     ripple = parameters.listening_speed * bench.period
+    if bench.height_floor:
+        threshold = max(parameters.threshold, ripple + bench.height_floor)
+        parameters = replace(parameters, threshold=threshold)
     if not parameters.threshold > ripple:
         rule = f"must be above a listening pin's own way in a control period, {ripple:g} m"
         raise ParameterError("control", "threshold", rule, f"{parameters.threshold:g} m")

@@ -23,6 +23,7 @@ from .bench import Bench
 from .blister import Blister
 from .master import Master, Phase, VirtualMaster
 from .master_cell import MasterCell, master_cell
+from .noise_floor import above, check_told
 from .servo import locked_under_overload
 from .travel import ABEAM, Heading, beyond, seen_from, turned
 
@@ -30,6 +31,9 @@ __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assemble
 
 Floats = NDArray[np.float64]
 
+#: Share of the total force that the cell in the middle of the finger carries while shaping, at least: 0.23
+#: to 0.33 of it measured while the finger moves slowly.
+HEAVIEST = 0.25
 CODES = (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
 
 
@@ -49,6 +53,8 @@ class VirtualMasterControl:
         Control period, s.
     model : MasterCell
         The master's own cylinder and valve.
+    floor : float
+        Force from which on the reading of a cell is no noise, N.
     """
 
     parameters: VirtualMaster
@@ -57,6 +63,7 @@ class VirtualMasterControl:
     lift: float
     period: float
     model: MasterCell
+    floor: float = 0.0
 
     name = "virtual_master"
     rows = 0
@@ -69,14 +76,27 @@ class VirtualMasterControl:
         self, memory: Master, touched: Measurement
     ) -> tuple[Master, tuple[float, float, float] | None]:
         """Locate the finger and move the master; see `places.Controller`."""
-        pressed = touched.place.dot(touched.force).tolist()[:3]
-        master = self._locate(memory, touched, pressed)
+        felt = touched._replace(force=above(touched.force, self.floor)) if self.floor else touched
+        pressed = felt.place.dot(felt.force).tolist()[:3]
+        master = self._locate(memory, felt, pressed)
         if master.phase is Phase.IDLE:
             return master, None
         # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
         given_up = self._given_up(master)
-        master = master._replace(height=master.felt) if given_up else self._lead(master, pressed[0])
+        master = master._replace(height=master.felt) if given_up else self._lead(master, self._total(memory, touched, pressed[0]))
         return master, (master.x, master.y, self.blister.edge_radius)
+
+    def _total(self, master: Master, touched: Measurement, felt: float) -> float:
+        """Return the force that is controlled, N: of all touched cells, see docs/equations.md.
+
+        Next to the master noise stays in, for what is below the floor adds up; farther off only what is no
+        noise counts. `felt` is the sum of that everywhere, N.
+        """
+        if not self.floor or master.phase is Phase.IDLE:
+            return felt
+        off = beyond(master.x, master.y, self.parameters.radius * (1.0 + ON_THE_SIDE), touched.place)
+        hidden = (off <= 0.0) & (touched.force < self.floor)
+        return felt + float(touched.force.dot(hidden))
 
     def _locate(self, master: Master, touched: Measurement, pressed: list[float]) -> Master:
         """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
@@ -163,7 +183,7 @@ class VirtualMasterControl:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         blister, stroke = self.blister, self.actuator.stroke
         limits = filled(self.limits, seen.target.size)
-        none, abeam, radius, edge_radius, flat_radius, behind, release, *_ = limits
+        _, abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = limits
         edge, formed, spring, follow, froze = filled(CODES, seen.target.size, np.int8)
         distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
         inside = distance <= radius
@@ -187,7 +207,7 @@ class VirtualMasterControl:
             np.putmask(profile, frozen, outgrown(profile, seen.target))
         target = seen.target.copy()
         np.putmask(target, inside, profile)
-        touched = seen.force > none
+        touched = seen.force > noise
         touched &= inside
         np.putmask(mode, inside, formed)
         np.putmask(mode, touched, follow if master.phase is Phase.SHAPING else spring)
@@ -199,7 +219,7 @@ class VirtualMasterControl:
     def limits(self) -> tuple[float, ...]:
         """What tells cells apart.
 
-        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; a force, N; the
+        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the
         height of a pin at rest, and how far from it one counts as formed, m. Circles are widened
         by a billionth, for the sake of cells exactly on them.
         """
@@ -210,13 +230,16 @@ class VirtualMasterControl:
         )
         known = self.parameters
         rest = self.actuator.rest_height, known.dead_band
-        return (0.0, -ABEAM, *wider, known.behind, known.release_force, *rest)
+        release = max(known.release_force, self.floor)
+        return (0.0, -ABEAM, *wider, known.behind, release, self.floor, *rest)
 
 
 def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:
     """Put Method I together for a device; the bench has a blister."""
     assert bench.blister is not None
+    asked = parameters.force_setpoint
+    check_told(HEAVIEST * asked, "force_setpoint", asked, bench.force_floor)
     model = master_cell(bench.cell, bench.period)
     return VirtualMasterControl(
-        parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, model
+        parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, model, bench.force_floor
     )

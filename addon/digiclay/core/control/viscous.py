@@ -18,7 +18,7 @@ from ..modes import Mode
 from ..places import Measurement, Orders
 from ..quantity import quantity
 from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive
+from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .neighbours import Exchange, cells_at, exchange
 from .servo import locked_under_overload
 
@@ -146,7 +146,7 @@ def assembled(parameters: Viscous, bench: Bench) -> ViscousControl:
     """Put the viscous behaviour together for a device."""
     check_damping(parameters.damping, bench.cell, bench.period)
     return ViscousControl(
-        parameters,
+        feeling_above(bench.force_floor, parameters),
         bench.grid,
         bench.cell.actuator,
         drive(parameters, bench.cell, bench.period),
