@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from digiclay.core.actuator import Actuator
@@ -156,3 +158,26 @@ def test_thresholds_in_the_wrong_order_are_refused(given: dict[str, float], said
     with pytest.raises(ParameterError) as caught:
         CellStates(**given)
     assert str(caught.value) == said
+
+
+#: With sensors whose noise hides forces below 25 mN.
+NOISY = replace(CONTROL, floor=25e-3)
+
+
+def test_a_force_that_may_be_noise_makes_no_blister_cell_follow() -> None:
+    measured = seen({MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3}, {MIDDLE + 2: Mode.BLISTER})
+    measured.mode[[MIDDLE, MIDDLE - 2]] = Mode.FORCE_FOLLOW, Mode.BLISTER
+    mode = NOISY.command(NOISY.begin(), measured)[1].mode
+    assert [mode[MIDDLE + 2], mode[MIDDLE - 2]] == [Mode.BLISTER, Mode.FORCE_FOLLOW]
+
+
+def test_a_force_that_may_be_noise_moves_no_spring() -> None:
+    assert NOISY.command(NOISY.begin(), seen({MIDDLE: 24e-3}))[1].command[MIDDLE] == 0.0
+
+
+def test_a_following_cell_counts_to_the_patch_with_what_it_reads() -> None:
+    # A finger that rises presses with less than the noise hides; where it is shows nevertheless.
+    following = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.CRITICAL}
+    measured = seen({MIDDLE: 10e-3, MIDDLE + 1: 10e-3, MIDDLE + 3: 24e-3}, following)
+    memory, _ = NOISY.attend(NOISY.begin(), measured)
+    assert memory.x - BED.x[MIDDLE] == pytest.approx(1.5e-3, abs=1e-12)

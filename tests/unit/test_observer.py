@@ -140,8 +140,14 @@ def test_an_unloaded_pin_reads_no_force() -> None:
 
 
 def test_a_force_is_never_below_zero() -> None:
-    _, read = watched(scene(AWAY, sensors={"observer": "valve", "height_noise": 1e-4}), down_and_up)
+    _, read = watched(scene(sensors={"observer": "valve", "height_noise": 1e-6}), down_and_up)
     assert read.min() == 0.0 < read.max()
+
+
+@pytest.mark.parametrize("inexact", [{"height_noise": 1e-6}, {"height_step": 5e-6}])
+def test_heights_that_are_not_exact_press_on_no_free_pin(inexact: dict[str, float]) -> None:
+    _, read = watched(scene(AWAY, sensors={"observer": "valve", **inexact}), down_and_up)
+    assert read.max() == 0.0
 
 
 def test_the_last_estimate_is_held_while_the_valve_is_shut() -> None:

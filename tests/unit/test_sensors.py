@@ -127,6 +127,25 @@ def test_noise_is_quantised_too() -> None:
     assert np.unique(force).size > 3
 
 
+@pytest.mark.parametrize(
+    ("noise", "step", "floor"), [(2e-3, 0.0, 10e-3), (2e-3, 3e-3, 11.5e-3), (0.0, 3e-3, 0.0)]
+)
+def test_the_floor_is_five_standard_deviations_and_half_a_step(
+    noise: float, step: float, floor: float
+) -> None:
+    assert Sensing(force_noise=noise, force_step=step).force_floor == pytest.approx(floor, abs=1e-12)
+
+
+@pytest.mark.parametrize("step", [0.0, 1.0, 4.0, 7.5])
+def test_no_force_reads_below_the_floor(step: float) -> None:
+    known = Sensing(force_noise=1.0, force_step=step)
+    sensors = Quantised(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
+    nothing = (truth(period, [0.0] * CELLS, [0.04] * CELLS) for period in range(PERIODS))
+    read = max(float(sensors.measure(np.empty((0, CELLS)), seen)[0].max()) for seen in nothing)
+    # 200 000 readings: one in 3.5 million would be above.
+    assert read < known.force_floor
+
+
 def readings(sensors: Sensors, truths: Sequence[Truth], skipped: Sequence[int] = ()) -> Floats:
     """Return what is read of cell 0, (t, 2), where it takes no part in some periods."""
     own, read = np.zeros((sensors.rows, 1)), []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster, VirtualMasterControl
@@ -186,3 +188,41 @@ def test_a_finger_that_comes_down_elsewhere_starts_anew_and_is_counted() -> None
 def test_a_new_touch_after_a_loss_starts_the_virtual_spring() -> None:
     memory, _ = control().attend(alone(master(), 11), touched((3, 3, 0.1)))
     assert (memory.phase, memory.losses) == (Phase.SPRING, 1)
+
+
+# Noise
+
+
+def hearing(floor: float) -> VirtualMasterControl:
+    """Return Method I with sensors whose noise hides forces below a floor, N."""
+    return replace(control(), floor=floor)
+
+
+def test_a_reading_that_may_be_noise_is_no_finger() -> None:
+    phases = [hearing(10e-3).attend(Master(), touched((0, 0, force)))[0].phase for force in (9.9e-3, 10.1e-3)]
+    assert phases == [Phase.IDLE, Phase.SPRING]
+
+
+def test_readings_that_may_be_noise_do_not_add_up_to_a_finger() -> None:
+    memory, _ = hearing(10e-3).attend(Master(), touched(*[(3.0 * x, 0, 9e-3) for x in range(5)]))
+    assert memory.phase is Phase.IDLE
+
+
+def test_noise_does_not_draw_the_master_aside() -> None:
+    memory, _ = hearing(10e-3).attend(master(), touched((0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)))
+    assert memory.x == pytest.approx(-1.5e-3, abs=1e-15)
+
+
+def test_what_noise_hides_next_to_the_master_counts_to_the_force_that_is_held() -> None:
+    # 0.39 N are felt: what lies below the floor makes it more or less than the set point, 0.4 N.
+    start = master(phase=Phase.SPRING)
+    near = [touched((0, 0, 0.39), (6, 0, hidden), (-6, 0, 9e-3)) for hidden in (2e-3, -2e-3)]
+    phases = [hearing(10e-3).attend(start, seen)[0].phase for seen in near]
+    assert phases == [Phase.SHAPING, Phase.SPRING]
+
+
+def test_what_noise_hides_farther_off_does_not() -> None:
+    start = master(phase=Phase.SPRING)
+    far = [touched((0, 0, 0.395), (9, 0, force)) for force in (9.9e-3, 10.1e-3)]
+    phases = [hearing(10e-3).attend(start, seen)[0].phase for seen in far]
+    assert phases == [Phase.SPRING, Phase.SHAPING]

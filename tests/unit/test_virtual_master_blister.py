@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister
@@ -169,6 +171,15 @@ def test_a_frozen_cell_that_is_pressed_is_freed() -> None:
     _, orders = created(master(*EAST), seen)
     assert orders.mode[at(-12, 0)] == Mode.FORCE_FOLLOW
     assert orders.target[at(-12, 0)] != 44e-3
+
+
+def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
+    noisy = replace(make_system(Layout(15, 15), control=VirtualMaster()).controller, floor=30e-3)
+    seen = ridge(Mode.BLISTER)
+    seen.mode[at(-12, 0)] = Mode.FROZEN
+    seen.force[[at(-12, 0), at(0, 0)]] = 29e-3
+    mode = noisy.command(master(*EAST), seen)[1].mode
+    assert [mode[at(-12, 0)], mode[at(0, 0)]] == [Mode.FROZEN, Mode.BLISTER]
 
 
 def test_a_frozen_cell_out_of_the_blister_holds() -> None:

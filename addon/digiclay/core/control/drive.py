@@ -53,7 +53,7 @@ Touch = TypeVar("Touch", bound=TouchParameters)
 
 
 def feeling_above(floor: float, parameters: Touch) -> Touch:
-    """Return parameters whose `felt_force` is at least the noise floor, N; with a floor of 0 the same ones."""
+    """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0."""
     return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def above(force: Floats, floor: float) -> Floats:
-    """Return the forces that are no noise, N, shape (m,); 0 for the others. A floor of 0 leaves all as they are."""
+    """Return forces, N, shape (m,), but 0 where they may be noise; all as they are for a floor of 0."""
     return np.where(force >= floor, force, 0.0) if floor else force
 
 

@@ -83,7 +83,11 @@ class VirtualMasterControl:
             return master, None
         # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
         given_up = self._given_up(master)
-        master = master._replace(height=master.felt) if given_up else self._lead(master, self._total(memory, touched, pressed[0]))
+        master = (
+            master._replace(height=master.felt)
+            if given_up
+            else self._lead(master, self._total(memory, touched, pressed[0]))
+        )
         return master, (master.x, master.y, self.blister.edge_radius)
 
     def _total(self, master: Master, touched: Measurement, felt: float) -> float:

@@ -1,0 +1,89 @@
+"""Sessions under noisy sensors: who is followed, and what stays where it is."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.errors import ParameterError
+from digiclay.core.modes import Mode
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.session import Result, run
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Press, lift a blister, drag it level, let go, and hang beside the ridge without touching it.
+WAY = [
+    (0.0, -9, 0, 43), (0.7, -9, 0, 36), (1.0, -9, 0, 36), (2.2, -9, 0, 42), (2.4, -9, 0, 42),
+    (4.0, 9, 0, 42), (4.1, 9, 0, 42), (4.3, 9, 0, 62), (4.5, 0, 15, 62), (4.7, 0, 15, 43), (5.0, 0, 15, 43),
+]  # fmt: skip
+#: A finger that presses one spot and goes.
+PRESS = [(0.0, 0, 0, 43), (0.4, 0, 0, 38.5), (0.6, 0, 0, 38.5), (0.8, 0, 0, 46), (1.0, 0, 0, 46)]
+
+
+def scene(method: str, way: list[Any] = WAY, cells: int = 15, **sensors: float) -> Scene:
+    """Return a short session of a method with noisy sensors."""
+    points = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
+    table: dict[str, Any] = {
+        "layout": {"rows": cells, "columns": cells},
+        "control": {"method": method},
+        "trajectory": {"waypoints": points},
+    }
+    return resolve({**table, **({"sensors": sensors} if sensors else {})})
+
+
+@cache
+def session(method: str, noise: float, seed: int = 0) -> Result:
+    """Run the session under so many millinewtons of noise."""
+    sensors = {"force_noise": noise * 1e-3, "seed": seed} if noise else {}
+    return run(scene(method, **sensors))
+
+
+@pytest.mark.parametrize("noise", [0, 1, 2, 5])
+def test_method_i_loses_the_finger_at_lift_off_alone_whatever_the_noise(noise: int) -> None:
+    assert session("virtual_master", noise).metrics["losses"] == 1
+
+
+@pytest.mark.parametrize("noise", [0, 1, 2, 5])
+def test_method_ii_loses_the_finger_at_lift_off_alone_whatever_the_noise(noise: int) -> None:
+    assert session("cell_states", noise).metrics["losses"] == 1
+
+
+def test_noise_does_not_bias_the_force_that_is_held() -> None:
+    quiet, noisy = (session("virtual_master", noise).metrics for noise in (0, 5))
+    # Force that only what is above the floor adds up to is 40 mN off at 5 mN of noise.
+    assert noisy["rfd"] == pytest.approx(quiet["rfd"], abs=5e-3)
+
+
+def test_a_finger_that_hangs_over_the_bed_is_not_felt_in_the_noise() -> None:
+    modes = session("virtual_master", 5).history["mode"]
+    assert not np.isin(modes[-60:], (Mode.SPRING, Mode.FORCE_FOLLOW)).any()
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
+def test_noise_is_no_touch(method: str) -> None:
+    history = run(scene(method, PRESS, 11, force_noise=4e-3)).history
+    assert history is not None
+    untouched = history["force"].max(axis=0) == 0.0
+    touched_modes = (Mode.SPRING, Mode.FORCE_FOLLOW)
+    assert not np.isin(history["mode"][:, untouched], touched_modes).any()
+
+
+def test_pins_that_listen_are_not_touched_by_the_noise_of_their_heights() -> None:
+    history = run(scene("push_pull", [(0.0, 0, 0, 46), (1.0, 0, 0, 46)], 7, height_noise=50e-6)).history
+    assert history is not None
+    assert not (history["mode"] == Mode.FORCE_FOLLOW).any()
+
+
+@pytest.mark.parametrize(
+    ("method", "noise"),
+    [("virtual_master", 21.0), ("cell_states", 8.1), ("plastic", 6.1), ("force_display", 10.1)],
+)
+def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method: str, noise: float) -> None:
+    with pytest.raises(ParameterError, match=r"^sensors\.force_noise must .*control\.\w+ = [\d.]+ N") as told:
+        run(scene(method, force_noise=noise * 1e-3))
+    assert "\n" not in str(told.value)
