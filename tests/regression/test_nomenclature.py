@@ -8,6 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from digiclay.core.methods import METHODS
 from digiclay.core.quantity import quantities
 from digiclay.core.scene import SECTIONS, parameters
 
@@ -36,6 +37,18 @@ def test_every_parameter_is_on_the_page_of_symbols(maker: ModuleType, section: s
     text = maker.PAGE.read_text(encoding="utf-8")
     names = quantities(parameters(section, "virtual_master"))
     assert [name for name in names if f"`{section}.{name}`" not in text] == []
+
+
+def test_every_parameter_says_where_it_comes_from(maker: ModuleType) -> None:
+    named = {
+        source
+        for section in SECTIONS
+        for method in METHODS
+        for known in quantities(parameters(section, method)).values()
+        for source in known.source.split(", ")
+    }
+    # The paper, derived, chosen; or a reference that the page lists, and none that nobody takes a value from.
+    assert named - {"P", "D", "C"} == set(maker.REFERENCES)
 
 
 def test_all_fourteen_equations_have_a_row() -> None:

@@ -75,6 +75,12 @@ def test_shaping_starts_at_the_set_point() -> None:
     assert phases == [Phase.SPRING, Phase.SHAPING]
 
 
+def test_the_force_that_is_held_is_that_on_all_touched_cells() -> None:
+    # The centroid takes those within r_VM of the master alone; a flank pressed farther off is felt as well.
+    memory, _ = control().attend(master(phase=Phase.SPRING), touched((0, 0, 0.3), (9, 0, 0.11)))
+    assert (memory.phase, memory.x) == (Phase.SHAPING, 0.0)
+
+
 def test_shaping_goes_on_below_the_set_point() -> None:
     assert control().attend(master(), touched((0, 0, 0.1)))[0].phase is Phase.SHAPING
 

@@ -45,8 +45,8 @@ class Quantity:
     """What is known of one parameter besides its value.
 
     Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
-    ``at_least`` and ``at_most`` inclusive. `source` is one of P (paper), S (other
-    source), D (derived), C (chosen).
+    ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
+    the key of a reference in docs/nomenclature.md; several are set apart by commas.
     """
 
     doc: str

@@ -25,10 +25,14 @@ class Relaxation(Parameters):
     """
 
     times: tuple[float, ...] = quantity(
-        (4e-3, 70e-3, 1.4), "relaxation times", unit="s", symbol="1/ν_i", source="S", at_least=1e-9
+        (4e-3, 70e-3, 1.4), "relaxation times", unit="s", symbol="1/ν_i", source="Pawluk 1999", at_least=1e-9
     )
     weights: tuple[float, ...] = quantity(
-        (0.08, 0.62, 0.20, 0.10), "weights c0 (what stays) to c_k", symbol="c_i", at_least=0.0
+        (0.08, 0.62, 0.20, 0.10),
+        "weights c0 (what stays) to c_k",
+        symbol="c_i",
+        source="C, Jindrich 2003",
+        at_least=0.0,
     )
 
     def check(self) -> None:

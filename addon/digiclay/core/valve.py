@@ -28,7 +28,7 @@ class Valve(Parameters):
 
     orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", symbol="d_o", above=0.0)
     stroke: float = quantity(
-        30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="S", above=0.0
+        30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="Roberts 2003", above=0.0
     )
     discharge_slope: float = quantity(
         0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0

@@ -53,7 +53,7 @@ class ShapeDisplay(DriveParameters):
     refresh: str = quantity(
         "one_time",
         "how the surface gets there",
-        source="S",
+        source="Zhu 2005",
         choices=("one_time", "gradual", "approximate_gradual"),
     )
     surfaces: int = quantity(
