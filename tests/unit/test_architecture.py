@@ -35,7 +35,7 @@ LEVELS = (
     "sheet shape_file physics scene stack.control",
     "features system observer steppers.bernoulli_plan steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
-    "control.drive control.neighbours control.shapes stack.physics",
+    "control.drive control.neighbours control.shapes stack.physics strained",
     "steppers.bernoulli stack.gathering stack.fingers stack.bernoulli",
     "feature_solids "
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from digiclay.core.assembly import assemble
+from digiclay.core.physics import speeds
 from digiclay.core.scene_file import find, load
 from digiclay.core.stack.columns import Floats
 from digiclay.core.stack.physics import Extrapolated
@@ -24,10 +26,14 @@ class Set:
         driven[:] = self.value
 
 
-def extrapolated(coarse: float, fine: float) -> Floats:
-    """Return the rows of one cell in one run that two movements set to these values come to."""
-    driven = np.ones((CELL.rows + 1, 1, 1))
-    Extrapolated(CELL, Set(coarse), Set(fine)).advance(driven, np.empty((3, 1, 1)))
+def extrapolated(coarse: float, fine: float, period: float = 10.0, under: float = 1.0) -> Floats:
+    """Return the rows of a cell in one run, a pin 40 mm high, that two movements set to these come to.
+
+    In a period as long as this a valve lets a pin go anywhere.
+    """
+    driven = np.full((CELL.rows + 1, 1, 1), 40e-3)
+    unders, periods = np.full((3, 1, 1), under), np.array([period])
+    Extrapolated(CELL, Set(coarse), Set(fine), speeds(CELL), periods).advance(driven, unders)
     return driven[:, 0, 0]
 
 
@@ -47,3 +53,9 @@ def test_no_pin_goes_beyond_an_end_stop() -> None:
 
 def test_no_filter_of_the_pulp_pulls() -> None:
     assert (extrapolated(3e-3, 0.0)[CELL.pulp_rows] == 0.0).all()
+
+
+def test_no_pin_goes_beyond_where_its_valve_and_the_finger_can_take_it() -> None:
+    way = speeds(CELL).rise * 5e-3
+    assert extrapolated(40e-3, 40e-3 + way, period=5e-3)[0] == pytest.approx(40e-3 + way, rel=1e-12)
+    assert extrapolated(40e-3, 30e-3, period=5e-3, under=30e-3)[0] == pytest.approx(30e-3 - way, rel=1e-12)

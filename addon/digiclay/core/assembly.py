@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from .delay import Queue, queue
 from .layout import Grid, grid
 from .methods import METHODS
-from .physics import Cell
+from .physics import Cell, speeds
 from .places import Controller, Flow, Lag, Pulp, Sensors, Stepper
 from .scene import STEPPERS, Scene, part
 from .state import Rows
@@ -42,7 +40,7 @@ def assemble(scene: Scene) -> System:
         stepper=stepper,
         period=period,
         plan=stepper.plan(cell, line, steps),
-        fastest=_fastest(cell),
+        fastest=speeds(cell).rise,
         instants=instants,
         rows=Rows(
             cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0
@@ -136,9 +134,3 @@ def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
 
         controller = handover(scene.shape, bench, controller, recovers=METHODS[scene.method].recovers)
     return controller
-
-
-def _fastest(cell: Cell) -> float:
-    """Return the speed at which a pin without load rises through an open valve, m/s."""
-    highest = max(cell.supply.high, cell.supply.low, 0.0)
-    return float(cell.flow.flow(np.ones(1), np.array([highest]))[0]) / cell.actuator.area

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LARGE", "TINY", "careful", "crossed", "pressed"]
+__all__ = ["LARGE", "TINY", "careful", "crossed", "not_zero", "pressed"]
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ LARGE = 300.0
 TINY = 1e-200
 #: Below this logarithm log(1 + q) is q, to the last bit.
 _ROUNDED_AWAY = -36.8
+#: Stands for zero where a way so short is divided by, and what comes of it is multiplied by a growth.
+_STILL = 1e-100
 _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 
 
@@ -53,22 +55,39 @@ def pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     return q
 
 
-def careful(exponent: Floats, growth: Floats, decay: Floats) -> tuple[Floats, Floats]:
-    """Return relief and mean of exp(e), like `pressed`, at any size of the exponents.
+def careful(
+    exponent: Floats, growth: Floats, slip: Floats, decay: Floats, pulp: Floats
+) -> tuple[Floats, Floats]:
+    """Return the load's part of the way, and the mean of exp(e), of cells that stay under load, at any size.
 
     Parameters
     ----------
     exponent : ndarray (k,)
         e(0).
-    growth, decay : ndarray (k,)
-        As for `pressed`.
+    growth, slip, decay, pulp : ndarray (k,)
+        See the module; `decay` not below `TINY`, `growth` not zero (`TINY` will do).
+
+    Returns
+    -------
+    push : ndarray (k,)
+        ``e(1) - e(0) - slip``, never above 0 where e(0) is above ``log(pulp)``.
+    mean : ndarray (k,)
     """
     size = np.abs(growth)
-    log_grown = exponent + np.maximum(growth, 0.0) + np.log(-np.expm1(-size) / size)
-    log_q = np.log(decay) + log_grown
+    part, log_decay = np.log(-np.expm1(-size) / size), np.log(decay)
+    log_grown = exponent + np.maximum(growth, 0.0) + part
+    log_q = log_decay + log_grown
     relief = np.logaddexp(0.0, log_q)
     ratio = np.where(log_q < _ROUNDED_AWAY, 0.0, np.log(np.maximum(relief, TINY)) - log_q)
-    return relief, np.exp(np.minimum(log_grown + ratio, 2.0 * LARGE))
+    push, log_mean = decay * pulp - relief, log_grown + ratio
+    vast = size > LARGE
+    if np.count_nonzero(vast):
+        # Relief and growth are both so large that their difference has lost its digits: e(1) without them.
+        after = np.minimum(growth, 0.0) - np.logaddexp(-np.maximum(growth, 0.0), log_decay + exponent + part)
+        np.putmask(push, vast, after - slip)
+        lasting = vast & (log_q >= _ROUNDED_AWAY)
+        np.putmask(log_mean, lasting, np.log(np.maximum(relief, TINY)) - log_decay)
+    return push, np.exp(np.minimum(log_mean, LARGE))
 
 
 def crossed(
@@ -91,20 +110,21 @@ def crossed(
     mean : ndarray (k,)
         Mean of ``max(exp(e) - 1, 0)``.
     """
-    growth = _not_zero(slip + decay * pulp)
-    slip = _not_zero(slip)
+    growth = not_zero(slip + decay * pulp)
+    slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
     threshold = np.log(pulp)
     share = _loaded_share(threshold - exponent, slip, growth)
     # A parabola's mean height over the loaded part, from its mean over all of it.
     exponent = exponent + bow * share * (3.0 - 2.0 * share)
     share = _loaded_share(threshold - exponent, slip, growth)
     start = np.maximum(exponent, threshold)
-    relief, mean = careful(start, _not_zero(share * growth), np.maximum(share * decay, TINY))
+    few = np.maximum(share * decay, TINY)
+    push, mean = careful(start, not_zero(share * growth), share * slip, few, pulp)
     # Without load the exponent goes straight, up to the threshold or down from it; below 0 is a gap.
     apart = np.maximum(np.abs((1.0 - share) * slip), TINY)
     closed = np.minimum(apart, np.maximum(threshold, 0.0))
     alone = (pulp * -np.expm1(-closed) - closed) / apart
-    return share * decay * pulp - relief, share * (mean - 1.0) + (1.0 - share) * alone
+    return push, share * (mean - 1.0) + (1.0 - share) * alone
 
 
 def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
@@ -116,6 +136,6 @@ def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
     return share
 
 
-def _not_zero(values: Floats) -> Floats:
+def not_zero(values: Floats) -> Floats:
     """Return `values` with `TINY` for zeros."""
     return np.where(np.abs(values) < TINY, TINY, values)

@@ -15,8 +15,8 @@ __all__ = ["Contact"]
 
 Floats = NDArray[np.float64]
 
-#: Beyond this exponent the spring is stiffer than anything physical; the cut keeps it finite.
-LARGEST_EXPONENT = 500.0
+#: Beyond this exponent the spring is stiffer than anything physical; the cut keeps even its square finite.
+LARGEST_EXPONENT = 300.0
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from .places import Flow, Lag
 from .supply import Supply
 from .touch import Touch, force
 
-__all__ = ["GAUSS", "Cell", "felt", "rates"]
+__all__ = ["GAUSS", "Cell", "Speeds", "felt", "rates", "speeds"]
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,48 @@ class Cell:
     def rows(self) -> int:
         """State rows a cell needs."""
         return 1 + (self.touch.pulp.rows if self.touch else 0) + self.lag.rows
+
+
+@dataclass(frozen=True, eq=False)
+class Speeds:
+    """How fast a pin without load goes through a valve that is wide open, m/s.
+
+    Attributes
+    ----------
+    fall, rise : float or ndarray (b,)
+        Its velocity downwards, not above 0, and upwards, not below.
+    """
+
+    fall: Any
+    rise: Any
+
+    def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
+        """Return the lowest and the highest that pins can be after some time, (n, ..), m.
+
+        A finger that pushes a pin leaves it where they part, and what it does not push goes no faster than
+        its valve lets it: no pin is lower than it was, or than the finger came, by more than such a fall.
+
+        Parameters
+        ----------
+        height : ndarray (n, ..)
+            Heights before, m.
+        under : ndarray (p, k, ..)
+            Undersides of the finger over the first k, m.
+        time : float or ndarray (b,)
+            s.
+        """
+        lowest = height.copy()
+        near = lowest[: under.shape[1]]
+        np.minimum(near, under.min(axis=0), out=near)
+        lowest += time * self.fall
+        return lowest, height + time * self.rise
+
+
+def speeds(cell: Cell) -> Speeds:
+    """Work out how fast a pin without load goes at most."""
+    wide = np.array([-1.0, 1.0])
+    ways = cell.flow.flow(wide, cell.supply.pressure(wide)) / cell.actuator.area
+    return Speeds(min(float(ways.min()), 0.0), max(float(ways.max()), 0.0))
 
 
 def felt(cell: Cell, y: Floats, under: Floats) -> Floats:

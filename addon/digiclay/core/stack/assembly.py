@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..assembly import assemble
-from ..physics import Cell
+from ..physics import Cell, Speeds, speeds
 from ..scene import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from ..system import System
@@ -111,8 +111,13 @@ def _movement(systems: Sequence[System], cell: Cell) -> Movement:
         return Alike(first.stepper, first.plan)
     from .bernoulli import unlike
 
-    coarse, *fine = (unlike(cell, of_all) for of_all in plans)
-    return Extrapolated(cell, coarse, *fine) if fine else coarse
+    movements = [unlike(cell, of_all) for of_all in plans]
+    if len(movements) == 1:
+        return movements[0]
+    alone = [speeds(system.cell) for system in systems]
+    of_all_runs = Speeds(numbers([one.fall for one in alone]), numbers([one.rise for one in alone]))
+    coarse, fine = movements
+    return Extrapolated(cell, coarse, fine, of_all_runs, numbers([system.period for system in systems]))
 
 
 def _as(first: System, system: System) -> bool:

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..closed_form import TINY, careful, crossed, pressed
+from ..closed_form import TINY, crossed, pressed
 from ..contact import LARGEST_EXPONENT
 from ..physics import Cell
-from ..steppers.bernoulli_plan import BernoulliPlan
+from ..steppers.bernoulli_plan import MOST_BOW, BernoulliPlan
+from ..strained import Strain, loaded_way
 from .columns import Floats, mapped, numbers
 
 __all__ = ["Unlike", "unlike"]
@@ -39,7 +40,9 @@ class Unlike:
     laminar : bool
         No unloaded valve is turbulent; the same in all runs.
     exponent, offset, to_load, hard : ndarray (b,)
-        `offset` is m x0; `hard` the last of `BernoulliPlan.numbers`.
+        `offset` is m x0; `hard` the first of `BernoulliPlan.limits`.
+    vast : float
+        That of the growth.
     """
 
     cell: Cell
@@ -56,6 +59,7 @@ class Unlike:
     offset: Floats
     to_load: Floats
     hard: Floats
+    vast: float
 
     def advance(self, driven: Floats, under: Floats) -> None:
         """Move a block of cells on, in place; see `physics.Movement`.
@@ -143,30 +147,31 @@ class Unlike:
         growth += TINY
         end: Floats = exponent + slip
         bent = exponent + bow
-        strained = np.maximum(bent, end) >= self.hard
-        if not np.count_nonzero(strained):
+        strained = np.maximum(np.maximum(bent, end), exponent) >= self.hard
+        strained |= growth >= self.vast
+        strained |= bow >= MOST_BOW
+        if np.count_nonzero(strained):
+            np.putmask(bow, strained, 0.0)
+            seen = Strain(
+                openings, self.weights[self.nodes[s]], exponent, bow, path[count + s], lift, relaxed, idle
+            )
+            rise[:], end, mean[:] = loaded_way(self.cell, m, self.to_load, self.shares[s], seen)
+            _tension(end, last)
+        else:
             relief = pressed(np.exp(bent, bent), growth, stiffness)
             np.divide(relief, stiffness, mean)
-        else:
-            decay, rise[:] = self._loaded_valve(s, openings, exponent, relaxed, lift)
-            slip = m * rise - lift
-            stiffness = np.where(idle, TINY, decay)
-            push = stiffness * relaxed
-            np.putmask(bow, strained, 0.0)
-            relief, mean[:] = careful(exponent + bow, push + slip + TINY, stiffness)
-            end = exponent + slip
-        push -= relief
-        mean -= 1.0
-        end += push
-        _tension(end, last)
-        crossing = (last <= lost) != idle
-        if np.count_nonzero(crossing):
-            parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
-            push[crossing], mean[crossing] = crossed(*parts)
-            end = exponent + slip + push
+            mean -= 1.0
+            push -= relief
+            end += push
             _tension(end, last)
-        push /= m
-        rise += push
+            crossing = (last <= lost) != idle
+            if np.count_nonzero(crossing):
+                parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+                push[crossing], mean[crossing] = crossed(*parts)
+                end = exponent + slip + push
+                _tension(end, last)
+            push /= m
+            rise += push
         rise += height
         np.maximum(rise, 0.0, out=height)
         np.minimum(height, self.cell.actuator.stroke, out=height)
@@ -182,26 +187,6 @@ class Unlike:
         # is the force.
         np.maximum(mapped(self.transition[s], work)[:-1], 0.0, out=filters)
         return end
-
-    def _loaded_valve(
-        self, s: int, openings: Floats, exponent: Floats, relaxed: Floats, lift: Floats
-    ) -> tuple[Floats, Floats]:
-        """Return decay and free rise of step s where the load decides on the valve's branch."""
-        m, weights = self.exponent, self.weights[self.nodes[s]]
-        to_load = self.to_load * self.shares[s]
-        pressure = self.cell.supply.pressure(openings)
-        grown = middle = _grown(exponent)
-        for _ in range(2):
-            load = to_load * np.maximum(middle - relaxed, 0.0)
-            conductance = self.cell.flow.conductance(openings, pressure - load)
-            decay = m * to_load * (weights * conductance).sum(axis=0) + TINY
-            free = (weights * conductance * pressure).sum(axis=0)
-            slip = m * free - lift
-            growth = slip + decay * relaxed + TINY
-            relief, _ = careful(exponent, growth, decay)
-            way = np.where(grown > relaxed, growth - relief, slip)
-            middle = 0.5 * (grown + _grown(exponent + way))
-        return decay, free
 
 
 def unlike(cell: Cell, plans: Sequence[BernoulliPlan]) -> Unlike:
@@ -221,7 +206,8 @@ def unlike(cell: Cell, plans: Sequence[BernoulliPlan]) -> Unlike:
         exponent=numbers([plan.numbers[0] for plan in plans]),
         offset=numbers([plan.numbers[1] for plan in plans]),
         to_load=numbers([plan.to_load for plan in plans]),
-        hard=numbers([plan.numbers[-1] for plan in plans]),
+        hard=numbers([plan.limits[0] for plan in plans]),
+        vast=first.limits[3],
     )
 
 
@@ -244,9 +230,3 @@ def _tension(exponent: Floats, out: Floats) -> None:
     np.maximum(exponent, 0.0, out=out)
     np.minimum(out, LARGEST_EXPONENT, out=out)
     np.expm1(out, out)
-
-
-def _grown(exponent: Floats) -> Floats:
-    """Return exp(e), 1 where there is a gap."""
-    grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
-    return grown

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..contact import LARGEST_EXPONENT
-from ..physics import Cell
+from ..physics import Cell, Speeds
 from ..places import Stepper
 from ..touch import Touch
 from .columns import Floats, together
@@ -70,18 +70,26 @@ class Extrapolated:
     cell : Cell
         Of all runs.
     coarse, fine : Movement
+    speeds : Speeds
+        Of all runs.
+    period : ndarray (b,)
+        s.
     """
 
     cell: Cell
     coarse: Movement
     fine: Movement
+    speeds: Speeds
+    period: Floats
 
     def advance(self, driven: Floats, under: Floats) -> None:
         """Move a block of cells on, in place; see `Movement`."""
         coarse, y = driven.copy(), driven[: self.cell.rows]
+        lowest, highest = self.speeds.reach(driven[0], under, self.period)
         self.coarse.advance(coarse, under)
         self.fine.advance(driven, under)
         y += (y - coarse[: self.cell.rows]) / 3.0
+        np.minimum(np.maximum(y[0], lowest), highest, out=y[0])
         np.minimum(np.maximum(y[0], 0.0), self.cell.actuator.stroke, out=y[0])
         np.maximum(y[self.cell.pulp_rows], 0.0, out=y[self.cell.pulp_rows])
 

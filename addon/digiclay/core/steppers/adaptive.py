@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell, felt
+from ..physics import Cell, Speeds, felt, speeds
 from ..places import Movement, Segment
 from ..some import some
 from .bernoulli import BernoulliExponential, BernoulliPlan
@@ -49,12 +49,17 @@ class AdaptivePlan:
     allowed, allowed_tension : float
         Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
         filters, N: what so much height makes at first touch, where the pulp is softest.
+    speeds : Speeds
+    period : float
+        s.
     """
 
     levels: tuple[BernoulliPlan, ...]
     between: tuple[Floats, ...]
     allowed: float
     allowed_tension: float
+    speeds: Speeds
+    period: float
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,8 @@ class Adaptive:
             between.append(rows)
         allowed = 3.0 * self.tolerance
         stiffness = cell.touch.contact.stiffness if cell.touch else 0.0
-        return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed)
+        period = sum(part.length for part in segments)
+        return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed, speeds(cell), period)
 
     def bind(self, plan: AdaptivePlan, driven: Floats, near: int) -> Movement:
         """Make ready to move a block of cells on; see `places.Stepper`."""
@@ -116,6 +122,8 @@ class Adaptive:
             if not some(wide):
                 break
             open_cells, coarse = open_cells[wide], fine[:, wide]
+        # Where the finest two still have little in common the extrapolation lies beyond what there can be.
+        np.clip(driven[0], *plan.speeds.reach(start[0], under, plan.period), out=driven[0])
         np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
         pulp = driven[cell.pulp_rows]
         np.maximum(pulp, 0.0, out=pulp)

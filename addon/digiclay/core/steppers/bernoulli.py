@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closed_form import TINY, careful, crossed, pressed
-from ..contact import LARGEST_EXPONENT
+from ..closed_form import crossed, pressed
 from ..delay import Queue
 from ..filled import filled
 from ..physics import Cell
 from ..places import Segment
 from ..some import some
+from ..strained import Strain, Way, loaded_way
 from .bernoulli_plan import BernoulliPlan, bernoulli_plan
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "Block"]
@@ -97,6 +97,9 @@ class Block:
         self.begun, self.moved = self.work[:-2], self.work[:-4]
         self.first, self.mean, self.last = self.work[-3:]
         self.constants, self.none = filled(plan.numbers, k), np.zeros_like(self.moved)
+        # What `pressed` is not for from the limits on.
+        self.guarded, self.limits = empty(5, k), np.array(filled(plan.limits, k))
+        self.exponent, self.end, self.bent, self.growth, self.bow = self.guarded
         self.stops = filled((0.0, cell.actuator.stroke), count)
 
     def __call__(self, under: Floats) -> Floats:
@@ -124,52 +127,49 @@ class Block:
         """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
         plan, height, near = self.plan, self.height, self.near
         first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
-        m, offset, per_m, most, zero, one, half, tiny, hard = self.constants
+        m, offset, per_m, most, zero, one, half, tiny = self.constants
+        guarded, exponent, growth = self.guarded, self.exponent, self.growth
         lowest, highest = self.stops
         self.filters[:] = self.pulp
-        exponent = near * m
+        np.multiply(near, m, exponent)
         exponent -= self.start
         _tension(exponent, zero, most, first)
+        end: Floats = exponent
         for s, (rise, risen, slip, bow, decay) in enumerate(self.steps):
             if s:
                 first[:] = last
+                exponent[:] = end
             plan.begin[s].dot(self.begun, self.begins)
             idle = first <= lost
             stiffness = decay.copy()
             np.putmask(stiffness, idle, tiny)
             push = stiffness * relaxed
-            growth = push + slip
+            np.add(push, slip, growth)
             growth += tiny
-            end = exponent + slip
-            bent = exponent + bow
-            strained = np.maximum(end, bent) >= hard
-            if not some(strained):
+            end = np.add(exponent, slip, self.end)
+            bent = np.add(exponent, bow, self.bent)
+            self.bow[:] = bow
+            if some(guarded >= self.limits):
+                risen[:], end, mean[:] = self._strained(s, exponent, bow, idle)
+                _tension(end, zero, most, last)
+                rise += height
+            else:
                 relief = pressed(np.exp(bent), growth, stiffness)
                 np.divide(relief, stiffness, mean)
                 mean -= one
-            else:
-                decay, risen[:] = self._loaded_valve(s, exponent, relaxed)
-                slip = m * risen - plan.path[s].dot(self.under)
-                stiffness = np.where(idle, tiny, decay)
-                push = stiffness * relaxed
-                # Their way bends with the load, not as it would without.
-                np.putmask(bow, strained, zero)
-                relief, grown = careful(exponent + bow, push + slip + tiny, stiffness)
-                np.subtract(grown, one, mean)
-                end = exponent + slip
-            push -= relief
-            end += push
-            _tension(end, zero, most, last)
-            crossing = last <= lost
-            crossing ^= idle
-            if some(crossing):
-                parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
-                push[crossing], mean[crossing] = crossed(*parts)
-                end = exponent + slip + push
+                push -= relief
+                end += push
                 _tension(end, zero, most, last)
-            push *= per_m
-            rise += height
-            risen += push
+                crossing = last <= lost
+                crossing ^= idle
+                if some(crossing):
+                    parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+                    push[crossing], mean[crossing] = crossed(*parts)
+                    end = exponent + slip + push
+                    _tension(end, zero, most, last)
+                push *= per_m
+                rise += height
+                risen += push
             np.maximum(rise, lowest, out=height)
             np.minimum(height, highest, out=height)
             stopped = risen != near
@@ -182,32 +182,18 @@ class Block:
             np.maximum(mean, zero, out=mean)
             # Of a tension that falls steeply a straight line would make a filter that pulls.
             np.maximum(plan.finish[s].dot(self.work), self.none, out=self.moved)
-            exponent = end
         self.pulp[:] = self.filters
 
-    def _loaded_valve(self, s: int, exponent: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
-        """Return decay and free rise of step s where the load decides on the valve's branch.
-
-        The secant conductance is taken at the load of mid step, predicted with the one at the
-        start: second order, like the rest.
-        """
-        plan, m = self.plan, self.constants[0]
-        area, lift = plan.cell.actuator.area, plan.path[s].dot(self.under)
-        opening, weights = self.opening[plan.nodes[s], : len(m)], plan.weights[plan.nodes[s]] / area
-        to_load = plan.to_load * plan.shares[s]
-        pressure = plan.cell.supply.pressure(opening)
-        grown = middle = _grown(exponent)
-        for _ in range(2):
-            load = to_load * np.maximum(middle - relaxed, 0.0)
-            conductance = plan.cell.flow.conductance(opening, pressure - load)
-            decay = m * to_load * (weights @ conductance) + TINY
-            free = weights @ (conductance * pressure)
-            slip = m * free - lift
-            growth = slip + decay * relaxed + TINY
-            relief, _ = careful(exponent, growth, decay)
-            way = np.where(grown > relaxed, growth - relief, slip)
-            middle = 0.5 * (grown + _grown(exponent + way))
-        return decay, free
+    def _strained(self, s: int, exponent: Floats, bow: Floats, idle: NDArray[np.bool_]) -> Way:
+        """Return the way of step s, some of whose cells `pressed` is not for."""
+        plan, under, nodes = self.plan, self.under, self.plan.nodes[s]
+        # Their way bends with the load, not as it would without; or so much that its mean says nothing.
+        bow[(self.guarded >= self.limits).any(axis=0)] = 0.0
+        weights, count = plan.weights[nodes, None] / plan.cell.actuator.area, len(self.steps)
+        finger_bow, lift = plan.path[count + s].dot(under), plan.path[s].dot(under)
+        openings = self.opening[nodes, : self.near.size]
+        seen = Strain(openings, weights, exponent, bow, finger_bow, lift, self.relaxed, idle)
+        return loaded_way(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], seen)
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:
@@ -215,9 +201,3 @@ def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:
     np.maximum(exponent, zero, out=out)
     np.minimum(out, most, out=out)
     np.expm1(out, out)
-
-
-def _grown(exponent: Floats) -> Floats:
-    """Return exp(e), 1 where there is a gap."""
-    grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
-    return grown

@@ -33,6 +33,11 @@ def _legendre(count: int) -> tuple[tuple[float, float], ...]:
 #: may go all its way, within a short piece it goes less of it.
 POINTS = ((0.3, _legendre(2)), (0.6, _legendre(3)), (1.0, _legendre(4)))
 
+#: Largest bow, in 1/m, whose step may be taken for a straight one that lies higher by so much. Out of touch
+#: at the start, in the middle and at the end it then leaves no tension on average, as it should: that comes
+#: out as at most exp(b) (1 - exp(-3 b)) / (3 b) - 1 of a bow b, which is above 0 from 1.54 on.
+MOST_BOW = 1.5
+
 
 @dataclass(frozen=True, eq=False)
 class BernoulliPlan:
@@ -71,8 +76,11 @@ class BernoulliPlan:
     unloaded : callable
         Works out the conductance of valves without load, m³/(s Pa), from their openings, into an array.
     numbers : tuple of float
-        The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`; and
-        the exponent below which every flow is laminar and nothing overflows.
+        The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`.
+    limits : tuple of float
+        What `closed_form.pressed` is for lies below all of them: the exponent at the start of a step, at its
+        end and with the bow, where every flow is laminar; the growth, where nothing overflows and what does
+        not push moves no pin; and the bow, see `MOST_BOW`.
     unit : float
         b/m, N.
     to_load : float
@@ -94,6 +102,7 @@ class BernoulliPlan:
     shares: tuple[float, ...]
     unloaded: Callable[[Floats, Floats], Floats]
     numbers: tuple[float, ...]
+    limits: tuple[float, ...]
     unit: float
     to_load: float
 
@@ -139,7 +148,8 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
         tuple(_finish(one) for one in transition),
         shares,
         cell.flow.laminar_conductance if cell.flow.knee > supply.largest else under_supply,
-        (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY, hard),
+        (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY),
+        (hard, hard, hard, 0.5 * LARGE, MOST_BOW),
         unit,
         to_load,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell, felt, rates
+from ..physics import Cell, Speeds, felt, rates, speeds
 from ..places import Movement, Segment
 
 __all__ = ["Explicit", "ExplicitPlan", "Rates"]
@@ -33,15 +33,13 @@ class ExplicitPlan:
     queue : Queue
     segments : tuple of Segment
         The physics steps of a period.
-    fall, rise : float
-        Velocity of a pin without load through a valve that is wide open, m/s: not above 0, not below.
+    speeds : Speeds
     """
 
     cell: Cell
     queue: Queue
     segments: tuple[Segment, ...]
-    fall: float
-    rise: float
+    speeds: Speeds
 
 
 @dataclass(frozen=True)
@@ -51,19 +49,16 @@ class Explicit:
     Notes
     -----
     A method that has left its region of stability throws pins from stop to stop, and the stops
-    would hide it. But a finger that pushes a pin leaves it where they part, and a pin without
-    load goes no faster than its valve lets it: no pin ever is further from where it was, or from
-    the lowest the finger came. A cell that is, is given up as infinite, which the check for
-    finite numbers at the end of the period finds, and says when and where.
+    would hide it. But there are heights no pin can come to, see `Speeds.reach`. A cell that does is
+    given up as infinite, which the check for finite numbers at the end of the period finds, and
+    says when and where.
     """
 
     bridges = False
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
         """Work out once what all periods share."""
-        wide = np.array([-1.0, 1.0])
-        ways = cell.flow.flow(wide, cell.supply.pressure(wide)) / cell.actuator.area
-        return ExplicitPlan(cell, queue, segments, min(float(ways.min()), 0.0), max(float(ways.max()), 0.0))
+        return ExplicitPlan(cell, queue, segments, speeds(cell))
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
         """Return how far the rows go in one step, s long."""
@@ -86,10 +81,9 @@ class Explicit:
             ) -> Floats:
                 return rates(cell, rows, instants[node], command)
 
-            lowest = y[0].copy()
-            np.minimum(lowest[: under.shape[1]], instants.min(axis=0), out=lowest[: under.shape[1]])
-            lowest += part.length * plan.fall - ASTRAY * stroke
-            highest = y[0] + (part.length * plan.rise + ASTRAY * stroke)
+            lowest, highest = plan.speeds.reach(y[0], instants, part.length)
+            lowest -= ASTRAY * stroke
+            highest += ASTRAY * stroke
             with np.errstate(over="ignore", invalid="ignore"):
                 y += self.increment(rates_at, y, part.length)
             np.clip(y[0], 0.0, stroke, out=y[0])

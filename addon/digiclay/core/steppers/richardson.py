@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..delay import Queue
-from ..physics import Cell, felt
+from ..physics import Cell, Speeds, felt, speeds
 from ..places import Movement, Segment
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
@@ -24,10 +24,21 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RichardsonPlan:
-    """What all periods share: the closed-form plans for the steps, and for their halves."""
+    """What all periods share.
+
+    Attributes
+    ----------
+    coarse, fine : BernoulliPlan
+        For the steps, and for their halves.
+    speeds : Speeds
+    period : float
+        s.
+    """
 
     coarse: BernoulliPlan
     fine: BernoulliPlan
+    speeds: Speeds
+    period: float
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,10 @@ class Richardson:
         closed_form = BernoulliExponential()
         whole = tuple(Segment(part.start, part.length, part.nodes[::2]) for part in segments)
         return RichardsonPlan(
-            closed_form.plan(cell, queue, whole), closed_form.plan(cell, queue, halved(segments))
+            closed_form.plan(cell, queue, whole),
+            closed_form.plan(cell, queue, halved(segments)),
+            speeds(cell),
+            sum(part.length for part in segments),
         )
 
     def bind(self, plan: RichardsonPlan, driven: Floats, near: int) -> Movement:
@@ -58,9 +72,12 @@ class Richardson:
 
         def advance(under: Floats) -> Floats:
             coarse[:] = driven
+            lowest, highest = plan.speeds.reach(driven[0], under, plan.period)
             once(under)
             twice(under)
             np.add(fine_rows, (fine_rows - coarse_rows) / 3.0, out=fine_rows)
+            # Where the two have little in common the extrapolation lies beyond what there can be.
+            np.clip(driven[0], lowest, highest, out=driven[0])
             np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
             np.maximum(pulp, 0.0, out=pulp)
             return felt(cell, driven, under[-1])

@@ -1,0 +1,242 @@
+"""A finger that jumps: no warning, nothing moves that is shut, and no pin goes where none can come to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from digiclay.commands.benchmark_stiff_runs import strict
+from digiclay.core.actuator import Actuator
+from digiclay.core.assembly import assemble
+from digiclay.core.contact import Contact
+from digiclay.core.fluid import Fluid
+from digiclay.core.layout import Layout
+from digiclay.core.physics import speeds
+from digiclay.core.scene import Path, Scene, Waypoint
+from digiclay.core.stack.session import run_together
+from digiclay.core.system import System
+from digiclay.core.trajectory import Trajectory
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from tests.assemble import Record, make_system, one_cell, path, record, sample, scripted, under
+
+Floats = NDArray[np.float64]
+
+PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
+#: Millimetres from where the finger stood: a little, the width of the bed, far beyond it.
+far = st.one_of(st.integers(-5, 5), st.integers(-100, 100), st.sampled_from([-1000, 0, 1000])).map(float)
+deep = st.one_of(st.integers(-8, 4), st.integers(-100, 100), st.sampled_from([-1000, 1000])).map(float)
+#: Milliseconds until the next place, and the place.
+jumps = st.lists(st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, deep), min_size=3, max_size=6)
+turns = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+beds = st.builds(
+    Layout,
+    rows=st.just(5),
+    columns=st.just(5),
+    pitch=st.sampled_from([2e-3, 2.3e-3, 3.1e-3]),
+    arrangement=st.sampled_from(["aligned", "staggered", "hexagonal"]),
+)
+parts = st.sampled_from([
+    {}, {"relaxation": None}, {"valve_lag": None, "conduit": None}, {"contact": Contact(exponent=2e4)},
+    {"fluid": Fluid(viscosity=1.6e-9)}, {"actuator": Actuator(bore=0.2e-3)},
+    {"contact": Contact(stiffness=2.5e6)},
+])  # fmt: skip
+Spot = tuple[int, float, float, float]
+#: From the issue: 100 mm sideways within 5 ms, at a depth of 4 mm.
+SIDEWAYS = [(20, 100.0, 0.0, -4.0), (5, 0.0, 0.0, -4.0), (50, 0.0, 0.0, -4.0)]
+DOWN = [(5, 0.0, 0.0, 100.0), (5, 0.0, 0.0, -4.0), (20, 0.0, 0.0, -4.0)]
+#: Out of a load whose exponent is beyond the largest one that counts.
+UP = [(50, 0.0, 0.0, -26.0), (50, 0.0, 0.0, -26.0), (5, 0.0, 0.0, 1000.0), (20, 0.0, 0.0, -4.0)]
+LEVEL = (0.0, 0.0, 0.0)
+
+
+def waypoints(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> tuple[Waypoint, ...]:
+    """Return the places of a finger over pins 40 mm high; at every other one it has turned."""
+    times = np.cumsum([0, *(after for after, *_ in spots[1:])]) * 1e-3
+    return tuple(
+        Waypoint(float(time), (x * 1e-3, y * 1e-3, 40e-3 + z * 1e-3), (1.0, *(i % 2 * one for one in turn)))
+        for i, (time, (_, x, y, z)) in enumerate(zip(times, spots, strict=True))
+    )
+
+
+def way(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> Trajectory:
+    """Return the straight way of a finger from place to place."""
+    return Path("linear", waypoints(spots, turn)).trajectory()
+
+
+def taken(scene: Scene, points: tuple[Waypoint, ...]) -> Scene:
+    """Return a scene whose finger takes this straight way, and that lasts as long."""
+    lasting = replace(scene.simulation, duration=points[-1].time)
+    return replace(scene, trajectory=Path("linear", points), simulation=lasting)
+
+
+def half_shut(t: float, x: Floats, y: Floats) -> Floats:
+    """Shut the left half, and swing the valves of the other through all openings."""
+    return np.where(x < 0.0, 0.0, np.sin(300.0 * t + 1e3 * y))
+
+
+def jumped(system: System, finger: Trajectory) -> Record:
+    """Play a way, with every warning an error."""
+    with strict():
+        return record(system, finger, min(150, round(finger.times[-1] / system.period) + 2))
+
+
+def assert_where_pins_can_be(system: System, finger: Trajectory, run: Record) -> None:
+    """Check that all is finite, that nothing pulls, and that no pin is where none can be."""
+    assert np.isfinite(run.rows).all()
+    assert run.force.min() >= 0.0
+    assert_within_reach(system, finger, run.height)
+
+
+def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> None:
+    """Check heights, (t, n), a control period apart: within the stroke, and within `Speeds.reach`."""
+    assert height.min() >= 0.0
+    assert height.max() <= system.cell.actuator.stroke
+    for period, (before, after) in enumerate(pairwise(height)):
+        poses = finger.poses(period * system.period + system.instants)
+        unders = under(system.cell.touch.fingertip.outline(poses), system.grid.x, system.grid.y)
+        lowest, highest = speeds(system.cell).reach(before, unders, system.period)
+        # Rounding: the undersides are taken over another sum here.
+        assert (after >= lowest - 1e-12).all()
+        assert (after <= highest + 1e-15).all()
+
+
+@settings(max_examples=50)
+@given(jumps, turns, beds, parts, st.sampled_from(PERIODS), st.sampled_from(["bernoulli", "richardson"]))
+@example(SIDEWAYS, LEVEL, Layout(13, 13), {}, 5e-3, "bernoulli")
+@example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
+@example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
+def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
+    spots: list[Spot],
+    turn: tuple[float, ...],
+    bed: Layout,
+    changes: dict[str, object],
+    period: float,
+    stepper: str,
+) -> None:
+    system = make_system(
+        bed, stepper=stepper, period=period, step=period, control=scripted(half_shut), **changes
+    )
+    finger = way(spots, turn)
+    run = jumped(system, finger)
+    assert np.all(run.height[:, system.grid.x < 0.0] == 40e-3)
+    assert_where_pins_can_be(system, finger, run)
+
+
+@settings(max_examples=6)
+@given(jumps, turns, st.sampled_from(PERIODS))
+def test_the_adaptive_stepper_withstands_jumps(
+    spots: list[Spot], turn: tuple[float, ...], period: float
+) -> None:
+    system = make_system(
+        Layout(3, 3), stepper="adaptive", period=period, step=period, control=scripted(half_shut)
+    )
+    finger = way(spots, turn)
+    run = jumped(system, finger)
+    assert np.all(run.height[:, system.grid.x < 0.0] == 40e-3)
+    assert_where_pins_can_be(system, finger, run)
+
+
+@settings(max_examples=10)
+@given(st.lists(jumps, min_size=2, max_size=3), st.sampled_from(["bernoulli", "richardson"]))
+@example([SIDEWAYS, DOWN], "bernoulli")
+def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> None:
+    # Each run with a pulp of its own; all valves of the last one shut.
+    scenes = [
+        taken(
+            sample("tap", f"simulation.stepper={stepper}", f"contact.stiffness={250 + 50 * i}"),
+            waypoints(spots),
+        )
+        for i, spots in enumerate(several)
+    ]
+    with strict():
+        found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
+        shut = [replace(one, control=None, blister=None) for one in scenes]
+        still = {number: result.history["height"].copy() for number, result in run_together(shut)}
+    for number, scene in enumerate(scenes):
+        system, finger = assemble(scene), scene.trajectory.trajectory()
+        assert_within_reach(system, finger, found[number])
+        assert np.all(still[number] == 40e-3)
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([1, 5, 20]), st.just(0.0), st.just(0.0), deep), min_size=3, max_size=5
+    ),
+    st.floats(-1.0, 1.0),
+    st.integers(0, 8),
+    st.sampled_from([1.6e-6, 1.6e-9]),
+)
+def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
+    spots: list[Spot], opening: float, smaller: int, viscosity: float
+) -> None:
+    # A valve that does not lag, and one opening all along: what flows under the largest load is known.
+    opening *= 10.0**-smaller
+    system = one_cell(
+        dead_time=0.0, step=5e-3, valve_lag=None, fluid=Fluid(viscosity=viscosity),
+        control=scripted(lambda t, x, y: opening),
+    )  # fmt: skip
+    finger, cell = way(spots), system.cell
+    run = jumped(system, finger)
+    for i, start in enumerate(run.time[:-1]):
+        low = under(
+            cell.touch.fingertip.outline(finger.poses(start + system.instants)), system.grid.x, system.grid.y
+        )
+        k = np.array([opening])
+        free = cell.flow.flow(k, cell.supply.pressure(k))[0] * 5e-3 / cell.actuator.area
+        deepest = run.height[i] + max(free, 0.0) - low.min()
+        load = cell.actuator.pressure(cell.touch.contact.share * cell.touch.contact.tension(deepest))
+        loaded = cell.flow.flow(k, cell.supply.pressure(k) - load)[0] * 5e-3 / cell.actuator.area
+        gone = run.height[i + 1, 0] - run.height[i, 0]
+        # A turbulent valve: its opening law is taken at mid load; 1e-15 is rounding.
+        assert min(loaded, 0.0) * (1.0 + 1e-9) - 1e-15 <= gone <= max(free, 0.0) * (1.0 + 1e-9) + 1e-15
+
+
+#: Places well above the pins, at any distance.
+above = st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, st.integers(1, 20).map(float))
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(above, min_size=2, max_size=4),
+    st.sampled_from(PERIODS),
+    st.sampled_from(["bernoulli", "richardson"]),
+)
+@example([(5, 0.0, 0.0, 6.0), (5, -30.0, 0.0, 4.0)], 5e-3, "bernoulli")
+def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(
+    spots: list[Spot], period: float, stepper: str
+) -> None:
+    system = make_system(Layout(9, 9), stepper=stepper, period=period, step=period)
+    run = jumped(system, way(spots))
+    untouched = record(system, path((0.0, 0.0, 0.0, 500.0)), 1).rows[0]
+    assert (run.rows == untouched).all()
+
+
+@pytest.mark.parametrize("x", [-8.0, -30.0, 1000.0])
+def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x: float) -> None:
+    # In stacks; all valves are shut. The places are passed at the ends of control periods, of 5 ms.
+    spots = [(5, 0.0, 0.0, 6.0), (5, x, 0.0, 4.0)]
+    press = [(50, 0.0, 0.0, 20.0), (50, 0.0, 0.0, 0.5), (50, 0.0, 0.0, -3.0), (50, 0.0, 0.0, -3.0)]
+    known = [
+        replace(
+            sample("tap", f"contact.stiffness={stiffness}"),
+            control=None,
+            blister=None,
+        )
+        for stiffness in (250, 300)
+    ]
+    passed, began = ([taken(one, waypoints(places)) for one in known] for places in (spots + press, press))
+    with strict():
+        after, alone = (
+            {number: result.history["force"].copy() for number, result in run_together(scenes)}
+            for scenes in (passed, began)
+        )
+    for number, force in alone.items():
+        assert force[-1].max() > 0.1
+        # The times at which they press are rounded otherwise.
+        np.testing.assert_allclose(after[number][-len(force) :], force, rtol=1e-9, atol=1e-12)
