@@ -12,6 +12,7 @@ from ..core.assembly import assemble
 from ..core.quantity import Parameters, quantities
 from ..core.recorder import available_memory, bytes_needed
 from ..core.scene import Scene
+from ..core.session import busy_cells
 from ..core.shape_file import fitted_to
 from ..core.simulation import System
 from .arguments import add_command, add_scene, scene_of
@@ -72,7 +73,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield f"  {simulation.duration:g} s, {scene.periods} control periods of {period}, physics steps of {step}"
     points = scene.trajectory.waypoints
     yield f"  {len(points)} waypoints, {scene.trajectory.interpolation}, the last at {points[-1].time:g} s"
-    needed, free = bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods), available_memory()
+    sizes = scene.cells, scene.periods, busy_cells(scene)
+    needed, free = bytes_needed(scene.recorder, system.rows, *sizes), available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
     yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"
 

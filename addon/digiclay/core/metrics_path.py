@@ -12,8 +12,9 @@ Rows = NDArray[np.bool_]
 
 #: How far the finger must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
-#: Rows of a history looked at at a time: distances to all cells of a long session would not fit in memory.
-CHUNK = 256
+#: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
+#: in memory.
+AT_ONCE = 2**17
 
 
 def in_contact(total_force: ArrayLike) -> Rows:
@@ -107,8 +108,9 @@ def ridge_errors(
     place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)
     nearest = np.empty(chosen.size, dtype=np.intp)
-    for first in range(0, chosen.size, CHUNK):
-        part = slice(first, first + CHUNK)
+    several = max(1, AT_ONCE // max(len(place), 1))
+    for first in range(0, chosen.size, several):
+        part = slice(first, first + several)
         square = (tip[chosen[part], 0, None] - place[:, 0]) ** 2
         square += (tip[chosen[part], 1, None] - place[:, 1]) ** 2
         nearest[part] = np.argmin(square, axis=1)

@@ -20,8 +20,15 @@ __all__ = ["Recorder", "Recording", "available_memory", "bytes_needed", "refuse_
 
 Floats = NDArray[np.float64]
 
-#: Bytes one row takes for one cell: height, force and command as float64, mode as int8.
-BYTES_A_CELL = 3 * 8 + 1
+#: Bytes one row takes for one cell: height, force and command as float64, mode as int8; and one while the
+#: metrics are computed, of which rows a cell follows the force in.
+BYTES_A_CELL = 3 * 8 + 1 + 1
+#: Bytes a cell takes besides its state's rows: position (2 float64), age (float64), mode (int8).
+BYTES_BESIDE = 2 * 8 + 8 + 1
+#: Bytes a cell of a recorded session takes while the metrics are computed, however many rows there are; and
+#: those a cell that takes part takes in a control period, and for its rows that wait (measured: about three
+#: times what they are, `CHUNK` rows of 25 bytes).
+BYTES_JUDGED, BYTES_BUSY, BYTES_WAITING = 100, 850, 3 * 25 * 64
 #: Bytes of memory assumed where the system does not tell.
 ASSUMED_MEMORY = 8 * 2**30
 #: Most rows that wait to be written together.
@@ -130,14 +137,24 @@ class Recording:
         return {name: getattr(self, f"_{name}")[rows] for name in names}
 
 
-def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int) -> int:
-    """Return about how much memory a session takes.
+def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
+    """Return about how much memory a session takes; tests/unit/test_memory.py compares what it does take.
 
-    The state is kept once and gathered once more in the worst period; the positions, modes
-    and times of the cells come to some 50 bytes.
+    Parameters
+    ----------
+    recorder : Recorder or None
+    rows : Rows
+        Of the state.
+    cells, periods : int
+    busy : int, optional
+        Cells that may take part at once, where they are more than those under a finger.
     """
-    recorded = recorder.rows(periods) * BYTES_A_CELL if recorder else 0
-    return cells * (recorded + 2 * 8 * rows.count + 50)
+    held = 8 * rows.count + BYTES_BESIDE
+    at_work = BYTES_BUSY
+    if recorder is not None:
+        held += recorder.rows(periods) * BYTES_A_CELL + BYTES_JUDGED
+        at_work += BYTES_WAITING
+    return cells * held + busy * at_work
 
 
 def available_memory() -> int:
@@ -155,21 +172,22 @@ def available_memory() -> int:
 
 
 def refuse_what_cannot_fit(
-    recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int
+    recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int, busy: int = 0
 ) -> None:
-    """Refuse, before it starts, a session that `available` bytes cannot hold.
+    """Refuse, before it starts, a session that `available` bytes cannot hold; see `bytes_needed`.
 
     Raises
     ------
     ParameterError
         With the numbers, and what to change.
     """
-    needed = bytes_needed(recorder, rows, cells, periods)
+    needed = bytes_needed(recorder, rows, cells, periods, busy)
     if needed <= available:
         return
     memory = f"{available / 1e9:.3g} GB of free memory"
-    alone = bytes_needed(None, rows, cells, periods)
-    spare = (available - alone) // (cells * BYTES_A_CELL)
+    alone = bytes_needed(None, rows, cells, periods, busy)
+    begun = needed - (recorder.rows(periods) * BYTES_A_CELL * cells if recorder else 0)
+    spare = (available - begun) // (cells * BYTES_A_CELL)
     if recorder is None or spare < 2:
         rule = f"must be few enough for {memory}"
         raise ParameterError("layout", "rows * columns", rule, f"{cells} cells, {alone / 1e9:.3g} GB")

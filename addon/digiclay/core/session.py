@@ -25,7 +25,7 @@ from .state import State
 from .system import System
 from .trajectory import Trajectory
 
-__all__ = ["Ended", "Result", "fits", "judged", "run", "save"]
+__all__ = ["Ended", "Result", "busy_cells", "fits", "judged", "run", "save"]
 
 History = dict[str, NDArray[Any]]
 
@@ -78,9 +78,15 @@ class Result:
         return replace(self, metrics={**self.metrics, **judged, "units": {**self.metrics["units"], **units}})
 
 
+def busy_cells(scene: Scene) -> int:
+    """Return how many cells may take part at once: all, where a shape is displayed; else few."""
+    return scene.cells if scene.shape is not None else 0
+
+
 def fits(scene: Scene, system: System) -> None:
     """Refuse a session that cannot fit in memory, before it starts; ParameterError says what to change."""
-    refuse_what_cannot_fit(scene.recorder, system.rows, scene.cells, scene.periods, available_memory())
+    busy = busy_cells(scene)
+    refuse_what_cannot_fit(scene.recorder, system.rows, scene.cells, scene.periods, available_memory(), busy)
 
 
 def run(
