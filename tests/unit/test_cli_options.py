@@ -14,6 +14,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import describe, export
 from digiclay.commands.describe import size
+from digiclay.core.errors import BEGINNING, END, one_line
 
 from tests.patience import HANGS
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
@@ -58,6 +59,77 @@ def test_a_mistake_is_one_line_before_any_work(
     (here / "d.png").mkdir()
     code = main(arguments)
     assert (code, capfd.readouterr(), left(here)) == (2, ("", f"{said}\n"), ["d.png"])
+
+
+MEANT = {
+    "rn my.toml": "Did you mean run?",
+    "Run my.toml": "Did you mean run?",
+    "ex my": "Did you mean export?",
+    "run my.toml --exprot stl": "Did you mean --export (not --exprot)?",
+    "run my.toml --exprot=stl": "Did you mean --export (not --exprot)?",
+    "run my.toml -export stl": "Did you mean --export (not -export)?",
+    "run my.toml --over": "Did you mean --overwrite (not --over)?",
+    "sweep tap --varry layout.rows=3 --out o": "Did you mean --vary (not --varry)?",
+    "export my --kind soild": "Did you mean solid?",
+    "benchmark sesion": "Did you mean session?",
+    "--verson": "Did you mean --version (not --verson)?",
+}
+
+
+@pytest.mark.parametrize(("line", "asked"), MEANT.items())
+def test_a_misspelt_word_gets_a_suggestion(line: str, asked: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(line.split()) == 2
+    said = capsys.readouterr().err
+    assert f". {asked} See 'digiclay" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("line", ["walk", "run my.toml --fast", "run my.toml --set x", "run -- --exprot stl"])
+def test_what_is_like_nothing_gets_no_suggestion(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(line.split()) == 2
+    assert "Did you mean" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "my.toml", "--set", f"layout.rows={'x' * 5000}"],
+        ["run", "my.toml", "--set", "valve.stroke='\x1b[2J\x07 a\nb'"],
+        ["run", "x" * 5000],
+        ["run", "my.toml", "--export", "x" * 5000],
+        ["y" * 5000],
+        ["run", "my.toml", f"--{'z' * 5000}"],
+    ],
+)
+def test_an_error_is_one_line_of_a_sane_length(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert 0 < len(said) < 600
+    assert said.endswith("\n")
+    assert said.rstrip("\n").isprintable()
+
+
+def test_a_line_that_is_cut_keeps_its_beginning_and_its_end() -> None:
+    line = one_line("must be 1 (got " + "9" * 5000 + "). Did you mean 1?")
+    assert line.startswith("must be 1 (got 999")
+    assert line.endswith("999). Did you mean 1?")
+    assert " ... " in line
+    whole = "a" * (BEGINNING + END)
+    assert one_line(f" {whole}\n") == whole
+
+
+@pytest.mark.parametrize("said", ["0", "-1", "2.5", "65", "9" * 400, "x"])
+@pytest.mark.parametrize("command", ["export", "features"])
+def test_a_resolution_must_be_a_number_of_points(
+    command: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "my.toml", "--quiet", "--no-errors"]) == 0
+    assert main([command, "my", f"--resolution={said}"]) == 2
+    told = capsys.readouterr().err
+    assert "resolution" in told
+    assert ("from 1 to 64" in told) or ("at most 64" in told)
 
 
 def test_compare_keeps_to_the_tolerance(here: Path) -> None:

@@ -125,7 +125,7 @@ def test_a_history_too_large_is_refused_with_what_to_change() -> None:
         refuse_what_cannot_fit(Recorder(1), ROWS, 1_000_000, 5200, 20_000_000_000)
     assert str(caught.value) == (
         "recorder.every must be at least 7 for the history to fit into 20 GB of free memory "
-        "(got 1: 5201 rows of 1000000 cells are 136 GB)."
+        "(got 1: 5201 rows of 1000000 cells are 135 GB)."
     )
 
 

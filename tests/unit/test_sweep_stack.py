@@ -21,7 +21,7 @@ from digiclay.core.stack.simulation import advance, begin
 from digiclay.core.supply import Supply
 from digiclay.core.sweep import Point, evaluate, points
 from digiclay.core.sweep_axis import axis
-from digiclay.core.sweep_bundles import RUNS, bundles, evaluate_all
+from digiclay.core.sweep_bundles import RUNS, StackWarning, bundles, evaluate_all, fallen_apart
 from digiclay.core.touch import approach
 
 SHORT = [Setting("simulation.duration", "0.1")]
@@ -182,13 +182,43 @@ def test_a_bundle_comes_to_the_figures_of_its_points(errors: bool) -> None:
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
 
 
-def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
+def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    """Let stacks fail as a whole."""
+
     def faulty(*given: Any, **known: Any) -> Any:
-        raise MemoryError
+        raise error
 
     monkeypatch.setattr("digiclay.core.sweep_bundles.judge_together", faulty)
+
+
+def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    break_stacks(monkeypatch, MemoryError())
     scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    assert all(record and "figures" in record for record in evaluate_all(scenes))
+    records = dict(enumerate(record or {} for record in evaluate_all(scenes)))
+    assert all("figures" in record for record in records.values())
+    assert fallen_apart(records) == ["2 points one at a time: there is not enough memory for a stack"]
+
+
+def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
+    break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
+    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
+    with pytest.raises(StackWarning, match="A stack of 2 runs failed: ZeroDivisionError: by zero"):
+        evaluate_all(scenes)
+    with pytest.warns(StackWarning):
+        records = evaluate_all(scenes)
+    assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
+
+
+def test_a_sweep_says_which_points_ran_alone_because_their_stack_failed(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    break_stacks(monkeypatch, MemoryError())
+    varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1", "--workers", "1"]
+    assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
+    assert "\n4 points one at a time: there is not enough memory for a stack\n" in capsys.readouterr().out
+    table = (here / "out" / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert [line.endswith(",") for line in table[1:]] == [True] * 4  # no point has an error
 
 
 def test_a_stack_that_is_stopped_has_no_records() -> None:
