@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .compat import bpy
 from .core.errors import DigiclayError
 from .core.fingertip import Fingertip
+from .device.roles import ELLIPSOID, ROLE
 from .device.shapes import Shape
 
 __all__ = [
@@ -117,7 +118,7 @@ def resize_fingertip(tip: Any, finger: Fingertip) -> None:
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
     for ball in tip.children:
-        if ball.type == "MESH":
+        if ball.get(ROLE) == ELLIPSOID:  # other things may hang on the fingertip, and keep their size
             ball.scale = axes * SCALE
 
 

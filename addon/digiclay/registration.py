@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from . import command_line, operators, panels, preferences
-from .device import display
+from .device import display, unit_watch
 from .exchange import image_reader
 from .live import handlers
 from .press import press_tool
@@ -23,6 +23,7 @@ MODULES: tuple[ModuleType, ...] = (
     panels,
     press_tool,
     command_line,
+    unit_watch,
     handlers,  # the last to come and the first to go: it ends what runs
 )
 

@@ -11,7 +11,10 @@ import pytest
 from digiclay.core import live
 from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
+from digiclay.device import unit_watch
 from digiclay.device.instant import Instant
+
+from tests.blender.at_hand import done
 
 
 @pytest.fixture(autouse=True)
@@ -48,3 +51,16 @@ def formed() -> Instant:
         fingertip=np.array([0.004, -0.002, 0.055, 1.0, 0.0, 0.0, 0.0]),
         pitch=layout.pitch,
     )
+
+
+@pytest.fixture
+def watched(factory_file: None) -> Iterator[None]:
+    """Enable the extension and look after beds as in a window, in an empty scene; take all back."""
+    digiclay.register()
+    unit_watch.watch()
+    bpy.ops.object.select_all(action="SELECT")
+    bpy.ops.object.delete()
+    done("Empty")
+    yield
+    unit_watch.unregister()
+    digiclay.unregister()

@@ -84,9 +84,9 @@ def test_a_bed_shown_in_another_scale_still_stands_on_the_cursor(scale: float) -
     bpy.context.scene.cursor.location = (1.0, 2.0, 3.0)
     bed = add(rows=6, columns=6, scale=scale)
     bpy.context.view_layer.update()
-    case = next(child for child in bed.children if child.get(view.ROLE) == view.HOUSING)
+    shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     # float32 at 3 units.
-    assert min((case.matrix_world @ vertex.co).z for vertex in case.data.vertices) == pytest.approx(
+    assert min((bed.matrix_world @ vertex.co).z for vertex in shown.data.vertices) == pytest.approx(
         3.0, abs=1e-5
     )
     assert bridge.uniform(bed) == pytest.approx(scale, rel=1e-6)

@@ -102,12 +102,8 @@ def test_a_new_bed_stands_on_the_cursor_selected_with_its_fingertip_above_the_pi
     bed = bpy.context.object
     assert bpy.context.selected_objects == [bed]
     bpy.context.view_layer.update()
-    feet = [
-        child.matrix_world @ vertex.co
-        for child in bed.children
-        if child.data
-        for vertex in child.data.vertices
-    ]
+    drawn = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    feet = [bed.matrix_world @ vertex.co for vertex in drawn.vertices]
     assert min(point.z for point in feet) == pytest.approx(3.0, abs=1e-5)  # float32 at 3 units
     assert bridge.pose(view.fingertip_of(bed))[2] > 0.040
 

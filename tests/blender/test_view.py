@@ -127,7 +127,7 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed: Any, formed: Ins
         if item.is_instance and item.parent.original == bed
     ]
     assert len(feet) == 48
-    housing = next(child for child in bed.children if child[view.ROLE] == view.HOUSING)
+    housing = bed.evaluated_get(graph)
     deck = housing.data.vertices[-1].co.z  # the housing is drawn from its underside to the deck inside
     # float32 on lengths below one unit.
     np.testing.assert_allclose(feet, deck, rtol=0, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Picks pins while the workspace changes under it, and presses Esc in the moment a session steps aside."""
+"""Picks pins in another workspace, presses Esc while a session steps aside, copies and deletes beds."""
 
 from __future__ import annotations
 
@@ -39,6 +39,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield None
     yield from pick(blender)
     yield from escape(blender)
+    yield from units(blender)
 
 
 def pick(blender: Any) -> Iterator[float | None]:
@@ -71,6 +72,7 @@ def escape(blender: Any) -> Iterator[float | None]:
     """Press Esc while nobody drives the session: over a 3D view, and over another editor."""
     loop, session_loop = blender.part("live.loop"), blender.part("operators.session_loop")
     # Long enough that the key comes in it for sure; else it is a tenth of a second every 20 s.
+    usual = session_loop.EVERY, session_loop.MOMENT
     session_loop.EVERY, session_loop.MOMENT = 0.5, 8.0
     for name in ("VIEW_3D", "PROPERTIES"):
         blender.select(blender.beds()[0])
@@ -85,3 +87,78 @@ def escape(blender: Any) -> Iterator[float | None]:
         after = len(blender.part("live.running").all())
         yield session_loop.MOMENT
         blender.SEEN[f"Esc over {name}"] = [*before, after, modal(), loop.token()]
+    session_loop.EVERY, session_loop.MOMENT = usual
+
+
+def counted(blender: Any, name: str) -> None:
+    """Count the beds, those with a fingertip, the objects of the scene, those hidden, and the sessions."""
+    view, scene = blender.part("device.view"), blender.window().scene
+    tips = [view.fingertip_of(bed) for bed in blender.beds()]
+    hidden = sum(thing.hide_get() for thing in scene.objects)
+    sessions = len(blender.part("live.running").all())
+    blender.SEEN[name] = [
+        len(tips),
+        sum(tip is not None for tip in tips),
+        len(scene.objects),
+        hidden,
+        sessions,
+    ]
+
+
+def looked(blender: Any, name: str) -> Iterator[float | None]:
+    """Wait until Blender has done what was asked for and it was looked at; count."""
+    watch, tick = blender.part("device.unit_watch"), blender.part("live.running").all
+    yield 1.0
+    yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._look))
+    if tick():
+        yield from blender.until(lambda: not all(one.stale for one in tick()))
+    yield 0.5
+    counted(blender, name)
+
+
+def pressed(blender: Any, name: str, kind: str, **held: bool) -> Iterator[float | None]:
+    """Press a key over the 3D view, and count what there is then."""
+    blender.key(kind, blender.middle(), **held)
+    yield from looked(blender, name)
+
+
+def units(blender: Any) -> Iterator[float | None]:
+    """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
+    blender.event("MOUSEMOVE", "NOTHING", blender.middle())
+    blender.select(blender.beds()[0])
+    yield 0.5
+    counted(blender, "one bed")
+    yield from pressed(blender, "deleted", "DEL")
+    yield from pressed(blender, "delete undone", "Z", ctrl=True)
+    yield from pressed(blender, "delete redone", "Z", ctrl=True, shift=True)
+    yield from pressed(blender, "delete undone again", "Z", ctrl=True)
+    blender.select(blender.beds()[0])
+    blender.key("D", blender.middle(), shift=True)
+    yield 1.0
+    counted(blender, "copy in hand")
+    x, y = blender.middle()
+    blender.event("MOUSEMOVE", "NOTHING", (x + 120, y))
+    yield 0.5
+    blender.key("LEFTMOUSE", (x + 120, y))
+    yield from looked(blender, "copied")
+    yield from pressed(blender, "copy undone", "Z", ctrl=True)
+    yield from pressed(blender, "copy redone", "Z", ctrl=True, shift=True)
+    blender.select(blender.beds()[0])
+    yield from pressed(blender, "hidden", "H")
+    yield from pressed(blender, "shown", "H", alt=True)
+    blender.select(blender.beds()[1])
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield from blender.settle()
+    counted(blender, "session")
+    yield from pressed(blender, "deleted in mid-session", "DEL")
+    yield from pressed(blender, "undone after it", "Z", ctrl=True)
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    bpy.ops.ed.undo_push(message="Select")
+    blender.key("D", blender.middle(), alt=True)
+    yield 1.0
+    blender.key("RIGHTMOUSE", blender.middle())
+    yield from looked(blender, "all copied")
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    bpy.ops.ed.undo_push(message="Select")
+    yield from pressed(blender, "all deleted", "DEL")
+    yield from pressed(blender, "all back", "Z", ctrl=True)

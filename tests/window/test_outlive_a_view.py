@@ -1,4 +1,4 @@
-"""Operators that go on while views, workspaces and other operators come and go, in a real Blender window."""
+"""What outlives the view or the moment it was begun in, and beds that are whole, in a real Blender window."""
 
 from __future__ import annotations
 
@@ -32,3 +32,32 @@ def test_esc_stops_a_session_that_has_stepped_aside_for_a_moment(seen: dict[str,
     modal, running, after, later, token = seen[f"Esc over {area}"]
     assert (modal, running) == ([], 1)
     assert (after, later, token) == (0, [], 0)
+
+
+#: Beds, those with a fingertip, objects in the scene (an ellipsoid each), hidden ones, sessions.
+ONE, TWO, FOUR = [1, 1, 3, 0, 0], [2, 2, 6, 0, 0], [4, 4, 12, 0, 0]
+WHOLE = {
+    "one bed": ONE,
+    "deleted": [0, 0, 0, 0, 0],
+    "delete undone": ONE,
+    "delete redone": [0, 0, 0, 0, 0],
+    "delete undone again": ONE,
+    # While it is dragged nothing is done to the file.
+    "copy in hand": [2, 1, 4, 0, 0],
+    "copied": TWO,
+    "copy undone": ONE,
+    "copy redone": TWO,
+    "hidden": [2, 2, 6, 3, 0],
+    "shown": TWO,
+    "session": [2, 2, 6, 0, 1],
+    "deleted in mid-session": ONE,
+    "undone after it": TWO,
+    "all copied": FOUR,
+    "all deleted": [0, 0, 0, 0, 0],
+    "all back": FOUR,
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_bed_and_its_fingertip_are_one_under_the_hand(seen: dict[str, Any], name: str) -> None:
+    assert seen[name] == WHOLE[name]

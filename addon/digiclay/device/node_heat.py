@@ -7,7 +7,7 @@ from typing import Any
 from . import heat
 from .nodes import attribute, node, number, socket
 
-__all__ = ["COLOUR_BY_FORCE", "TOP_FORCE", "add_settings", "pins_by_force"]
+__all__ = ["COLOUR_BY_FORCE", "TOP_FORCE", "add_settings", "level_of_force"]
 
 #: Names of the settings.
 COLOUR_BY_FORCE, TOP_FORCE = "Colour by Force", "Top Colour at (N)"
@@ -19,23 +19,18 @@ def add_settings(tree: Any) -> None:
     socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "From this force on a pin has the last colour, in N")
 
 
-def pins_by_force(tree: Any, pins: Any, top: Any, row: float) -> tuple[Any, Any]:
-    """Add the nodes that choose a pin by the force on it.
+def level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
+    """Add the nodes that choose a pin by the force on it; return its place among the pins.
 
     Parameters
     ----------
     tree : bpy.types.NodeTree
-    pins : bpy.types.Collection
-        One pin a level of `heat.level`, their names in that order.
     top : bpy.types.NodeSocket
         Force of the last level, N.
+    first : int
+        Place of the pin that nothing presses; the levels of `heat.level` come behind it.
     row : float
         Where in the tree they stand.
-
-    Returns
-    -------
-    instances, index : bpy.types.NodeSocket
-        The pins to choose from, and which one each vertex gets; as `heat.level` works it out.
     """
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
     per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLOURS)), top)
@@ -43,7 +38,4 @@ def pins_by_force(tree: Any, pins: Any, top: Any, row: float) -> tuple[Any, Any]
     within = node(tree, "ShaderNodeClamp", 3, row + 1)
     within.inputs["Max"].default_value = len(heat.COLOURS)
     tree.links.new(levels, within.inputs["Value"])
-    choice = node(tree, "GeometryNodeCollectionInfo", 3, row)
-    choice.inputs["Collection"].default_value = pins
-    choice.inputs["Separate Children"].default_value = True
-    return choice.outputs["Instances"], within.outputs["Result"]
+    return number(tree, "ADD", 3.5, row, within.outputs["Result"], float(first))

@@ -1,32 +1,33 @@
-"""The geometry nodes that draw a bed: a pin on every vertex, stretched down to the deck."""
+"""The geometry nodes that draw a bed: a pin on every vertex, stretched down to the deck, and the housing."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from ..compat import bpy
+from ..core.modes import Mode
 from . import node_arrows, node_heat
 from .nodes import attribute, node, number, switch
+from .parts import Sources
 
-__all__ = ["bed_nodes"]
+__all__ = ["CASE", "SOURCES", "bed_nodes"]
+
+#: Names of the nodes that have the housing and the collection of all that is drawn.
+CASE, SOURCES = "Housing", "Sources"
 
 #: Pins pushed below the deck keep this much of their length, rather than turning upside down.
 LEAST_STRETCH = 0.02
 
 
-def bed_nodes(by_mode: Any, by_force: Any, arrow: Any, deck: float, length: float, unit: float) -> Any:
-    """Make the node group that puts a pin on every vertex, and an arrow where arrows are on.
+def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
+    """Make the node group that puts a pin on every vertex, an arrow where arrows are on, and the housing.
 
     Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
     rod, from a flat one on a low pin to a round one on a high pin.
 
     Parameters
     ----------
-    by_mode, by_force : bpy.types.Collection
-        One pin a mode and one a level of force, their names in the order of the codes; tops at
-        their origins.
-    arrow : bpy.types.Object
-        An arrow of length 1 that points down and ends at the origin.
+    sources : Sources
     deck : float
         Height the rods reach down to, Blender units.
     length : float
@@ -40,23 +41,29 @@ def bed_nodes(by_mode: Any, by_force: Any, arrow: Any, deck: float, length: floa
     node_heat.add_settings(tree)
     node_arrows.add_settings(tree)
     settings = node(tree, "NodeGroupInput", -1, 0)
-    result = node(tree, "NodeGroupOutput", 7, 0)
+    result = node(tree, "NodeGroupOutput", 9, 0)
     force_on, top = settings.outputs[node_heat.COLOUR_BY_FORCE], settings.outputs[node_heat.TOP_FORCE]
-    hot, level = node_heat.pins_by_force(tree, by_force, top, 3)
-    choice = node(tree, "GeometryNodeCollectionInfo", 2, 0)
-    choice.inputs["Collection"].default_value = by_mode
+    level = node_heat.level_of_force(tree, top, len(Mode), 3)
+    choice = node(tree, "GeometryNodeCollectionInfo", 4, 0)
+    choice.name, choice.inputs["Collection"].default_value = SOURCES, sources.collection
     choice.inputs["Separate Children"].default_value = True
     mode = attribute(tree, "mode", "INT", 2, 1)
     instances = node(tree, "GeometryNodeInstanceOnPoints", 5, 0)
     instances.inputs["Pick Instance"].default_value = True
-    shapes = switch(tree, "GEOMETRY", 4, 0, force_on, choice.outputs["Instances"], hot)
     index = switch(tree, "INT", 4, 1, force_on, mode, level)
     tree.links.new(settings.outputs["Geometry"], instances.inputs["Points"])
-    tree.links.new(shapes, instances.inputs["Instance"])
+    tree.links.new(choice.outputs["Instances"], instances.inputs["Instance"])
     tree.links.new(index, instances.inputs["Instance Index"])
     tree.links.new(_stretch(tree, deck, length), instances.inputs["Scale"])
-    drawn = node_arrows.arrows_on_points(tree, arrow, settings, instances.outputs["Instances"], unit, 7)
-    tree.links.new(drawn, result.inputs["Geometry"])
+    drawn = node_arrows.arrows_on_points(
+        tree, sources.arrow, settings, instances.outputs["Instances"], unit, 7
+    )
+    case = node(tree, "GeometryNodeObjectInfo", 7, 1)
+    case.name, case.inputs["Object"].default_value = CASE, sources.housing
+    both = node(tree, "GeometryNodeJoinGeometry", 8, 0)
+    tree.links.new(case.outputs["Geometry"], both.inputs["Geometry"])
+    tree.links.new(drawn, both.inputs["Geometry"])
+    tree.links.new(both.outputs["Geometry"], result.inputs["Geometry"])
     return tree
 
 

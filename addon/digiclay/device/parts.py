@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,15 +12,9 @@ from ..compat import bpy, shader_nodes
 from ..core.modes import COLOURS, Mode
 from . import heat, shapes
 from .instant import Instant
+from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 
-__all__ = [
-    "BED", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
-    "arrow", "ellipsoid", "fingertip", "housing", "marked", "material", "pins", "skin",
-]  # fmt: skip
-
-#: Marks the objects of the device; names are the user's to change.
-ROLE = "digiclay_role"
-BED, FINGERTIP, ELLIPSOID, HOUSING, PIN = "bed", "fingertip", "ellipsoid", "housing", "pin"
+__all__ = ["Sources", "ellipsoid", "fingertip", "marked", "material", "skin", "sources", "stands"]
 
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)
@@ -62,40 +55,50 @@ def material(name: str, colour: tuple[float, float, float], roughness: float, al
     return made
 
 
-def pins(instant: Instant, length: float) -> tuple[Any, Any]:
-    """Make one pin a mode and one a level of force, in two collections that stand in no scene."""
+class Sources(NamedTuple):
+    """What a bed's geometry nodes draw: objects that stand in no scene, all in one collection.
+
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
+    arrow : bpy.types.Object
+        An arrow of length 1 that points down and ends at the origin.
+    housing : bpy.types.Object
+    """
+
+    collection: Any
+    arrow: Any
+    housing: Any
+
+
+def sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
+    """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m."""
     segments = 28 if len(instant.height) <= MANY else 12
     shape = shapes.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
     mesh.materials.append(None)
-    modes = [(mode.name.lower(), COLOURS[mode]) for mode in Mode]
-    levels = [(f"force_{level:02d}", colour) for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS))]
-    return _worn("Digital Clay Pins", mesh, modes), _worn("Digital Clay Pins by Force", mesh, levels)
-
-
-def _worn(name: str, mesh: Any, looks: Sequence[tuple[str, tuple[float, float, float]]]) -> Any:
-    """Make a collection in which a mesh wears one material after another.
-
-    The node that reads the collection sorts it by name: hence the code in front.
-    """
-    collection = bpy.data.collections.new(name)
+    looks = [(mode.name.lower(), COLOURS[mode]) for mode in Mode]
+    looks += [(f"force_{level:02d}", colour) for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS))]
+    collection = bpy.data.collections.new("Digital Clay Parts")
+    # The node that reads the collection sorts it by name: hence the number in front.
     for code, (look, colour) in enumerate(looks):
         pin = marked(mesh, f"{code:02d} {look}", PIN, collection)
         pin.material_slots[0].link = "OBJECT"
         pin.material_slots[0].material = material(look, colour, roughness=0.45)
-    return collection
+    arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", PIN, collection)
+    case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", PIN, collection)
+    return Sources(collection, arrow, case)
 
 
-def arrow(pitch: float) -> Any:
-    """Make the arrow of a bed, which stands in no scene; the pitch in m."""
+def _arrow(pitch: float) -> Any:
+    """Make the mesh of a bed's arrow; the pitch in m."""
     mesh = bridge.mesh("Digital Clay Force", shapes.arrow(HEAD * pitch * SCALE))
     mesh.materials.append(material("force_arrow", ARROW, roughness=0.5))
-    made = bpy.data.objects.new("Digital Clay Force", mesh)
-    made[ROLE] = PIN
-    return made
+    return mesh
 
 
-def housing(instant: Instant, deck: float, rim: float) -> Any:
+def _housing(instant: Instant, deck: float, rim: float) -> Any:
     """Make the mesh of the case about the pins of an instant; floor inside and upper edge in m."""
     reach = np.abs(instant.position).max(axis=0) + instant.actuator.bore / 2 + GAP * instant.pitch
     half = float(reach[0]) * SCALE, float(reach[1]) * SCALE
@@ -114,12 +117,15 @@ def fingertip(collection: Any, bed: Any) -> Any:
     of the device, kept in the ellipsoid's scale.
     """
     made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
+    bed[FINGER] = made
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
     mesh = bridge.mesh("Digital Clay Ellipsoid", shapes.ball())
     mesh.materials.append(None)
     ball = marked(mesh, mesh.name, ELLIPSOID, collection, parent=made)
+    made[BALL] = ball
+    made[OWNED] = ball[OWNED] = True
     ball.hide_select = True
     ball.material_slots[0].link = "OBJECT"
     ball.material_slots[0].material = skin(clear=False)
@@ -128,7 +134,15 @@ def fingertip(collection: Any, bed: Any) -> Any:
 
 def ellipsoid(tip: Any) -> Any | None:
     """Return the ellipsoid of a fingertip, or None when the user has deleted it."""
-    return next((child for child in tip.children if child.get(ROLE) == ELLIPSOID), None)
+    ball = tip.get(BALL)
+    if ball is None:  # older files do not have it as a property
+        ball = next((child for child in tip.children if child.get(ROLE) == ELLIPSOID), None)
+    return ball if ball is not None and ball.parent == tip and stands(ball) else None
+
+
+def stands(thing: Any) -> bool:
+    """Tell whether an object stands in any collection: what is deleted but held by a property does not."""
+    return bool(thing.users_collection)
 
 
 def skin(clear: bool) -> Any:

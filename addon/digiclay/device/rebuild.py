@@ -13,6 +13,7 @@ from ..live import bed_state
 from ..settings import properties
 from . import view
 from .instant import Instant
+from .roles import FINGER
 
 __all__ = ["rebuild"]
 
@@ -34,22 +35,20 @@ def rebuild(bed: Any) -> Scene:
     """
     scene = properties.described(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
-    collection = bed.users_collection[0]
-    made = view.build(instant, collection, lowest=0.0)
     old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _nodes(bed)]
+    made = view.build(instant, bed.users_collection[0], lowest=0.0)
     bed.data = made.data
     # The modifier stays, and with it how the bed is coloured; only what it draws is another.
     for kept, new in zip(_nodes(bed), _nodes(made), strict=False):
         kept.node_group = new.node_group
     tip = view.fingertip_of(bed)
     if tip is None:
-        view.fingertip_of(made).parent = bed
+        bed[FINGER] = view.fingertip_of(made)
+        bed[FINGER].parent = bed
     else:
         bridge.resize_fingertip(tip, instant.finger)
+    view.guard(bed)
     cases = [child for child in bed.children if child.get(view.ROLE) == view.HOUSING]
-    for child in made.children:
-        if child.get(view.ROLE) == view.HOUSING:
-            child.parent = bed
     _remove([*cases, *made.children_recursive, made])
     for tree in old_trees:
         _discard(tree)

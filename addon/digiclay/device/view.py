@@ -24,14 +24,15 @@ from . import parts
 from .instant import Instant
 from .node_arrows import ARROW_LENGTH, ARROWS
 from .node_heat import COLOUR_BY_FORCE, TOP_FORCE
-from .node_tree import bed_nodes
-from .parts import BED, ELLIPSOID, FINGERTIP, HOUSING, ROLE, material
+from .node_tree import CASE, SOURCES, bed_nodes
+from .parts import material, stands
+from .roles import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
 
 __all__ = [
-    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE",
-    "arrow_length", "arrows_shown", "bed_of", "build", "colour_by", "coloured_by", "fingertip_of", "is_bed",
-    "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state",
-    "shows_force", "top_colour", "underside", "wants_force",
+    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "arrow_length", "arrows_shown",
+    "bed_of", "build", "colour_by", "coloured_by", "dress", "fingertip_of", "guard", "housing_of",
+    "is_bed", "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows",
+    "show_state", "shows_force", "sources_of", "top_colour", "tree_of", "underside", "wants_force",
 ]  # fmt: skip
 
 #: What the colour of a pin can tell.
@@ -41,7 +42,7 @@ MODIFIER = "Pins"
 
 
 def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
-    """Add a bed, its housing and its fingertip to a collection.
+    """Add a bed and its fingertip to a collection.
 
     Parameters
     ----------
@@ -56,27 +57,44 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     Returns
     -------
     bpy.types.Object
-        The bed; housing and fingertip are its children. Its origin is the centre of the
-        bed's floor.
+        The bed; the fingertip is its child. Its origin is the centre of the bed's floor.
     """
+    cells = bridge.points("Digital Clay", len(instant.height))
+    bed = parts.marked(cells, cells.name, BED, collection)
+    bed.modifiers.new(MODIFIER, "NODES").node_group = tree_of(instant, lowest)
+    parts.fingertip(collection, bed)
+    guard(bed)
+    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    _place_fingertip(bed, instant)
+    return bed
+
+
+def tree_of(instant: Instant, lowest: float | None = None) -> Any:
+    """Make the geometry nodes that draw pins and housing of a bed; see `build`."""
     lowest = float(instant.height.min()) if lowest is None else lowest
     # The rim stays below most tops, so that the surface and little of the rods is seen over it.
     rim = float(np.median(instant.height)) - 1.2 * instant.pitch
     # The deck is so deep that no pin is stretched much more than another: it shows on their caps.
     deck = min(lowest, rim) - 2.5 * instant.pitch
-    cells = bridge.points("Digital Clay", len(instant.height))
-    bed = parts.marked(cells, cells.name, BED, collection)
-    modifier = bed.modifiers.new(MODIFIER, "NODES")
     length = float(np.median(instant.height)) - deck
-    modifier.node_group = bed_nodes(
-        *parts.pins(instant, length), parts.arrow(instant.pitch), deck * SCALE, length * SCALE, SCALE * 1e-3
-    )
-    case = parts.housing(instant, deck, rim)
-    parts.marked(case, case.name, HOUSING, collection, parent=bed).hide_select = True
-    parts.fingertip(collection, bed)
-    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
-    _place_fingertip(bed, instant)
-    return bed
+    drawn = parts.sources(instant, length, deck, rim)
+    return bed_nodes(drawn, deck * SCALE, length * SCALE, SCALE * 1e-3)
+
+
+def dress(bed: Any, instant: Instant) -> None:
+    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
+    _modifier(bed).node_group = tree_of(instant, 0.0)
+
+
+def guard(bed: Any) -> None:
+    """Have what a bed is drawn with stay out of the scene when the bed is appended to another file.
+
+    Blender puts an appended collection of objects that stand in no scene into the scene, unless an
+    empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
+    """
+    tip = fingertip_of(bed)
+    if tip is not None:
+        tip.instance_collection = sources_of(bed)
 
 
 def show(bed: Any, instant: Instant) -> None:
@@ -178,13 +196,31 @@ def bed_of(context: Any) -> Any | None:
 
 def fingertip_of(bed: Any) -> Any | None:
     """Return the fingertip that belongs to a bed, or None when the user has deleted it."""
-    return next((child for child in bed.children if child.get(ROLE) == FINGERTIP), None)
+    tip = bed.get(FINGER)
+    if tip is None:  # older files do not have it as a property
+        tip = next((child for child in bed.children if child.get(ROLE) == FINGERTIP), None)
+    return tip if tip is not None and tip.parent == bed and stands(tip) else None
+
+
+def housing_of(bed: Any) -> Any | None:
+    """Return the object that has the shape of a bed's housing, in the bed's space; None without."""
+    modifier = _modifier_of(bed)
+    case = modifier.node_group.nodes.get(CASE) if modifier else None
+    if case is not None:
+        return case.inputs["Object"].default_value
+    return next((child for child in bed.children if child.get(ROLE) == HOUSING), None)
+
+
+def sources_of(bed: Any) -> Any | None:
+    """Return the collection of all a bed is drawn with; None in older files, or without its nodes."""
+    modifier = _modifier_of(bed)
+    drawn = modifier.node_group.nodes.get(SOURCES) if modifier else None
+    return None if drawn is None else drawn.inputs["Collection"].default_value
 
 
 def underside(bed: Any) -> float:
     """Return the height of the housing's underside in the space of its bed, Blender units."""
-    case = next(child for child in bed.children if child.get(ROLE) == HOUSING)
-    return min(float(vertex.co.z) for vertex in case.data.vertices)
+    return min(float(vertex.co.z) for vertex in housing_of(bed).data.vertices)
 
 
 def _place_fingertip(bed: Any, instant: Instant) -> None:

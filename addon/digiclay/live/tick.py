@@ -13,8 +13,7 @@ import numpy as np
 from .. import bridge, preferences
 from ..core.errors import DigiclayError, DivergenceError
 from ..core.fingertip import Fingertip
-from ..device import display, parts, view
-from ..device.instant import Instant
+from ..device import display, unit, view
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..settings import properties
@@ -49,11 +48,9 @@ def start(context: Any, bed: Any) -> list[Note]:
     if bed.data.users > 1:
         bed.data = bed.data.copy()
         notes.append(Note("INFO", f"{bed.name} got pins of its own: it shared them with another bed"))
-    if view.fingertip_of(bed) is None:
-        tip = parts.fingertip(bed.users_collection[0], bed)
-        rest = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip)
-        bridge.place_fingertip(tip, rest.fingertip, rest.finger)
-        notes.append(Note("INFO", f"{bed.name} got a new fingertip"))
+    got = unit.give_fingertip(bed, scene)
+    if got:
+        notes.append(Note("INFO", got))
     context.view_layer.update()
     why = obstacle(context, bed, scene.cells)
     if why:

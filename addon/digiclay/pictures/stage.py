@@ -108,11 +108,14 @@ def outline(bed: Any) -> Floats:
     The bed stands at the origin; `matrix_basis` is right without an update of the scene.
     """
     clouds = []
-    for part in (bed, *bed.children_recursive):
-        if part.type != "MESH":
-            continue
-        flat = np.empty(3 * len(part.data.vertices), np.float32)
-        part.data.vertices.foreach_get("co", flat)
+    # The housing's shape is that of an object which stands in no scene: what it is drawn by is the bed.
+    meshes = [(part, part.data) for part in (bed, *bed.children_recursive) if part.type == "MESH"]
+    case = view.housing_of(bed)
+    if case is not None and case.parent != bed:
+        meshes.append((bed, case.data))
+    for part, mesh in meshes:
+        flat = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", flat)
         cloud = flat.reshape(-1, 3)
         while part is not None:
             matrix = np.array(part.matrix_basis)

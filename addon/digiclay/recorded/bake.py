@@ -19,6 +19,7 @@ from ..core.keeping import unpacked
 from ..core.live import lived
 from ..core.take import Take
 from ..device import view
+from ..device.roles import BAKE
 from .bake_tree import MOMENT, pins_at_moment
 
 __all__ = ["Moments", "apply", "frames_in", "free", "is_baked", "moments_of", "sampled"]
@@ -26,8 +27,6 @@ __all__ = ["Moments", "apply", "frames_in", "free", "is_baked", "moments_of", "s
 Floats = NDArray[np.float64]
 #: Name of the modifier.
 MODIFIER = "Baked session"
-#: Role of the object that holds the baked pins; it stands in no scene.
-BAKE = "bake"
 #: Frame ranges longer than this are a slip of the hand: an hour at 60 frames a second.
 MOST_FRAMES = 216_000
 
@@ -108,7 +107,11 @@ def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
-    modifier.node_group = pins_at_moment(_held(moments), count)
+    held = _held(moments)
+    modifier.node_group = pins_at_moment(held, count)
+    sources = view.sources_of(bed)
+    if sources is not None:
+        sources.objects.link(held)  # as `view.guard` has it: appended, the bed leaves it out of the scene
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]
     own_curves(bed)
@@ -145,7 +148,7 @@ def free(bed: Any) -> bool:
     if not tree.users:
         held = _source(tree)
         bpy.data.node_groups.remove(tree)
-        if held is not None and not held.users:
+        if held is not None and held.users == len(held.users_collection):
             bpy.data.meshes.remove(held.data)  # takes the object along
     return True
 

@@ -1,0 +1,236 @@
+"""A bed and its fingertip as one: what a copy lacks, what a deleted bed leaves behind, what is hidden along.
+
+Blender copies, deletes and hides the objects that are selected, not those that belong to them. Here is told
+what is missing or left over then, and it is put right; when that happens is up to `unit_watch`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from .. import bridge
+from ..compat import bpy, own_curves
+from ..core.errors import DigiclayError
+from ..core.fingertip import Fingertip
+from ..core.scene import Scene
+from ..settings import properties
+from . import parts, view
+from .instant import Instant
+from .roles import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
+
+__all__ = ["Faults", "adopt", "faults", "follow", "give_fingertip", "mend"]
+
+#: Marks what was hidden along with what it belongs to: only that is shown along with it again.
+HIDDEN = "digiclay_hidden"
+#: Its bits: by the eye in the outliner (H), and by the switches of the object itself.
+EYE, SWITCHES = 1, ((2, "hide_viewport"), (4, "hide_render"))
+
+
+class Faults(NamedTuple):
+    """What is not as it should be; not to be kept, since undo invalidates it.
+
+    Attributes
+    ----------
+    bare : list of bpy.types.Object
+        Beds that have come without a fingertip of their own: copies, and beds of older files. And
+        fingertips that were copied without their ellipsoid, which cannot be selected.
+    left : list of bpy.types.Object
+        Fingertips, ellipsoids and housings whose bed or fingertip is gone.
+    strewn : list of bpy.types.Object
+        What beds are drawn with, come into a scene with an older bed that was appended.
+    """
+
+    bare: list[Any]
+    left: list[Any]
+    strewn: list[Any]
+
+
+def adopt() -> frozenset[int]:
+    """Mark what belongs to the beds there are; return the uids of all objects that are known from now on."""
+    for bed in _beds():
+        tip = view.fingertip_of(bed)
+        if tip is None:
+            continue
+        if bed.get(FINGER) != tip:  # an older file
+            bed[FINGER] = tip
+            view.guard(bed)
+        ball = parts.ellipsoid(tip)
+        if ball is not None and tip.get(BALL) != ball:
+            tip[BALL] = ball
+        cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
+        for part in filter(None, (tip, ball, *cases)):
+            if not part.get(OWNED):
+                part[OWNED] = True
+    return frozenset(thing.session_uid for thing in bpy.data.objects if ROLE in thing)
+
+
+def faults(known: frozenset[int]) -> Faults:
+    """Return what is to be put right, by what was known before."""
+    bare = [bed for bed in _beds() if view.fingertip_of(bed) is None and _asks(bed, FINGER, known)]
+    tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
+    bare += [tip for tip in tips if parts.stands(tip) and _asks(tip, BALL, known)]
+    mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
+    left = [thing for thing in mine if parts.stands(thing) and _lost(thing)]
+    shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
+    strewn = [thing for thing in shown if thing.session_uid not in known and not thing.library]
+    return Faults(bare, left, strewn)
+
+
+def mend(found: Faults) -> None:
+    """Put right what was found."""
+    for thing in found.strewn:
+        _put_away(thing)
+    for owner in found.bare:
+        if owner.get(ROLE) == BED:
+            _made_whole(owner)
+        else:
+            _copy(owner, BALL)
+    _remove(found.left)
+
+
+def give_fingertip(bed: Any, scene: Scene) -> str:
+    """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
+    if view.fingertip_of(bed) is not None:
+        return ""
+    tip = bed.get(FINGER)
+    if tip is not None and tip.parent == bed:  # deleted: nothing but the bed holds it any more
+        for part in filter(None, (tip, tip.get(BALL))):
+            bed.users_collection[0].objects.link(part)
+        return f"{bed.name} got its fingertip back"
+    made = parts.fingertip(bed.users_collection[0], bed)
+    rest = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
+    bridge.place_fingertip(made, rest.fingertip, rest.finger)
+    view.guard(bed)
+    return f"{bed.name} got a new fingertip"
+
+
+def follow() -> None:
+    """Have the parts of a bed hidden while it is, and an ellipsoid while its fingertip is."""
+    for bed in _beds():
+        tip = view.fingertip_of(bed)
+        if tip is None:
+            continue
+        _hide_along(bed, tip)
+        ball = parts.ellipsoid(tip)
+        if ball is not None:
+            _hide_along(tip, ball)
+
+
+def _beds() -> list[Any]:
+    """Return the beds of this file that stand in a collection."""
+    every = (thing for thing in bpy.data.objects if thing.get(ROLE) == BED)
+    return [
+        thing for thing in every if not thing.library and not thing.override_library and parts.stands(thing)
+    ]
+
+
+def _asks(owner: Any, held: str, known: frozenset[int]) -> bool:
+    """Tell whether an object without a part of its own is to get one.
+
+    A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
+    part the user has deleted, or taken off it, is not.
+    """
+    part, new = owner.get(held), owner.session_uid not in known
+    if part is None:
+        return new and held == FINGER
+    return part.parent != owner and (new or part.parent is not None)
+
+
+def _lost(part: Any) -> bool:
+    """Tell whether nothing that stands has this part any more."""
+    kind, held = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
+    owner = part.parent
+    if owner is not None and owner.get(ROLE) == kind and parts.stands(owner):
+        return False
+    # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
+    return not any(thing.get(held) == part and parts.stands(thing) for thing in bpy.data.objects)
+
+
+def _made_whole(bed: Any) -> None:
+    """Give a bed a fingertip: a copy of the one it holds and does not own, or a new one."""
+    tip = bed.get(FINGER)
+    if tip is not None and tip.parent != bed:
+        _copy(bed, FINGER)
+        if tip.get(BALL) is not None:
+            _copy(bed[FINGER], BALL)
+    try:
+        scene = properties.described(bed)
+    except DigiclayError:  # settings that do not go together: a session will say so
+        scene = Scene()
+    give_fingertip(bed, scene)
+    if view.is_drawn(bed) and view.housing_of(bed) is None:  # of an older file, where it is an object
+        view.dress(bed, Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip()))
+    view.guard(bed)
+
+
+def _copy(owner: Any, held: str) -> None:
+    """Give a copy of an object a copy of the part it holds, where that one is, its animation its own."""
+    made = owner[held].copy()
+    own_curves(made)
+    made.parent = owner
+    owner[held] = made
+    for collection in owner.users_collection:
+        collection.objects.link(made)
+
+
+def _remove(found: Iterable[Any]) -> None:
+    """Remove parts; what is still held by another stands nowhere from then on, and can be had back."""
+    tips = list(found)
+    things = tips + [
+        child for tip in tips for child in tip.children if child.get(OWNED) and child not in tips
+    ]
+    for part in things:
+        for child in [one for one in part.children if ROLE not in one]:
+            # What the user has hung on a part stays where it is.
+            where = child.matrix_world.copy()
+            child.parent = None
+            child.matrix_world = where
+        for collection in part.users_collection:
+            collection.objects.unlink(part)
+    for part in sorted(things, key=lambda one: one.get(ROLE) == ELLIPSOID):  # held by the others
+        if not part.users:
+            bpy.data.objects.remove(part)
+    # Deleted along with its bed, a fingertip was still held by that, and Blender has kept it.
+    while gone := [one for one in bpy.data.objects if one.get(OWNED) and not one.users]:
+        bpy.data.batch_remove(gone)
+
+
+def _put_away(thing: Any) -> None:
+    """Take what beds are drawn with out of all scenes."""
+    for scene in bpy.data.scenes:
+        for owner in (scene.collection, *scene.collection.children_recursive):
+            for child in list(owner.children):
+                if thing.name in child.objects and all(one.get(ROLE) in (PIN, BAKE) for one in child.objects):
+                    owner.children.unlink(child)
+            if thing.name in owner.objects and owner.objects[thing.name] == thing:
+                owner.objects.unlink(thing)
+
+
+def _hide_along(owner: Any, part: Any) -> None:
+    """Hide a part in every way its owner is hidden, and show it again where it was hidden along."""
+    before = now = int(part.get(HIDDEN, 0))
+    layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
+    both = [one for one in layers if _in(one, owner) and _in(one, part)]
+    for layer in both:
+        hidden, along = owner.hide_get(view_layer=layer), part.hide_get(view_layer=layer)
+        if hidden and not along:
+            now |= EYE
+        if hidden != along and (hidden or before & EYE):
+            part.hide_set(hidden, view_layer=layer)
+    if not any(owner.hide_get(view_layer=layer) for layer in both):
+        now &= ~EYE
+    for bit, name in SWITCHES:
+        hidden, along = getattr(owner, name), getattr(part, name)
+        if hidden != along and (hidden or before & bit):
+            setattr(part, name, hidden)
+        now = now | bit if hidden and not along else now if hidden else now & ~bit
+    if now:
+        part[HIDDEN] = now
+    elif before:
+        del part[HIDDEN]
+
+
+def _in(layer: Any, thing: Any) -> bool:
+    """Tell whether an object stands in a view layer."""
+    return bool(layer.objects.get(thing.name) == thing)

@@ -1,0 +1,94 @@
+"""What a user does to beds with Blender's own operators, and what the scene has after it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from digiclay.device import unit_watch, view
+from digiclay.device.roles import BALL, FINGER, HOUSING, OWNED, ROLE
+
+__all__ = ["added", "beds", "done", "housings", "looked", "older", "redone", "select", "undone", "whole"]
+
+
+def done(step: str) -> None:
+    """End a user's action as Blender does: an undo step, an evaluation, and what waits for those."""
+    bpy.ops.ed.undo_push(message=step)
+    looked()
+
+
+def looked() -> None:
+    """Let what waits for an evaluation happen."""
+    bpy.context.view_layer.update()
+    unit_watch.settle()
+    bpy.context.view_layer.update()
+
+
+def undone() -> None:
+    """Undo one step, as the user counts them."""
+    bpy.ops.ed.undo()
+    looked()
+
+
+def redone() -> None:
+    """Redo one step, as the user counts them."""
+    bpy.ops.ed.redo()
+    looked()
+
+
+def added(x: float = 0.0) -> Any:
+    """Add a small bed, its fingertip somewhere."""
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    bed = bpy.context.object
+    bed.location.x = x
+    view.fingertip_of(bed).location.x += 0.05
+    done("Add")
+    return bed
+
+
+def select(*things: Any) -> None:
+    """Select objects alone, the last one active."""
+    bpy.ops.object.select_all(action="DESELECT")
+    for thing in things:
+        thing.select_set(True)
+        bpy.context.view_layer.objects.active = thing
+
+
+def beds() -> list[Any]:
+    """Return the beds of the scene."""
+    return [thing for thing in bpy.context.scene.objects if view.is_bed(thing)]
+
+
+def whole(*found: Any) -> bool:
+    """Tell whether the scene has these beds, each with a fingertip of its own, and nothing else."""
+    tips = [view.fingertip_of(bed) for bed in found]
+    balls = [tip[BALL] for tip in tips if tip is not None]
+    parts = {*found, *tips, *balls}
+    of_balls = [ball.parent for ball in balls] == tips
+    return len(parts) == 3 * len(found) and of_balls and set(bpy.context.scene.objects) == parts
+
+
+def housings() -> int:
+    """Count the housings drawn."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    drawn = (item.object for item in graph.object_instances if not item.is_instance)
+    meshes = (thing.data for thing in drawn if thing.type == "MESH")
+    return sum(one is not None and one.get(ROLE) == "housing" for mesh in meshes for one in mesh.materials)
+
+
+def older(bed: Any) -> None:
+    """Make a bed what it was in older files: its housing an object, nothing held by properties."""
+    tree = bed.modifiers[0].node_group
+    case = tree.nodes["Housing"].inputs["Object"].default_value.copy()
+    case[ROLE], case.parent = HOUSING, bed
+    bpy.context.collection.objects.link(case)
+    (last,) = (one for one in tree.nodes if one.bl_idname == "NodeGroupOutput")
+    ends = [link.from_socket for link in last.inputs[0].links[0].from_node.inputs[0].links]
+    tree.links.new(next(end for end in ends if end.node.name != "Housing"), last.inputs[0])
+    tree.nodes.remove(tree.nodes["Housing"])
+    tree.nodes["Sources"].name = "Collection Info"
+    tip = view.fingertip_of(bed)
+    ball, tip.instance_collection = tip[BALL], None
+    for thing, names in ((bed, [FINGER]), (tip, [BALL, OWNED]), (ball, [OWNED])):
+        for name in names:
+            del thing[name]

@@ -1,0 +1,192 @@
+"""A bed, its housing and its fingertip are one: appended, deleted, duplicated and hidden together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.device import view
+from digiclay.device.roles import BALL, ROLE
+from digiclay.live import running, tick
+
+from tests.blender.at_hand import added, beds, done, housings, looked, redone, select, undone, whole
+from tests.blender.session.live import Clock, press, started
+
+pytestmark = pytest.mark.usefixtures("watched")
+
+
+def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(tmp_path: Path) -> None:
+    bed = added()
+    at = bridge.pose(view.fingertip_of(bed))
+    name = bed.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    looked()
+    bpy.ops.wm.append(directory=str(tmp_path / "bed.blend" / "Object") + "/", filename=name)
+    # As Blender leaves it, without any help.
+    (bed,) = beds()
+    assert whole(bed)
+    assert len(bpy.context.scene.collection.children) == 0
+    done("Append")
+    assert whole(bed)
+    assert housings() == 1
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), at, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("everything", [False, True], ids=["the bed", "all that can be selected"])
+def test_a_deleted_bed_takes_its_fingertip_along_and_undo_brings_both_back_in_one_step(
+    everything: bool,
+) -> None:
+    bed = added()
+    bpy.ops.object.select_all(action="SELECT" if everything else "DESELECT")
+    bed.select_set(True)
+    done("Select")
+    bpy.ops.object.delete()
+    done("Delete")
+    assert len(bpy.data.objects) == len([one for one in bpy.data.objects if one.get(ROLE) == "pin"])
+    undone()
+    assert whole(*beds())
+    assert len(beds()) == 1
+    redone()
+    assert len(bpy.context.scene.objects) == 0
+    undone()
+    assert whole(*beds())
+
+
+def test_one_of_two_beds_deleted_leaves_the_other_as_it_is() -> None:
+    first, second = added(), added(1.0)
+    # Not by an operator: what the outliner and scripts do is looked after as well.
+    bpy.data.objects.remove(first)
+    done("Delete")
+    assert whole(second)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("along", [False, True], ids=["the bed", "its fingertip too"])
+def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked: bool, along: bool) -> None:
+    bed = added()
+    tip = view.fingertip_of(bed)
+    tip.keyframe_insert("location", frame=1)
+    select(*[tip] * along, bed)
+    done("Select")
+    bpy.ops.object.duplicate(linked=linked)
+    bpy.context.object.location.x = 1.0
+    done("Duplicate")
+    assert len(beds()) == 2
+    assert whole(*beds())
+    assert housings() == 2
+    tips = [view.fingertip_of(one) for one in beds()]
+    poses = [bridge.pose(one) for one in tips]
+    np.testing.assert_allclose(*poses, rtol=0, atol=1e-7)
+    if not (linked and along):  # else Blender has copied it, and was asked to share
+        assert tips[0].animation_data.action != tips[1].animation_data.action
+    undone()
+    assert len(beds()) == 1
+    assert whole(*beds())
+    redone()
+    assert len(beds()) == 2
+    assert whole(*beds())
+
+
+def test_several_beds_are_copied_at_once_and_the_first_ones_deleted_before_anybody_looks() -> None:
+    first = [added(), added(1.0)]
+    select(*first)
+    bpy.ops.object.duplicate()
+    copies = list(bpy.context.selected_objects)
+    select(*first)
+    bpy.ops.object.delete()
+    done("Delete")
+    assert set(copies) == set(beds())
+    assert whole(*copies)
+
+
+def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_session() -> None:
+    bed = added()
+    tip = view.fingertip_of(bed)
+    at = bridge.pose(tip)
+    select(tip)
+    bpy.ops.object.delete()
+    done("Delete")
+    assert list(bpy.context.scene.objects) == [bed]
+    notes = tick.start(bpy.context, bed)
+    assert [note.words for note in notes] == [f"{bed.name} got its fingertip back"]
+    assert whole(bed)
+    np.testing.assert_array_equal(bridge.pose(view.fingertip_of(bed)), at)
+
+
+def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state() -> None:
+    bed, clock = added(), Clock()
+    bpy.ops.object.select_all(action="DESELECT")
+    started(bed)
+    press(bed, clock)
+    select(bed)
+    bpy.ops.object.duplicate()
+    done("Duplicate")
+    copy = bpy.context.object
+    select(bed)
+    bpy.ops.object.delete()
+    clock.tick()
+    done("Delete")
+    assert running.all() == ()
+    assert whole(copy)
+    started(copy)
+    assert running.of(copy).state.row(0).min() < 39e-3
+
+
+def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is() -> None:
+    bed = added()
+    bed.location.z = 0.0  # what hangs on something that is deleted goes to the origin: that is Blender's way
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    bpy.context.collection.objects.link(camera)
+    camera.parent, camera.location = view.fingertip_of(bed), (0.0, 0.0, 0.3)
+    done("Hang")
+    where = np.array(camera.matrix_world)
+    bpy.data.objects.remove(bed)
+    done("Delete")
+    assert list(bpy.context.scene.objects) == [camera]
+    np.testing.assert_allclose(camera.matrix_world, where, rtol=0, atol=1e-6)
+
+
+def hidden(name: str, *things: Any) -> list[bool]:
+    """Tell of objects whether they are hidden, by the eye or a switch of their own."""
+    return [thing.hide_get() if name == "eye" else getattr(thing, name) for thing in things]
+
+
+@pytest.mark.parametrize("name", ["eye", "hide_viewport", "hide_render"])
+def test_a_bed_is_hidden_and_shown_with_its_fingertip(name: str) -> None:
+    bed = added()
+    tip = view.fingertip_of(bed)
+    parts = bed, tip, tip[BALL]
+
+    def hide(thing: Any, on: bool) -> None:
+        thing.hide_set(on) if name == "eye" else setattr(thing, name, on)
+        done("Hide")
+
+    for _ in range(2):
+        hide(bed, True)
+        assert hidden(name, *parts) == [True] * 3
+        hide(bed, False)
+        assert hidden(name, *parts) == [False] * 3
+    hide(tip, True)
+    assert hidden(name, *parts) == [False, True, True]
+    # What was hidden for itself is not shown along.
+    hide(bed, True)
+    hide(bed, False)
+    assert hidden(name, *parts) == [False, True, True]
+    hide(tip, False)
+    assert hidden(name, *parts) == [False] * 3
+
+
+def test_undo_shows_again_what_was_hidden_along() -> None:
+    bed = added()
+    bed.hide_set(True)
+    done("Hide")
+    undone()
+    (bed,) = beds()
+    tip = view.fingertip_of(bed)
+    assert hidden("eye", bed, tip, tip[BALL]) == [False] * 3
