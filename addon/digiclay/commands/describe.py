@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.assembly import assemble
+from ..core.control.master_cell import master_cell
 from ..core.quantity import Parameters, quantities
 from ..core.recorder import available_memory, bytes_needed
 from ..core.scene import Scene
@@ -32,7 +33,7 @@ PLACES = (
     ("blister", "blister"), ("recorder", "recorder"),
 )  # fmt: skip
 #: Units people read: factor and name.
-READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s")}
+READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s"), "m/s": (1e3, "mm/s")}
 
 
 def add(commands: Any) -> None:
@@ -65,6 +66,9 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     layout = scene.layout
     pitch = human(layout.pitch, "m")
     yield f"  {layout.rows} x {layout.columns} = {scene.cells} cells, {pitch} apart, {layout.arrangement}"
+    yield "\nThe pins"
+    for name, text in _pins(scene, system):
+        yield _filled(name, text)
     yield "\nThe state of a cell"
     rows = ", ".join(f"{name} ({count})" if count > 1 else name for name, count in _rows(system) if count)
     yield f"  {system.rows.count} rows: {rows}; {8 * system.rows.count} bytes"
@@ -77,6 +81,30 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     needed, free = bytes_needed(scene.recorder, system.rows, *sizes), available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
     yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"
+
+
+def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
+    """Give what a pin can do, and how long the bed takes over it."""
+    actuator, supply = scene.actuator, scene.supply
+    speed = master_cell(system.cell, system.period).speed
+    up, down = speed(1.0), 0.0 - speed(-1.0)
+    yield "free speed", f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load"
+    lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
+    yield (
+        "hold force",
+        f"{lift:.3g} N up through the open valve, {pull:.3g} N down; any load with the valve shut",
+    )
+    volume = scene.cells * actuator.area * actuator.stroke
+    yield (
+        "refill",
+        f"all pins together, from the floor to the full stroke: {_lasting(actuator.stroke, up)}; "
+        f"back to the floor: {_lasting(actuator.stroke, down)}; {volume * 1e6:.3g} ml",
+    )
+
+
+def _lasting(way: float, speed: float) -> str:
+    """Write how long a way takes, m and m/s; a reservoir may push the other way."""
+    return f"{way / speed:.3g} s" if speed > 0.0 else "never"
 
 
 def _rows(system: System) -> Iterator[tuple[str, int]]:
