@@ -153,6 +153,8 @@ def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
         (b'"memory"', b'"m"'),
         (b'"memory": ', b'"memory": ' + b"[" * 100_000),
         (b'"period": 70', b'"period": 1' + b"0" * 400),
+        (b'"peak": ', b'"peak": 1' + b"0" * 400 + b', "p": '),
+        (b'"reach": [', b'"reach": [1' + b"0" * 400 + b", "),
     ],
 )
 def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
@@ -176,6 +178,45 @@ def test_a_mode_that_does_not_exist_is_refused() -> None:
     state.modes[5] = len(Mode)
     with pytest.raises(StateError, match="no state has"):
         unpacked(system, packed(system, state))
+
+
+def test_a_cell_that_is_gathered_twice_is_refused() -> None:
+    system = system_of()
+    state = run(system, begin(system), 70)
+    cells = state.gathered.cells
+    cells[1] = cells[0]
+    with pytest.raises(StateError, match="no state has"):
+        unpacked(system, packed(system, state))
+
+
+@pytest.mark.parametrize(
+    ("row", "value"),
+    [
+        ("height", -1e-3),
+        ("height", 0.11),
+        ("opening", 1.1),
+        ("opening", -1.1),
+        ("command", 1.1),
+        ("force", 1e154),
+    ],
+)
+@pytest.mark.parametrize("gathered", [False, True])
+def test_numbers_no_device_can_have_are_refused(row: str, value: float, gathered: bool) -> None:
+    system = system_of()
+    state, rows = run(system, begin(system), 70), system.rows
+    lag = system.cell.lag_rows.start
+    index = {"height": 0, "opening": lag, "command": rows.command, "force": rows.force}[row]
+    (state.gathered.block if gathered else state.rows)[index, 1] = value
+    with pytest.raises(StateError, match="no state has"):
+        unpacked(system, packed(system, state))
+
+
+def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
+    system = system_of()
+    state = run(system, begin(system), 70)
+    state.rows[0, :2] = 0.0, system.cell.actuator.stroke
+    state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
+    assert same(unpacked(system, packed(system, state)), state)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,10 @@ __all__ = ["carried", "packed", "unpacked"]
 
 #: What kept bytes start with; the number changes when their arrangement does.
 START = b"digiclay state 1\n"
+#: How far rounding may take a height, m, or an opening beyond its ends.
+SLACK = 1e-6
+#: No number of a state is as large: a session ends when the square of one is no longer finite.
+LARGEST = 1e154
 #: What can be done about bytes that cannot be used.
 REMEDY = "Reset the session to begin with a bed at rest."
 
@@ -93,6 +97,7 @@ def unpacked(system: System, data: bytes) -> State:
     _fits("number of cells", header["cells"], system.grid.count)
     _fits("rows of a cell", header["rows"], here)
     _fits("control period", header["control_period"], system.period)
+    _within_the_device(system, kept)
     template = system.controller.begin() if system.controller else None
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
@@ -143,6 +148,17 @@ def carried(system: System, data: bytes) -> State:
     return State(0, state.rows, state.modes, state.aged, peak, state.gathered, state.memory)
 
 
+def _within_the_device(system: System, kept: Kept) -> None:
+    """Refuse pins beyond their end stops, and valves opened wider than all the way."""
+    rows, top = system.rows, system.cell.actuator.stroke + SLACK
+    for name in ("rows", "block"):
+        values = kept.arrays[name]
+        height, valves = values[0], (values[system.cell.lag_rows], values[rows.commands])
+        wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
+        if wide or ((height < -SLACK) | (height > top)).any():
+            raise _unusable("holds numbers that no state has")
+
+
 def _read(data: bytes) -> Kept:
     """Read bytes without regard to any system; their arrays are new ones."""
     if not isinstance(data, bytes) or not data.startswith(START):
@@ -168,7 +184,7 @@ def _read(data: bytes) -> Kept:
         kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
-    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise _unusable(f"is damaged: {type(error).__name__}") from None
     if not sound or not _sound(kept, cells):
         raise _unusable("holds numbers that no state has")
@@ -194,7 +210,7 @@ def _sound(kept: Kept, count: int) -> bool:
     arrays = kept.arrays
     cells = arrays["cells"]
     return bool(
-        all(np.isfinite(arrays[name]).all() for name in ("rows", "aged", "block"))
+        all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
         and all(((arrays[name] >= 0) & (arrays[name] < len(Mode))).all() for name in ("modes", "mode"))
         and ((cells >= 0) & (cells < count)).all()
         and np.unique(cells).size == cells.size

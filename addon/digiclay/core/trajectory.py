@@ -15,6 +15,9 @@ __all__ = ["Trajectory", "along", "between", "level"]
 
 Floats = NDArray[np.float64]
 
+#: Waypoints are no nearer to each other, s: speeds stay finite.
+SHORTEST = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -56,11 +59,13 @@ class Trajectory:
             if bad.size:
                 value = f"{getattr(self, name)[tuple(bad[0])]} at waypoint {bad[0][0] + 1}"
                 raise ParameterError("Trajectory", name, "must be finite numbers", value)
-        falls = np.flatnonzero(np.diff(self.times) <= 0.0)
+        falls = np.flatnonzero(np.diff(self.times) < SHORTEST)
         if falls.size:
             at = int(falls[0])
             value = f"{self.times[at + 1]:g} s after {self.times[at]:g} s at waypoint {at + 2}"
-            raise ParameterError("Trajectory", "times", "must increase from waypoint to waypoint", value)
+            rule = "must increase from waypoint to waypoint"
+            rule += f" by at least {SHORTEST:g} s" if self.times[at + 1] > self.times[at] else ""
+            raise ParameterError("Trajectory", "times", rule, value)
         lengths = np.linalg.norm(self.orientations, axis=1)
         if not np.all(lengths > 1e-9):
             raise ParameterError("Trajectory", "orientations", "must have a length above 0", "0, 0, 0, 0")

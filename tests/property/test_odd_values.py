@@ -1,0 +1,84 @@
+"""Odd scenes and kept states are taken or refused in one line; `tools/fuzz.py` tries many more of them."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from digiclay.core.errors import DigiclayError, SceneError
+from digiclay.core.scene_file import Setting, find, load
+from digiclay.core.scene_table import resolve
+
+FILE = Path(__file__).parents[2] / "tools" / "fuzz.py"
+
+
+@pytest.fixture(scope="module")
+def fuzz() -> ModuleType:
+    """The program that makes odd cases."""
+    spec = importlib.util.spec_from_file_location("fuzz", FILE)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("kind", "count"), [("scenes", 250), ("states", 500)])
+def test_what_is_odd_is_taken_or_refused(fuzz: ModuleType, kind: str, count: int) -> None:
+    told = [fuzz.failure(kind, 7, number) for number in range(count)]
+    assert {number: said for number, said in enumerate(told) if said} == {}
+    # Neither is everything refused, nor is everything taken: the cases reach beyond the first check.
+    assert 0.05 * count < told.count("") < 0.95 * count
+
+
+def test_a_failure_is_told_with_its_place(fuzz: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(fuzz.CASES, "states", lambda chance: [][0])
+    assert "IndexError in test_odd_values.py:" in fuzz.failure("states", 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("layout.rows", "1" + 400 * "0", "rows must be a finite number (got a whole number of 401 digits)"),
+        ("layout.rows", "1" + 300 * "0", "rows must be at most 10000 (got a whole number of 301 digits)"),
+        ("layout.rows", "1e300", "layout.rows must be at most 10000"),
+        ("layout.rows", "0x" + 900 * "f", "finite number (got a whole number of 1084 digits)"),
+        ("valve.discharge_slope", "5e-324", "slope must be at least 1e-09 (got 4.94066e-324)"),
+        ("conduit.diameter", "5e-324", "conduit.diameter must be at least 1e-12 m"),
+        ("simulation.physics_step", "5e-324", "simulation.physics_step must be at least 1e-09 s"),
+        ("simulation.control_period", "1e300", "simulation.control_period must be at most 1e+06 s"),
+        ("fluid.density", "1e308", "fluid.density must be at most 1e+06 kg/m3 (got 1e+308 kg/m3)"),
+        ("contact.stiffness", "1e308", "contact.stiffness must be at most 1e+09 N/m"),
+        ("contact.exponent", "1e300", "contact.exponent must be at most 1e+09 1/m"),
+        ("supply.low", "-1e300", "supply.low must be at least -1e+10 Pa"),
+        ("relaxation.times", "[1e300, 1, 1]", "relaxation.times must be at most 1e+06 s"),
+        ("recorder.every", "1" + 30 * "0", "at most 1e+09 (got a whole number of 31 digits)"),
+    ],
+)  # fmt: skip
+def test_a_number_beyond_all_devices_is_refused_with_its_bound(key: str, value: str, said: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(find("slow_press"), [Setting(key, value)])
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("stepper", "step", "said"),
+    [
+        ("bernoulli", 4e-6, "must be at least a 1000th of simulation.control_period, 0.005 s (got"),
+        ("adaptive", 4e-4, "a 10th of simulation.control_period, 0.005 s, with the stepper adaptive"),
+        ("richardson", 9e-6, "a 500th of simulation.control_period, 0.005 s, with the stepper rich"),
+    ],
+)  # fmt: skip
+def test_steps_whose_plan_would_fill_the_memory_are_refused(stepper: str, step: float, said: str) -> None:
+    # 1000 steps of the adaptive stepper, each cut into 128, would make a plan of terabytes.
+    with pytest.raises(DigiclayError) as caught:
+        resolve({"simulation": {"stepper": stepper, "physics_step": step}})
+    assert said in str(caught.value)
+
+
+def test_waypoints_less_than_a_nanosecond_apart_are_refused() -> None:
+    points = [{"time": time, "position": [0, 0, 0.046]} for time in (0.0, 5e-324, 1.0)]
+    with pytest.raises(DigiclayError, match=r"must increase from waypoint to waypoint by at least 1e-09 s"):
+        resolve({"trajectory": {"waypoints": points}})

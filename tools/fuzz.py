@@ -1,0 +1,244 @@
+"""Scenes and kept states made to break the program: all of them are taken, or refused in one line.
+
+usage: python tools/fuzz.py {scenes,states} [--count 100000] [--seed 0] [--first 0]
+
+Case number n of a seed is always the same one, whatever the count. What was neither taken nor refused is
+told with its number, and makes the exit code 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import sys
+import warnings
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from digiclay.core.assembly import assemble
+from digiclay.core.errors import DigiclayError
+from digiclay.core.keeping import START, carried, packed, unpacked
+from digiclay.core.methods import METHODS
+from digiclay.core.quantity import quantities
+from digiclay.core.scene import OPTIONAL, SECTIONS, STEPPERS, UNASKED, Path, Waypoint, parameters
+from digiclay.core.scene_table import ABSENT, PRESETS, resolve, text
+from digiclay.core.session import run
+from digiclay.core.simulation import advance, approaches, begin, periods
+from digiclay.core.system import System
+from digiclay.core.toml_text import tables
+from digiclay.core.trajectory import along
+
+__all__ = ["CASES", "failure", "main"]
+
+#: Numbers at the ends of what there is, and beyond.
+NUMBERS: tuple[Any, ...] = (
+    0, 0.0, -0.0, 1, -1, 5e-324, 1e-310, 2.3e-308, 1e-200, 1e-30, 1e-12, 1e-9, 1e-6, 1e-3, 0.5, 1e3, 1e6, 1e9,
+    1e12, 1e30, 1e100, 1e200, 1.7e308, -5e-324, -1e-9, -1e308, float("inf"), float("-inf"), float("nan"),
+    2**31, 2**53, 2**63, 10**19, 10**30, 10**308, 10**309, 10**400, -(10**400), True,
+)  # fmt: skip
+#: What is no number.
+OTHERS: tuple[Any, ...] = (
+    "", "a", "1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "\0", None, [], {},
+    [[]], [1, 2], [1e308] * 4, [5e-324] * 3, [0.0] * 4, {"a": 1}, ["a"], "é" * 50,
+)  # fmt: skip
+#: Most cells and control periods of a session that is begun, and numbers of a row that it announces.
+CELLS, PERIODS, RECORDED = 200, 3, 1_000_000
+#: Names of what has the physics of its own.
+WAYS = (*METHODS, ABSENT)
+
+
+def odd(chance: np.random.Generator, usual: Any) -> Any:
+    """Return something in place of a usual value: mostly numbers, some of them near the usual one."""
+    draw = chance.random()
+    if draw < 0.3 and isinstance(usual, float):
+        return usual * 10.0 ** chance.uniform(-12.0, 12.0)
+    if draw < 0.4 and isinstance(usual, tuple):
+        return [odd(chance, one) for one in usual]
+    if draw < 0.85:
+        return NUMBERS[chance.integers(len(NUMBERS))]
+    return OTHERS[chance.integers(len(OTHERS))]
+
+
+def table(chance: np.random.Generator) -> dict[str, Any]:
+    """Return the tables of a scene in which some values are odd."""
+    method = WAYS[chance.integers(len(WAYS))]
+    made: dict[str, Any] = {
+        "preset": list(PRESETS)[chance.integers(len(PRESETS))],
+        "layout": {"rows": int(chance.integers(1, 6)), "columns": int(chance.integers(1, 6))},
+        "simulation": {"stepper": list(STEPPERS)[chance.integers(len(STEPPERS))]},
+        "control": method if method == ABSENT else {"method": method},
+    }
+    if METHODS.get(method) and METHODS[method].blister is not None:
+        made["blister"] = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
+    for section in UNASKED:
+        if chance.random() < 0.2:
+            made[section] = {}
+    for section in set(OPTIONAL) - {"control"}:
+        if chance.random() < 0.05:
+            made[section] = ABSENT
+    for _ in range(chance.integers(1, 4)):
+        section = SECTIONS[chance.integers(len(SECTIONS))]
+        if made.get(section) == ABSENT or (section == "blister" and "blister" not in made):
+            continue
+        known = parameters(section, method if method != ABSENT else "virtual_master")
+        fields = list(quantities(known))
+        field = fields[chance.integers(len(fields))]
+        made.setdefault(section, {})[field] = odd(chance, getattr(known(), field))
+    if chance.random() < 0.2:
+        points = [
+            {"time": 0.1 * number, "position": [0.0, 0.0, 0.046 - 0.003 * number]} for number in range(4)
+        ]
+        point = points[chance.integers(4)]
+        field = ("time", "position", "orientation")[chance.integers(3)]
+        usual = {"orientation": (1.0, 0.0, 0.0, 0.0)}.get(field) or point.get(field)
+        point[field] = odd(chance, tuple(usual) if isinstance(usual, list) else usual)
+        made["trajectory"] = {"waypoints": points, "interpolation": ("smooth", "linear")[chance.integers(2)]}
+    return made
+
+
+@cache
+def written() -> str:
+    """Return the text of a small scene."""
+    small = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
+    return text(resolve({"layout": {"rows": 3, "columns": 3}, "blister": small, "sensors": {}, "shape": {}}))
+
+
+def spoilt(chance: np.random.Generator) -> str:
+    """Return the text of a scene with some letters, or a value, turned into others."""
+    lines = written().split("\n")
+    for _ in range(chance.integers(1, 3)):
+        at = int(chance.integers(len(lines)))
+        key, equals, _ = lines[at].partition(" = ")
+        if equals and chance.random() < 0.7:
+            value = NUMBERS[chance.integers(len(NUMBERS))]
+            lines[at] = f"{key} = {str(value).lower() if isinstance(value, bool) else value}"
+        else:
+            place = int(chance.integers(len(lines[at]) + 1))
+            lines[at] = lines[at][:place] + chr(chance.integers(0, 300)) + lines[at][place + 1 :]
+    return "\n".join(lines)
+
+
+def scene(chance: np.random.Generator) -> None:
+    """Take in a scene and begin its session, or have it refused."""
+    if chance.random() < 0.2:
+        try:
+            made = tables(spoilt(chance))
+        except (ValueError, RecursionError):  # said with file and line by `scene_file.read_table`
+            return
+    else:
+        made = table(chance)
+    found = resolve(made)
+    assert resolve(tables(text(found))) == found
+    if found.cells > CELLS or found.cells * found.periods > RECORDED:
+        return
+    seen: list[int] = []
+
+    def stopped() -> bool:
+        seen.append(0)
+        return len(seen) >= PERIODS
+
+    json.dumps(run(found, stopped=stopped).metrics, allow_nan=False)
+
+
+@cache
+def kept(method: str) -> tuple[System, bytes]:
+    """Return a small bed under a method, and its state in the middle of a press."""
+    system = assemble(resolve({"layout": {"rows": 6, "columns": 10}, "control": {"method": method}}))
+    places = ((0.0, 42e-3), (0.2, 37e-3))
+    way = Path("linear", tuple(Waypoint(time=when, position=(0.0, 0.0, z)) for when, z in places))
+    *_, last = periods(system, way.trajectory(), begin(system), 50)
+    return system, packed(system, last)
+
+
+def crafted(chance: np.random.Generator, data: bytes) -> bytes:
+    """Return a state with odd values in its header, in its arrays, or with other bytes."""
+    first = len(START) + 4
+    length = int.from_bytes(data[len(START) : first], "little")
+    header, arrays = json.loads(data[first : first + length]), bytearray(data[first + length :])
+    for _ in range(chance.integers(1, 4)):
+        draw = chance.random()
+        if draw < 0.6:
+            where: Any = header
+            while True:
+                places = list(where) if isinstance(where, dict) else list(range(len(where)))
+                if not places:
+                    break
+                place = places[chance.integers(len(places))]
+                if isinstance(where[place], (dict, list)) and chance.random() < 0.8:
+                    where = where[place]
+                    continue
+                where[place] = odd(chance, where[place])
+                break
+        elif draw < 0.9:
+            at = int(chance.integers(len(arrays) // 8)) * 8
+            value = NUMBERS[chance.integers(len(NUMBERS))]
+            kind = ("<f8", "<i8")[chance.integers(2)]
+            with np.errstate(all="ignore"):
+                number = np.float64(float(value) if abs(value) < 10**308 else np.inf)
+                arrays[at : at + 8] = number.astype(kind).tobytes()
+        else:
+            arrays[int(chance.integers(len(arrays)))] = int(chance.integers(256))
+    head = json.dumps(header).encode()
+    return START + len(head).to_bytes(4, "little") + head + bytes(arrays)
+
+
+def state(chance: np.random.Generator) -> None:
+    """Take up a crafted state and go on from it, or have it refused."""
+    system, data = kept(list(METHODS)[chance.integers(len(METHODS))])
+    finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1))
+    for take_up in (unpacked, carried):
+        found = take_up(system, crafted(chance, data))
+        for _ in range(PERIODS):
+            (way,) = approaches(system, along(finger, system.instants / system.period))
+            found = advance(system, found, way)
+        packed(system, found)
+
+
+#: What can be made, and had taken or refused.
+CASES: dict[str, Callable[[np.random.Generator], None]] = {"scenes": scene, "states": state}
+
+
+def failure(kind: str, seed: int, number: int) -> str | None:
+    """Try a case; return "" if it was taken, None if it was refused, or else what happened and where."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            CASES[kind](np.random.default_rng((seed, number)))
+    except DigiclayError as error:
+        return f"two lines: {error}" if "\n" in str(error) else None
+    except Exception as error:
+        place = error.__traceback__
+        while place and place.tb_next:
+            place = place.tb_next
+        where = f"{place.tb_frame.f_code.co_filename.rpartition('/')[2]}:{place.tb_lineno}" if place else ""
+        return f"{type(error).__name__} in {where}: {' '.join(str(error).split())[:80]}"
+    return ""
+
+
+def main() -> int:
+    """Try many cases, and tell what came of them."""
+    parser = argparse.ArgumentParser(description="Have odd scenes or states taken or refused.")
+    parser.add_argument("kind", choices=tuple(CASES))
+    parser.add_argument("--count", type=int, default=100_000, help="how many cases, default 100000")
+    parser.add_argument("--seed", type=int, default=0, help="which ones, default 0")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case, default 0")
+    arguments = parser.parse_args()
+    taken, failures = 0, collections.defaultdict(list)
+    for number in range(arguments.first, arguments.first + arguments.count):
+        told = failure(arguments.kind, arguments.seed, number)
+        taken += told == ""
+        if told:
+            failures[told].append(number)
+    failed = sum(map(len, failures.values()))
+    refused = arguments.count - taken - failed
+    print(f"{arguments.count} {arguments.kind}: {taken} taken, {refused} refused, {failed} neither")
+    for told, numbers in sorted(failures.items(), key=lambda item: -len(item[1])):
+        print(f"  {len(numbers)} x {told}  (number {', '.join(map(str, numbers[:3]))})")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
