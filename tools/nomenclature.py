@@ -14,7 +14,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT / "addon"))
 
 from digiclay.core.methods import METHODS  # noqa: E402
-from digiclay.core.quantity import Parameters, Quantity, quantities  # noqa: E402
+from digiclay.core.quantity import EXTENTS, Parameters, Quantity, quantities  # noqa: E402
 from digiclay.core.scene import SECTIONS, parameters  # noqa: E402
 
 INTRODUCTION = """\
@@ -66,7 +66,10 @@ LEGEND = """\
 The name is the key in a scene file. Source: P the paper, D derived, C chosen, or a
 reference of the list at the end. A default in
 brackets means several values, one after another. A range is in the parameter's own unit; rules that join
-several parameters are not in it.
+several parameters are not in it. Where it has no end, a number beyond all devices is refused all the same:
+
+| Unit | Least above 0 | Most |
+|---|---|---|
 """
 #: Where a value comes from that is neither the paper's nor chosen: its key, the work, what is taken from it.
 REFERENCES = {
@@ -142,6 +145,7 @@ def page() -> str:
     lines = [INTRODUCTION, "| Symbol | Name in code | Unit | Meaning |", "|---|---|---|---|"]
     lines += ["| " + " | ".join(row) + " |" for row in VARIABLES]
     lines.append(LEGEND.rstrip())
+    lines += [f"| {unit or 1} | {least:g} | {most:g} |" for unit, (least, most) in EXTENTS.items()]
     for name in SECTIONS:
         for method in METHODS if name == "control" else ("virtual_master",):
             lines += section(name, method)

@@ -16,7 +16,7 @@ from typing import Any
 
 from .errors import ParameterError
 
-__all__ = ["UNITS", "Parameters", "Quantity", "nearest", "parse", "quantities", "quantity"]
+__all__ = ["EXTENTS", "UNITS", "Parameters", "Quantity", "nearest", "parse", "quantities", "quantity"]
 
 #: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
 UNITS: dict[str, tuple[float, str]] = {
