@@ -154,7 +154,9 @@ def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
         (b'"memory": ', b'"memory": ' + b"[" * 100_000),
         (b'"period": 70', b'"period": 1' + b"0" * 400),
         (b'"peak": ', b'"peak": 1' + b"0" * 400 + b', "p": '),
-        (b'"reach": [', b'"reach": [1' + b"0" * 400 + b", "),
+        (b'"reach": [', b'"reach": [1' + b"0" * 400 + b', 0, 0], "r": ['),
+        (b'"reach": [', b'"reach": [2e9, 0, 0], "r": ['),
+        (b'"reach": [', b'"reach": [0, 0, 2e9], "r": ['),
     ],
 )
 def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
@@ -277,7 +279,7 @@ def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
     memory = Outer(Colour.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
     arrays: list[NDArray[Any]] = []
     text = written(memory, arrays)
-    back = rebuilt(Outer(Colour.RED, Inner(), np.zeros((0, 2))), text, arrays)
+    back = rebuilt(Outer(Colour.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
     assert back.table.tolist() == [[0.1, 2.0]]
     assert [*back[:2], back.count] == [Colour.BLUE, Inner(-math.inf, True), 7]
     assert [type(item) for item in (back.colour, back.inner.edge, back.inner.felt, back.count)] == [
@@ -288,11 +290,21 @@ def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
 @pytest.mark.parametrize(
     "kept_memory",
     [None, 3, "Inner", [], ["Inner"], ["Inner", 0.0], ["Inner", 0.0, False, 1], ["Inner", "a", False],
-     ["Inner", math.nan, False], {"array": 0}, ["Outer", 0.0, False]],
+     ["Inner", math.nan, False], ["Inner", math.inf, False], ["Inner", -1e76, False],
+     ["Inner", 10**400, False], {"array": 0}, ["Outer", 0.0, False]],
 )  # fmt: skip
 def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
     with pytest.raises(StateError, match="memory of the controller must be a Inner"):
         rebuilt(Inner(), kept_memory, [])
+
+
+@pytest.mark.parametrize("count", [-1, 2**53 + 1, 1e30, -math.inf, 10**400])
+def test_a_memory_with_a_count_that_is_none_is_refused(count: Any) -> None:
+    arrays = [np.zeros((0, 2))]
+    template = Outer(Colour.RED, Inner(), arrays[0])
+    assert rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
+    with pytest.raises(StateError, match="memory of the controller must be a Outer"):
+        rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)
 
 
 def test_every_field_of_a_state_is_kept() -> None:

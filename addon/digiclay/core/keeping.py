@@ -30,6 +30,8 @@ START = b"digiclay state 1\n"
 SLACK = 1e-6
 #: No number of a state is as large: a session ends when the square of one is no longer finite.
 LARGEST = 1e154
+#: No disc a session works in reaches as far, m.
+FARTHEST = 1e9
 #: What can be done about bytes that cannot be used.
 REMEDY = "Reset the session to begin with a bed at rest."
 
@@ -229,6 +231,8 @@ def _disc(values: Any) -> Disc | None:
     if values is None:
         return None
     x, y, radius = (float(value) for value in values)
+    if max(abs(x), abs(y), abs(radius)) > FARTHEST:
+        raise ValueError("a disc beyond all beds")
     return x, y, radius
 
 

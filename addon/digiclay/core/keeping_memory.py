@@ -13,6 +13,9 @@ from .errors import StateError
 
 __all__ = ["rebuilt", "written"]
 
+#: No number a controller remembers is larger, but those that may be infinite.
+LARGEST = 1e75
+
 
 def written(memory: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return a memory as JSON holds it; its arrays are put behind those in `arrays`.
@@ -74,6 +77,20 @@ def _like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
         if kept is not None:
             raise ValueError("something instead of nothing")
         return None
-    if not isinstance(template, Enum) and (not isinstance(kept, (bool, int, float)) or math.isnan(kept)):
-        raise ValueError("no number")
+    if not isinstance(template, Enum):
+        _check_number(template, kept)
     return kind(kept)
+
+
+def _check_number(template: Any, kept: Any) -> None:
+    """Refuse what is no number, or none that a controller comes to: whole numbers count something.
+
+    Infinite is only what begins so; no other number is so large that the square of its square is.
+    """
+    if not isinstance(kept, (bool, int, float)) or math.isnan(kept):
+        raise ValueError("no number")
+    if isinstance(template, int) and not isinstance(template, bool):
+        if not 0 <= kept <= 2**53:
+            raise ValueError("no count")
+    elif abs(kept) > LARGEST and kept != template:
+        raise ValueError("a number that is too large")
