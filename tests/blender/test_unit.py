@@ -38,6 +38,42 @@ def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(tmp_pa
     np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), at, rtol=0, atol=1e-7)
 
 
+def test_a_bed_that_is_linked_brings_nothing_else_and_gets_its_fingertip_when_made_local(
+    tmp_path: Path,
+) -> None:
+    name = added().name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    looked()
+    bpy.ops.wm.link(directory=str(tmp_path / "bed.blend" / "Object") + "/", filename=name)
+    done("Link")
+    (bed,) = bpy.context.scene.objects
+    assert housings() == 1
+    select(bed)
+    bpy.ops.object.make_local(type="ALL")
+    done("Make Local")
+    assert whole(*beds())
+
+
+@pytest.mark.parametrize("by_hand", [True, False])
+def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand: bool) -> None:
+    added()
+    bpy.ops.object.duplicate()
+    done("Duplicate")
+    copy = bpy.context.object
+    if by_hand:
+        select(view.fingertip_of(copy))
+        bpy.ops.object.delete()
+    else:
+        bpy.data.objects.remove(view.fingertip_of(copy))
+    done("Delete")
+    copy.location.x = 1.0
+    done("Move")
+    undone()
+    without = [bed for bed in beds() if view.fingertip_of(bed) is None]
+    assert [bed.location.x for bed in without] == [0.0]
+
+
 @pytest.mark.parametrize("everything", [False, True], ids=["the bed", "all that can be selected"])
 def test_a_deleted_bed_takes_its_fingertip_along_and_undo_brings_both_back_in_one_step(
     everything: bool,

@@ -21,6 +21,11 @@ def test_a_bed_of_an_older_file_stays_as_it_is_and_is_one_all_the_same(tmp_path:
     (bed,) = beds()
     assert len(bpy.context.scene.objects) == 4
     assert housings() == 1
+    bed.hide_set(True)
+    done("Hide")
+    assert not [thing for thing in bpy.context.scene.objects if thing.visible_get()]
+    bed.hide_set(False)
+    done("Show")
     select(bed)
     done("Select")
     bpy.ops.object.duplicate()

@@ -65,15 +65,23 @@ def adopt() -> frozenset[int]:
     return frozenset(thing.session_uid for thing in bpy.data.objects if ROLE in thing)
 
 
-def faults(known: frozenset[int]) -> Faults:
-    """Return what is to be put right, by what was known before."""
-    bare = [bed for bed in _beds() if view.fingertip_of(bed) is None and _asks(bed, FINGER, known)]
+def faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
+    """Return what is to be put right.
+
+    Parameters
+    ----------
+    known : frozenset of int
+        Uids of the objects that were there before: to what a user has done to those, nothing is added.
+    mended : frozenset of int, optional
+        Uids of those of them that may be again as they had come, since undo has gone back to that.
+    """
+    bare = [bed for bed in _beds() if view.fingertip_of(bed) is None and _asks(bed, FINGER, known, mended)]
     tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
-    bare += [tip for tip in tips if parts.stands(tip) and _asks(tip, BALL, known)]
+    bare += [tip for tip in tips if parts.stands(tip) and _asks(tip, BALL, known, mended)]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     left = [thing for thing in mine if parts.stands(thing) and _lost(thing)]
     shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
-    strewn = [thing for thing in shown if thing.session_uid not in known and not thing.library]
+    strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
     return Faults(bare, left, strewn)
 
 
@@ -108,7 +116,9 @@ def give_fingertip(bed: Any, scene: Scene) -> str:
 def follow() -> None:
     """Have the parts of a bed hidden while it is, and an ellipsoid while its fingertip is."""
     for bed in _beds():
-        tip = view.fingertip_of(bed)
+        tip, case = view.fingertip_of(bed), view.housing_of(bed)
+        if case is not None and case.parent == bed:
+            _hide_along(bed, case)
         if tip is None:
             continue
         _hide_along(bed, tip)
@@ -125,7 +135,7 @@ def _beds() -> list[Any]:
     ]
 
 
-def _asks(owner: Any, held: str, known: frozenset[int]) -> bool:
+def _asks(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Tell whether an object without a part of its own is to get one.
 
     A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
@@ -133,8 +143,10 @@ def _asks(owner: Any, held: str, known: frozenset[int]) -> bool:
     """
     part, new = owner.get(held), owner.session_uid not in known
     if part is None:
-        return new and held == FINGER
-    return part.parent != owner and (new or part.parent is not None)
+        return held == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
+    if part.parent == owner:  # it stands nowhere: of a bed that was linked and made local, or deleted
+        return held == FINGER and new
+    return new or part.parent is not None or owner.session_uid in mended
 
 
 def _lost(part: Any) -> bool:

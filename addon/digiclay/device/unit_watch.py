@@ -43,7 +43,7 @@ def tend() -> None:
     came, _CAME[0] = _CAME[0], ""
     if _KNOWN[0] is not None:
         # In a step that undo has come back to, what was put right since is as it had come.
-        found = unit.faults(_KNOWN[0] - _MENDED if came else _KNOWN[0])
+        found = unit.faults(_KNOWN[0], frozenset(_MENDED) if came else frozenset())
         if any(found):
             if came and _gone_on(came):
                 return
