@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import StateError
 from digiclay.core.keeping import START, carried, packed, unpacked
-from digiclay.core.keeping_memory import rebuilt, written
 from digiclay.core.methods import METHODS
 from digiclay.core.modes import Mode
 from digiclay.core.scene_table import resolve
 from digiclay.core.simulation import begin, periods
 from digiclay.core.state import State
 from digiclay.core.system import System
-from numpy.typing import NDArray
 
 from tests.assemble import path
 
@@ -250,61 +246,6 @@ def test_heights_are_not_carried_over_to_another_number_of_cells() -> None:
     _, data = kept()
     with pytest.raises(StateError, match="number of cells"):
         carried(assemble(resolve({})), data)
-
-
-class Colour(IntEnum):
-    """Something a controller might remember."""
-
-    RED = 1
-    BLUE = 2
-
-
-class Inner(NamedTuple):
-    """A part of a memory."""
-
-    edge: float = 0.0
-    felt: bool = False
-
-
-class Outer(NamedTuple):
-    """A memory with everything in it."""
-
-    colour: Colour
-    inner: Inner
-    table: NDArray[np.float64]
-    count: int = 0
-
-
-def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
-    memory = Outer(Colour.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
-    arrays: list[NDArray[Any]] = []
-    text = written(memory, arrays)
-    back = rebuilt(Outer(Colour.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
-    assert back.table.tolist() == [[0.1, 2.0]]
-    assert [*back[:2], back.count] == [Colour.BLUE, Inner(-math.inf, True), 7]
-    assert [type(item) for item in (back.colour, back.inner.edge, back.inner.felt, back.count)] == [
-        Colour, float, bool, int,
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "kept_memory",
-    [None, 3, "Inner", [], ["Inner"], ["Inner", 0.0], ["Inner", 0.0, False, 1], ["Inner", "a", False],
-     ["Inner", math.nan, False], ["Inner", math.inf, False], ["Inner", -1e76, False],
-     ["Inner", 10**400, False], {"array": 0}, ["Outer", 0.0, False]],
-)  # fmt: skip
-def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
-    with pytest.raises(StateError, match="memory of the controller must be a Inner"):
-        rebuilt(Inner(), kept_memory, [])
-
-
-@pytest.mark.parametrize("count", [-1, 2**53 + 1, 1e30, -math.inf, 10**400])
-def test_a_memory_with_a_count_that_is_none_is_refused(count: Any) -> None:
-    arrays = [np.zeros((0, 2))]
-    template = Outer(Colour.RED, Inner(), arrays[0])
-    assert rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
-    with pytest.raises(StateError, match="memory of the controller must be a Outer"):
-        rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)
 
 
 def test_every_field_of_a_state_is_kept() -> None:
