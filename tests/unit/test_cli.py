@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -216,6 +217,16 @@ def test_benchmark_gives_a_cost_for_every_part(capsys: pytest.CaptureFixture[str
         if line.startswith(f"  {part} ")
     }
     assert [part for part in PARTS if not costs[part] > 0.0] == []
+
+
+def test_benchmark_tells_the_processor_time_beside_the_time_gone_by(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    main(["benchmark", "session", "--scene", "my.toml", "--repeats", "1"])
+    out = capsys.readouterr().out
+    gone, used = (float(re.search(told, out)[1]) for told in (r"in ([\d.e-]+) s \(", r"time ([\d.e-]+) s \("))
+    # One process, one thread: it uses no more than goes by, but for the grain of the two clocks.
+    assert 0.0 < used <= 1.1 * gone
 
 
 def test_the_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:

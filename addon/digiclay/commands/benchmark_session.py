@@ -8,8 +8,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from time import perf_counter
-from typing import Any
+from time import perf_counter, process_time
+from typing import Any, NamedTuple
 
 from ..core import simulation
 from ..core.assembly import assemble
@@ -17,9 +17,10 @@ from ..core.recorder import Recorder, Recording
 from ..core.scene import Scene
 from ..core.session import fits
 from .arguments import add_scene, scene_of
+from .benchmark_report import made_with
 from .progress import Bar
 
-__all__ = ["PARTS", "Clock", "add", "measured"]
+__all__ = ["PARTS", "Clock", "Took", "add", "measured"]
 
 #: Parts of a control period and what is in them.
 PARTS = {
@@ -37,6 +38,13 @@ examples:
   digiclay benchmark session --scene tap --repeats 9
   digiclay benchmark session --calls
 """
+
+
+class Took(NamedTuple):
+    """What a session took, s: time gone by, and processor time, which other processes hardly add to."""
+
+    gone: float
+    used: float
 
 
 class Clock:
@@ -93,17 +101,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Time the session and print the table."""
     scene, _ = scene_of(arguments)
     fits(scene, assemble(scene))
-    plain: list[float] = []
+    plain: list[Took] = []
     split: list[dict[str, float]] = []
     with Bar(sys.stderr, "repeats", 1.0) as bar:
         for repeat in range(arguments.repeats):
             plain.append(measured(scene))
             clock = Clock()
-            clock.spent["the rest"] = measured(scene, clock) - sum(clock.spent.values())
+            clock.spent["the rest"] = measured(scene, clock).gone - sum(clock.spent.values())
             split.append(clock.spent)
             if not arguments.quiet:
                 bar(repeat + 1, arguments.repeats)
-    print("\n".join(_table(scene, statistics.median(plain), split)))
+    print("\n".join(_table(scene, plain, split)))
     if arguments.calls:
         from .benchmark_calls import report
 
@@ -111,12 +119,15 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _table(scene: Scene, whole: float, split: list[dict[str, float]]) -> Iterator[str]:
+def _table(scene: Scene, plain: list[Took], split: list[dict[str, float]]) -> Iterator[str]:
     """Give the lines of the table."""
     simulated = scene.periods * scene.simulation.control_period
-    stepper, factor = scene.simulation.stepper, simulated / whole
-    yield f"{scene.name}: {scene.cells} cells, {scene.periods} control periods, stepper {stepper}"
+    whole, used = (statistics.median(times) for times in zip(*plain, strict=True))
+    yield made_with()
+    yield f"{scene.name}: {scene.cells} cells, {scene.periods} control periods, {scene.simulation.stepper}"
+    factor = simulated / whole
     yield f"{simulated:.1f} s simulated in {whole:.3g} s ({factor:.3g} x real time), median of {len(split)}"
+    yield f"processor time {used:.3g} s ({simulated / used:.3g} x real time)"
     yield f"\n  {'part':<10} {'µs a period':>11} {'share':>6}"
     medians = {part: statistics.median(one[part] for one in split) for part in PARTS}
     total = sum(medians.values())
@@ -127,8 +138,8 @@ def _table(scene: Scene, whole: float, split: list[dict[str, float]]) -> Iterato
     yield f"  {'all':<10} {whole / scene.periods * 1e6:11.1f}         without it"
 
 
-def measured(scene: Scene, clock: Clock | None = None) -> float:
-    """Run a session as `core.session.run` does and return how long it took, s.
+def measured(scene: Scene, clock: Clock | None = None) -> Took:
+    """Run a session as `core.session.run` does and return how long it took.
 
     Parameters
     ----------
@@ -145,10 +156,10 @@ def measured(scene: Scene, clock: Clock | None = None) -> float:
         trajectory = clock.on("contact", trajectory, "poses")
         observe = clock.timed("observe", observe)
     with _timed(clock):
-        started = perf_counter()
+        started = perf_counter(), process_time()
         for reached in simulation.periods(system, trajectory, state, scene.periods):
             observe(reached)
-        return perf_counter() - started
+        return Took(perf_counter() - started[0], process_time() - started[1])
 
 
 @contextmanager
