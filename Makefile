@@ -30,6 +30,9 @@ test: ## run all tests but those of the matrix, of the window and of other progr
 	@rm -f .reports/test.txt; status=0; \
 	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
+	awk '/ s of processor time/ { sub(/.*; /, ""); total += $$1 } \
+	  END { printf "processor time of make test: %d s, to be kept below 600 s\n", total }' .reports/test.txt >.reports/time.txt; \
+	cat .reports/time.txt >>.reports/test.txt; rm .reports/time.txt; \
 	echo; cat .reports/test.txt; exit $$status
 
 lint: ## check style, format and types

@@ -80,7 +80,9 @@ def main() -> int:
     status, summary = run(command, arguments.limit)
     reason = judge(status, summary, arguments.limit)
     verdict = f"FAILED ({reason})" if reason else "passed"
-    line = f"{arguments.name}: {verdict}" + (f": {summary}" if summary else "")
+    spent = os.times()
+    processor = f"{spent.children_user + spent.children_system:.0f} s of processor time"
+    line = f"{arguments.name}: {verdict}" + (f": {summary}" if summary else "") + f"; {processor}"
     arguments.report.parent.mkdir(exist_ok=True)
     with arguments.report.open("a", encoding="utf-8") as report:
         report.write(line + "\n")

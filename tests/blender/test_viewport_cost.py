@@ -10,7 +10,7 @@ from digiclay.live import running, viewport_cost
 
 def test_every_part_of_a_tick_is_timed_and_nothing_is_left_in_the_file() -> None:
     objects = len(bpy.data.objects)
-    cost = viewport_cost.measured(12, 12, 8)
+    cost = viewport_cost.measured(12, 12, 2)
     assert set(cost.parts) == set(viewport_cost.PARTS)
     assert min(cost.parts.values()) > 0.0
     assert len(bpy.data.objects) == objects
@@ -29,6 +29,7 @@ def test_the_command_prints_a_row_for_every_bed(
     from digiclay.commands import benchmark_viewport
 
     monkeypatch.setattr(benchmark_viewport, "BEDS", ((12, 12, 5e-3), (12, 14, 5e-3)))
+    monkeypatch.setattr(benchmark_viewport, "QUICK", 2)
     assert main(["benchmark", "viewport", "--quick", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines[-2:]] == ["144", "168"]
@@ -37,5 +38,5 @@ def test_the_command_prints_a_row_for_every_bed(
 @pytest.mark.usefixtures("extension")
 def test_the_costs_are_measured_with_the_extension_enabled_too() -> None:
     # As in `blender --command digiclay benchmark viewport`: there everything is registered already.
-    assert viewport_cost.measured(12, 12, 8).whole > 0.0
+    assert viewport_cost.measured(12, 12, 2).whole > 0.0
     assert hasattr(bpy.types.Object, "digiclay")

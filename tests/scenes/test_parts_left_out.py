@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ print(" ".join(name.removeprefix(core) for name in sys.modules if name.startswit
 """
 
 
+@cache
 def imported(*absent: str) -> set[str]:
     """Run a short session without some parts; return the core's modules it imported."""
     done = subprocess.run(

@@ -17,6 +17,8 @@ __all__ = ["BEDS", "add"]
 
 #: Rows and columns of the beds, and the time a tick of them may take, s.
 BEDS = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
+#: Ticks that are timed, with --quick and without.
+QUICK, FULL = 40, 200
 
 
 def add(kinds: Any) -> None:
@@ -34,7 +36,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     from ..compat import bpy
     from ..live.viewport_cost import PARTS, measured
 
-    ticks = 40 if arguments.quick else 200
+    ticks = QUICK if arguments.quick else FULL
     costs = []
     with progress(arguments, "viewport", len(BEDS)) as bar:
         for rows, columns, _ in BEDS:
