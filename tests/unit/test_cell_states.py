@@ -99,6 +99,14 @@ def test_a_critical_cell_is_given_up_after_the_time_out() -> None:
     assert periods * CONTROL.period == pytest.approx(CONTROL.parameters.critical_time, abs=CONTROL.period)
 
 
+def test_only_critical_cells_count_their_periods() -> None:
+    measured = seen({MIDDLE + 1: 0.02}, {MIDDLE: Mode.CRITICAL, MIDDLE + 1: Mode.FORCE_FOLLOW})
+    measured.own[0] = 1.0
+    mode = CONTROL.command(Patch(felt=True), measured)[1].mode
+    assert mode[MIDDLE] == Mode.CRITICAL
+    assert (measured.own[0, MIDDLE], set(np.delete(measured.own[0], MIDDLE))) == (2.0, {0.0})
+
+
 def test_giving_up_the_last_cell_counts_as_a_loss() -> None:
     measured = seen({}, {MIDDLE: Mode.CRITICAL})
     measured.own[0] = 100.0

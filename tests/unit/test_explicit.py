@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from digiclay.core.steppers.explicit import Explicit, ExplicitPlan, Rates
 from numpy.typing import NDArray
 
@@ -86,3 +87,12 @@ def test_a_pin_pressed_onto_its_stop_is_kept() -> None:
 
 def test_a_height_that_is_no_number_is_given_up() -> None:
     assert put(np.nan, under=38e-3) == np.inf
+
+
+def test_the_force_told_is_that_of_the_finger_at_the_end_of_the_period() -> None:
+    system = make_system(stepper="euler", step=5e-3, dead_time=0.0, relaxation=None)
+    driven = np.zeros((system.rows.physics + system.rows.queue, 1))
+    driven[0] = 40e-3
+    force = Setter(39e-3).advance(system.plan, driven, np.array([[41e-3], [38e-3]]))
+    # 1 mm deep at the end: f_d b/m (e^(m x) - 1), and no contact at the start.
+    assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
