@@ -100,4 +100,4 @@ def test_no_estimate_is_made_once_it_is_stopped() -> None:
 
 def test_the_summary_tells_the_errors() -> None:
     result = run(scene_of("tap", "bernoulli", 1e-3)).with_errors(Errors(2e-6, 5e-4, 1e-3))
-    assert result.summary().endswith("height error <= 2 µm, force error <= 0.5 mN")
+    assert result.summary().endswith("height error about 2 µm, force error about 0.5 mN")

@@ -29,7 +29,7 @@ LEVELS = (
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
-    "mesh_in_gltf mesh_in_threemf feature_crest pins_solid skin_membrane metrics series_folder "
+    "mesh_in_gltf mesh_in_threemf finger_range feature_crest pins_solid skin_membrane metrics series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
     "sheet shape_file physics scene stack.control",

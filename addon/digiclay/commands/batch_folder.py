@@ -36,8 +36,8 @@ FACTS: tuple[tuple[str, str, float, str], ...] = (
     ("run_time", "run time", 1.0, "s"),
     ("rfd", "force deviation (RFD)", 1e3, "mN"),
     ("lag_mean", "lag", 1e3, "mm"),
-    ("height_error", "height error ≤", 1e6, "µm"),
-    ("force_error", "force error ≤", 1e3, "mN"),
+    ("height_error", "height error, about", 1e6, "µm"),
+    ("force_error", "force error, about", 1e3, "mN"),
 )
 
 
@@ -118,6 +118,8 @@ class Folder:
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
         metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
         facts = [(said, _value(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
+        if metrics.get("beyond_a_finger"):
+            facts.append(("not to be trusted", metrics["beyond_a_finger"]))
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts += [
             ("start of its process", _value(timing.get("start_up"), 1.0, "s")),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ParameterError, SceneError
+from ..core.finger_range import beyond_words, largest_indentation
 from ..core.methods import METHODS
 from ..core.metrics_speed import Criterion, Drag, Lift, largest_speed
 from ..core.metrics_trace import trace_of
@@ -88,19 +89,22 @@ def carry_out(arguments: argparse.Namespace) -> int:
     scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
     found: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
+    beyond: dict[str, str] = {}
     with Stop() as stop, written(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             done = _run(scene, method, stop, quiet=arguments.quiet)
             found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
             wanted = asked(scene.set_point, trace_of(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
+            beyond[method] = _beyond(done)
         units = {name: unit for name, (unit, _) in {**TRIAL_METRICS, **SPEEDS}.items()}
-        known = {"scene": scene.name, "methods": found, "units": units}
+        known = {"scene": scene.name, "methods": found, "units": units, "beyond_a_finger": beyond}
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
         save(comparison(found, forces, scene.name), folder / "compare.png")
     if not arguments.quiet:
         print("\n".join(table(found)))
+        print("".join(f"{method}: {words}\n" for method, words in beyond.items() if words), end="")
         if arguments.speed:
             print(f"Followed: {Criterion()}.")
         print(f"written to {out}")
@@ -116,6 +120,13 @@ def _run(scene: Scene, method: str, stop: Stop, *, quiet: bool) -> Trial:
     """Run one method under a progress bar."""
     with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
         return trial(scene, progress=None if quiet else bar, stopped=stop)
+
+
+def _beyond(done: Trial) -> str:
+    """Say what of a run is beyond a finger."""
+    tip, history = done.scene.fingertip, done.history
+    deepest = largest_indentation(tip, history) if tip else None
+    return beyond_words(float(history["total_force"].max()), deepest)
 
 
 def _speeds(scene: Scene) -> Metrics:

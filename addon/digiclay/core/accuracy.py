@@ -21,8 +21,9 @@ from .simulation import begin, periods
 
 __all__ = ["SHARE", "Errors", "can_be_estimated", "estimated", "judging"]
 
-#: The judge's own error is taken to be at most a quarter of that of the run: halving the step leaves
-#: so much of an error of second order, which is what remains of a higher one across a kink.
+#: The judge's own error is taken to be a quarter of that of the run: halving the step leaves so much of an
+#: error of second order, which is what remains of a higher one across a kink. What comes out is an estimate,
+#: no bound, and is said as "about".
 SHARE = 4.0 / 3.0
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .accuracy import Errors
 from .assembly import assemble
 from .errors import OutputError
+from .finger_range import beyond_words, largest_indentation
 from .metrics import METRICS, summary
 from .recorder import Recording, available_memory, refuse_what_cannot_fit, write
 from .scene import Scene
@@ -67,9 +68,11 @@ class Result:
         errors = ""
         if "height_error" in self.metrics:
             height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
-            errors = f", height error <= {height:.2g} µm, force error <= {force:.2g} mN"
+            errors = f", height error about {height:.2g} µm, force error about {force:.2g} mN"
+        beyond = self.metrics.get("beyond_a_finger")
+        warning = f"; {beyond}" if beyond else ""
         speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
-        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}"
+        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}{warning}"
 
     def with_errors(self, errors: Errors) -> Result:
         """Return the result with its estimated errors among the metrics."""
@@ -221,6 +224,10 @@ def _metrics(
         judged = summary(history, scene.set_point)
         known |= judged
         units |= {name: METRICS[name][0] for name in judged}
+        if scene.fingertip is not None:
+            known["max_indentation"] = largest_indentation(scene.fingertip, history)
+            units["max_indentation"] = "m"
+            known["beyond_a_finger"] = beyond_words(judged["max_total_force"], known["max_indentation"])
     return {**known, "units": units}
 
 

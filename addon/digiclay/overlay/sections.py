@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.finger_range import MOST_FORCE
 from ..core.modes import Mode
 from ..device import heat
 from .look import Colour, Look
@@ -126,6 +127,13 @@ def error_words(errors: tuple[float, float] | None) -> str:
     return f"Solver error: about {_size(errors[0] * 1e6, 'µm')}, {_size(errors[1] * 1e3, 'mN')}"
 
 
+def force_words(force: float) -> str:
+    """Say how large the total force is, N, and when no finger presses so hard; see `core.finger_range`."""
+    if force <= MOST_FORCE:
+        return f"{force:.2f} N"
+    return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
+
+
 def head_height(told: Told) -> float:
     """Return the height of the head, pixels at a UI scale of 1."""
     return 3 * ROW + GAP
@@ -146,7 +154,7 @@ def force_height(told: Told) -> float:
 
 def force(told: Told, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
-    now = f"{told.force[-1]:.2f} N" if told.force.size else ""
+    now = force_words(float(told.force[-1])) if told.force.size else ""
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
     top = pen.row(top, f"Total force  {now}", asked)
     recent = told.force[told.time >= told.window[0]]

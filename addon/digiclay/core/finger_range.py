@@ -1,0 +1,64 @@
+"""How hard and how deep a finger is pressed where its contact law is known, and what to say beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fingertip import Fingertip, forms, underside
+
+__all__ = ["MOST_FORCE", "MOST_INDENTATION", "beyond_words", "largest_indentation"]
+
+Floats = NDArray[np.float64]
+
+#: Total force up to which the law and its relaxation were measured, N: Pawluk and Howe, Dynamic contact of
+#: the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611 (1999): 0 to 2 N.
+MOST_FORCE = 2.0
+#: Indentation up to which fingerpads were pressed in measurements, m: Gulati and Srinivasan, Human fingerpad
+#: under indentation I: static and dynamic force response (1995), 0.5 to 3 mm. Below lies the bone.
+MOST_INDENTATION = 3e-3
+#: Rows whose undersides are worked out at a time.
+ROWS = 64
+
+
+def largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> float:
+    """Return how deep the deepest pin that is felt stands in the finger, over all rows, m.
+
+    Parameters
+    ----------
+    fingertip : Fingertip
+    history : mapping
+        The arrays of ``history.npz``: height, force, fingertip and position.
+    """
+    felt, height = history["force"] > 0.0, history["height"]
+    # No pin stands deeper than it is above the lowest point: few rows are left to look at.
+    most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]
+    deepest_first, found = np.argsort(-most, kind="stable"), 0.0
+    x, y = np.asarray(history["position"], dtype=np.float64).T
+    place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
+    for start in range(0, len(most), ROWS):
+        rows = deepest_first[start : start + ROWS]
+        if most[rows[0]] <= found:
+            break
+        under = underside(*forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), place)
+        depth = np.max(height[rows] - under, where=felt[rows], initial=0.0)
+        found = max(found, float(depth))
+    return found
+
+
+def beyond_words(force: float | None, indentation: float | None) -> str:
+    """Say what is beyond a finger; nothing where nothing is.
+
+    Parameters
+    ----------
+    force, indentation : float or None
+        The largest total force, N, and indentation, m; None where it is not known.
+    """
+    said = []
+    if force is not None and force > MOST_FORCE:
+        said.append(f"{force:.3g} N (fingers were measured up to {MOST_FORCE:g} N)")
+    if indentation is not None and indentation > MOST_INDENTATION:
+        said.append(f"{indentation * 1e3:.3g} mm deep (up to {MOST_INDENTATION * 1e3:g} mm)")
+    return f"the contact law does not hold: {', '.join(said)}" if said else ""

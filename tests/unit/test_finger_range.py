@@ -1,0 +1,93 @@
+"""A run that presses harder or deeper than a finger is says so, and one that does not says nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.commands.batch_folder import FACTS
+from digiclay.core.finger_range import MOST_FORCE, MOST_INDENTATION, beyond_words, largest_indentation
+from digiclay.core.fingertip import Fingertip
+from digiclay.core.scene import Path, Scene, Waypoint
+from digiclay.core.session import Result, run
+from digiclay.overlay.sections import force_words
+
+from tests.assemble import sample, under
+
+
+def pressed(depth: float, **parts: object) -> Result:
+    """Return a run whose finger comes down to `depth` below the tops within 0.1 s, m."""
+    points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
+    way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z)) for time, z in points))
+    known: Scene = sample("tap", "simulation.duration=0.15")
+    return run(replace(known, trajectory=way, **{"control": None, "blister": None, **parts}))
+
+
+@pytest.fixture(scope="module")
+def shallow() -> Result:
+    """Return a run within what a finger is."""
+    return pressed(1.5e-3)
+
+
+@pytest.fixture(scope="module")
+def through() -> Result:
+    """Return a run whose finger goes through the bed; all valves are shut."""
+    return pressed(60e-3)
+
+
+def test_a_press_within_a_finger_is_not_remarked(shallow: Result) -> None:
+    assert shallow.metrics["beyond_a_finger"] == ""
+    assert "contact law" not in shallow.summary()
+
+
+def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line(through: Result) -> None:
+    said = through.metrics["beyond_a_finger"]
+    assert said.startswith("the contact law does not hold: ")
+    assert said.endswith("e+51 N (fingers were measured up to 2 N), 60 mm deep (up to 3 mm)")
+    assert through.summary().endswith(f"; {said}")
+
+
+def test_the_indentation_is_that_of_the_pin_that_stands_deepest(shallow: Result) -> None:
+    history = shallow.history
+    assert history is not None
+    outline = Fingertip().outline(history["fingertip"])
+    depth = history["height"] - under(outline, *history["position"].T)
+    expected = depth[history["force"] > 0.0].max()
+    assert shallow.metrics["max_indentation"] == pytest.approx(expected, rel=1e-12)
+    assert shallow.metrics["units"]["max_indentation"] == "m"
+    # Under the middle of the finger stands a pin, and no valve is open.
+    assert expected == pytest.approx(1.5e-3, rel=1e-9)
+
+
+def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
+    # Beyond the rim of a finger that is lifted: no force, whatever the heights.
+    assert shallow.history is not None
+    free = {**shallow.history, "force": np.zeros_like(shallow.history["force"])}
+    assert largest_indentation(Fingertip(), free) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("force", "indentation", "parts"),
+    [
+        (MOST_FORCE, MOST_INDENTATION, 0),
+        (1.001 * MOST_FORCE, MOST_INDENTATION, 1),
+        (MOST_FORCE, 1.001 * MOST_INDENTATION, 1),
+        (476.0, 4e-3, 2),
+        (None, None, 0),
+    ],
+)
+def test_only_what_is_beyond_is_named(force: float | None, indentation: float | None, parts: int) -> None:
+    assert beyond_words(force, indentation).count("up to") == parts
+
+
+def test_the_overlay_says_when_no_finger_presses_so_hard() -> None:
+    assert [force_words(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
+        "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
+    ]  # fmt: skip
+
+
+def test_errors_are_estimates_wherever_a_batch_names_them() -> None:
+    assert {said for key, said, *_ in FACTS if key.endswith("_error")} == {
+        "height error, about", "force error, about",
+    }  # fmt: skip
