@@ -15,6 +15,7 @@ from digiclay.cli import main
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
 from digiclay.commands.extras import as_typed
+from digiclay.core import mesh_in
 
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
 
@@ -126,8 +127,8 @@ def test_form_ends_at_the_first_signal_and_names_what_is_missing(
 def test_form_that_is_stopped_before_its_session_writes_nothing(
     step: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(form_command, "run", lambda *given, **known: pytest.fail("It went on."))
     stop_before(monkeypatch, form_command, step)
-    # The session would take hours.
     assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
     assert capsys.readouterr().err == "Stopped; no file is half-written.\n"
     assert left(here) == []
@@ -175,3 +176,10 @@ def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) ->
     for row in (1, 777, 1999):
         later = meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed").later(Path("o"))
         assert row_at({"time": times}, float(later[later.index("--time") + 1]), "--time") == row
+
+
+def test_libraries_that_read_are_imported_where_a_stop_does_no_harm() -> None:
+    # trimesh reads three formats, which are imported within `undisturbed`; all others need no library.
+    assert {kind: mesh_in.reader(kind) for kind in mesh_in.MESHES if mesh_in.reader(kind)} == dict.fromkeys(
+        (".stl", ".ply", ".off"), "trimesh"
+    )

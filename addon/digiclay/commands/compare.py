@@ -24,7 +24,7 @@ from ..core.set_point import asked
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
-from .stop import Stop
+from .stop import interruptible
 from .tables import table as aligned
 
 __all__ = ["READ", "add", "table"]
@@ -90,9 +90,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     found: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
-    with Stop() as stop, written(out, overwrite=arguments.overwrite) as folder:
+    with interruptible(), written(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
-            done = _run(scene, method, stop, quiet=arguments.quiet)
+            done = _run(scene, method, quiet=arguments.quiet)
             found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
             wanted = asked(scene.set_point, trace_of(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
@@ -116,10 +116,10 @@ def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
     return load(path, [*settings_of(arguments), Setting("control.method", method, "--methods")])
 
 
-def _run(scene: Scene, method: str, stop: Stop, *, quiet: bool) -> Trial:
+def _run(scene: Scene, method: str, *, quiet: bool) -> Trial:
     """Run one method under a progress bar."""
     with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
-        return trial(scene, progress=None if quiet else bar, stopped=stop)
+        return trial(scene, progress=None if quiet else bar)
 
 
 def _beyond(done: Trial) -> str:

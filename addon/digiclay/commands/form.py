@@ -22,7 +22,7 @@ from ..core.safe_names import name_of
 from ..core.scene import Scene
 from ..core.scene_file import Setting
 from ..core.session import Result, run, save
-from ..core.shape_file import Fitted, find_shape, fitted_to, sample_shapes
+from ..core.shape_file import Fitted, find_shape, fitted_to, import_reader, sample_shapes
 from ..core.shape_text import packed
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
@@ -30,7 +30,7 @@ from .export import formats
 from .extras import Extra, make_extras, meshes, tell_left_out
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface
-from .stop import Stop, undisturbed
+from .stop import Stop, interruptible, undisturbed
 
 __all__ = ["add"]
 
@@ -79,12 +79,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
     may_be_written(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
-    with undisturbed():  # what reads meshes is imported there
+    with undisturbed():
+        import_reader(file)
+    with interruptible():  # a mesh of millions of triangles takes a while
         scene, laid = _laid(scene_of(arguments)[0])
-    if not arguments.quiet:
-        print(laid.told())
-    if arguments.finger != "scene":
-        scene = shaped(scene, assemble(scene), arguments.finger)
+        if not arguments.quiet:
+            print(laid.told())
+        if arguments.finger != "scene":
+            scene = shaped(scene, assemble(scene), arguments.finger)
     with claimed(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
             versions = {"digiclay": __version__}

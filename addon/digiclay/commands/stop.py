@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["Stop", "undisturbed"]
+__all__ = ["Stop", "interruptible", "undisturbed"]
 
 
 class Stop:
@@ -39,6 +39,24 @@ class Stop:
         for number, former in self._former.items():
             # Python does not know a handler that Blender itself has set, and cannot set it again.
             signal.signal(number, signal.SIG_DFL if former is None else former)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let a first signal interrupt at once, SIGTERM as Ctrl-C does: where there is nothing to be kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    former = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from .errors import ParameterError
 from .mesh_in_checks import check_off, check_ply, check_stl, stl_is_text
 from .mesh_in_limits import refuse_size
 
-__all__ = ["MESHES", "Read", "read"]
+__all__ = ["MESHES", "Read", "read", "reader"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -49,6 +49,11 @@ class Read(NamedTuple):
     faces: Indices
     length: float | None
     up: str
+
+
+def reader(kind: str) -> str:
+    """Return the library that reads a format, ``""`` where none is needed."""
+    return "trimesh" if kind in CHECKS else ""
 
 
 def read(path: Path) -> Read:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+from contextlib import suppress
 from pathlib import Path
 
 from . import mesh_in
@@ -18,7 +20,7 @@ from .shape import AUTO, LENGTHS, Shape
 from .shape_fit import Fitted, fitted, given
 from .shape_mesh import ShapeMesh, shape_mesh
 
-__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "read", "sample_shapes"]
+__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "import_reader", "read", "sample_shapes"]
 
 #: Where the sample shapes are.
 SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "shapes"
@@ -70,6 +72,18 @@ def read(shape: Shape) -> Relief:
     if kind in PICTURES:
         return height_map(path.name, pixels(path))
     return _mesh(path, shape)
+
+
+def import_reader(path: Path) -> None:
+    """Import the library that reads a file, where there is one: a stop within an import does harm.
+
+    One that is missing is told of when the file is read.
+    """
+    kind = path.suffix.lower()
+    reader = "PIL.Image" if kind in PICTURES else mesh_in.reader(kind)
+    if reader:
+        with suppress(ImportError):
+            importlib.import_module(reader)
 
 
 def _array(path: Path) -> HeightMap:
