@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test lint test-matrix test-window test-proof clean
+.PHONY: help demo extension test lint mutants test-matrix test-window test-proof clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -42,6 +42,12 @@ lint: ## check style, format and types
 	.venv/bin/ruff format --check . || status=1; \
 	.venv/bin/mypy || status=1; \
 	exit $$status
+
+# All mutants of some modules: make mutants MODULES="valve steppers.bernoulli"
+MODULES ?=
+mutants: ## change the core's physics and control here and there, and list what no test notices
+	@$(ENVIRONMENT) requirements/mutation.txt $(IN_311)
+	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 150 --limit 600 --most 0.3 $(MODULES)
 
 test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
 	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 # Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -24,7 +24,11 @@ settings.register_profile(
     max_examples=50,
     suppress_health_check=[HealthCheck.too_slow],
 )
-settings.load_profile("repeatable")
+# Where it only counts that a test fails, as in tools/mutants.py: no failing example is made simpler.
+settings.register_profile(
+    "first_failure", settings.get_profile("repeatable"), phases=(Phase.explicit, Phase.generate)
+)
+settings.load_profile(os.environ.get("DIGICLAY_HYPOTHESIS", "repeatable"))
 
 WINDOW = Path(__file__).parent / "window"
 

@@ -50,14 +50,14 @@ def shaped(spots: list[tuple[float, float, float]], **parts: object) -> Record:
     return record(bed(control=VirtualMaster(), **parts), finger(spots), COUNT)
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(points, turns)
 def test_every_number_stays_finite(spots: list[tuple[float, float, float]], turn: tuple[float, ...]) -> None:
     system = bed(control=VirtualMaster())
     assert np.isfinite(record(system, tilted(finger(spots), turn), COUNT).rows).all()
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(points, st.floats(0.0, 100.0))
 def test_pins_stay_within_their_stroke(spots: list[tuple[float, float, float]], rest: float) -> None:
     system = bed(control=VirtualMaster(), actuator=Actuator(rest_height=rest * 1e-3))
@@ -73,7 +73,7 @@ def test_no_force_pulls(spots: list[tuple[float, float, float]], stepper: str) -
     assert shaped(spots, stepper=stepper).force.min() >= 0.0
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(points)
 def test_there_is_no_force_without_contact(spots: list[tuple[float, float, float]]) -> None:
     system = bed(control=VirtualMaster())
@@ -85,13 +85,13 @@ def test_there_is_no_force_without_contact(spots: list[tuple[float, float, float
     assert not run.force[gap > 1e-15].any()
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(points)
 def test_commands_are_openings(spots: list[tuple[float, float, float]]) -> None:
     assert np.abs(shaped(spots).command).max() <= 1.0
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(points)
 def test_a_bed_without_control_does_not_move(spots: list[tuple[float, float, float]]) -> None:
     run = record(bed(), finger(spots), COUNT)

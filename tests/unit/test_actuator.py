@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from tests.assemble import AWAY, one_cell, path, record, scripted
 
 RAISE, LOWER = scripted(lambda t, x, y: 1.0), scripted(lambda t, x, y: -1.0)
-STEPPERS = [("bernoulli", 1e-3), ("runge_kutta_4", 0.25e-3)]
+STEPPERS = [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)]
 
 
 def test_pressure_is_force_over_area() -> None:

@@ -198,12 +198,12 @@ def test_nothing_changes_where_no_parameter_has() -> None:
 
 def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
     hand, session = Hand(), started()
-    circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 60)]
-    session = hand.move(session, [*circle * 8])  # longer than the trace's ten seconds, so that it is full
+    circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
+    session = hand.move(session, [*circle * 16])  # longer than the trace's ten seconds, so that it is full
     tracemalloc.start()
     try:
         floors = []
-        for _ in range(5):
+        for _ in range(4):
             held = []
             for place in circle:
                 session = hand.move(session, [place])

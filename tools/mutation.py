@@ -1,0 +1,116 @@
+"""What mutants there are of a module of the core: one change each, made by cosmic-ray's operators."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+
+__all__ = ["CORE", "ROOT", "Mutant", "mutants", "sample"]
+
+ROOT = Path(__file__).parents[1]
+CORE = ROOT / "addon" / "digiclay" / "core"
+#: Operators of cosmic-ray whose mutants mean something in numerical code.
+COMPARED = {"Lt": ("LtE", "Gt"), "LtE": ("Lt", "Gt"), "Gt": ("GtE", "Lt"), "GtE": ("Gt", "Lt")}
+COMPARED |= {"Eq": ("NotEq",), "NotEq": ("Eq",), "Is": ("IsNot",), "IsNot": ("Is",)}
+COMPUTED = {
+    "Add": ("Sub",),
+    "Sub": ("Add",),
+    "Mul": ("Div",),
+    "Div": ("Mul",),
+    "Pow": ("Mul",),
+    "Mod": ("Mul",),
+}
+COMPUTED |= {"BitOr": ("BitAnd",), "BitAnd": ("BitOr",), "FloorDiv": ("Mul",)}
+OTHERS = (
+    "AddNot", "NumberReplacer", "ReplaceAndWithOr", "ReplaceOrWithAnd", "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue", "ReplaceBreakWithContinue", "ReplaceContinueWithBreak",
+    "ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_USub", "ZeroIterationForLoop",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change of one place: a module of the core, which operator, and which of its places there."""
+
+    module: str
+    operator: str
+    occurrence: int
+    line: int
+    column: int
+
+    @property
+    def path(self) -> Path:
+        """The module's file."""
+        return CORE.joinpath(*self.module.split(".")).with_suffix(".py")
+
+    def source(self) -> str:
+        """Return the module's source with the change."""
+        text = mutate_code(
+            self.path.read_text(encoding="utf-8"), get_operator(self.operator)(), self.occurrence
+        )
+        assert text is not None, f"no mutant: {self}"
+        return text
+
+    def said(self) -> str:
+        """Return file, line, and the line before and after."""
+        before = self.path.read_text(encoding="utf-8").splitlines()
+        after = self.source().splitlines()
+        at = next(i for i, pair in enumerate(zip(before, after, strict=False)) if pair[0] != pair[1])
+        return f"{self.path.relative_to(ROOT)}:{at + 1}: {before[at].strip()}  ->  {after[at].strip()}"
+
+
+def operators() -> list[str]:
+    """Return the names of the operators that are used."""
+    wanted = {f"core/{name}" for name in OTHERS}
+    wanted |= {f"core/ReplaceComparisonOperator_{a}_{b}" for a, names in COMPARED.items() for b in names}
+    wanted |= {f"core/ReplaceBinaryOperator_{a}_{b}" for a, names in COMPUTED.items() for b in names}
+    lacking = wanted - set(operator_names())
+    assert not lacking, f"cosmic-ray has no {sorted(lacking)}"
+    return sorted(wanted)
+
+
+def idle(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Return from where to where (line, column) a mutant says nothing: annotations, decorators, messages."""
+    nodes: list[ast.AST] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            nodes += node.decorator_list
+        if isinstance(node, ast.FunctionDef) and node.returns:
+            nodes.append(node.returns)
+        if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation:
+            nodes.append(node.annotation)
+        if isinstance(node, ast.Raise):
+            nodes.append(node)
+    return [((n.lineno, n.col_offset), (n.end_lineno, n.end_col_offset)) for n in nodes]  # type: ignore[attr-defined]
+
+
+def mutants(module: str) -> Iterator[Mutant]:
+    """Yield all mutants of a module."""
+    source = Mutant(module, "", 0, 0, 0).path.read_text(encoding="utf-8")
+    tree, left_out = get_ast(source), idle(source)
+    for name in operators():
+        operator = get_operator(name)()
+        places = (place for node in ast_nodes(tree) for place in operator.mutation_positions(node))
+        for occurrence, (start, end) in enumerate(places):
+            if not any(first <= start and end <= last for first, last in left_out):
+                yield Mutant(module, name, occurrence, *start)
+
+
+def sample(every: Sequence[Mutant], count: int) -> list[Mutant]:
+    """Return `count` mutants: those whose module, operator and line of text hash smallest."""
+    lines = {one.module: one.path.read_text(encoding="utf-8").splitlines() for one in every}
+    seen: dict[str, int] = {}
+
+    def key(one: Mutant) -> str:
+        text = f"{one.module} {one.operator} {lines[one.module][one.line - 1].strip()}"
+        seen[text] = seen.get(text, 0) + 1
+        return hashlib.sha256(f"{text} {seen[text]}".encode()).hexdigest()
+
+    return [one for _, one in sorted(((key(one), one) for one in every), key=lambda pair: pair[0])[:count]]
