@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from digiclay.core.assembly import assemble
+from digiclay.core.control.shapes import SHAPES
 from digiclay.core.layout import Layout, grid
+from digiclay.core.modes import Mode
 from digiclay.core.places import Measurement
 from digiclay.core.scene_table import resolve
 
@@ -49,3 +52,37 @@ def test_heights_are_read_from_a_file(tmp_path: Path) -> None:
     heights = np.linspace(30e-3, 50e-3, 25).reshape(5, 5)
     np.save(tmp_path / "mine.npy", heights)
     assert np.array_equal(control(shape=str(tmp_path / "mine.npy")).heights, heights.ravel())
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        # At x = 0.5, y = 0.25 of the square from -1 to 1.
+        ("dome", 1.0 - 0.3125),
+        ("saddle", 0.1875),
+        ("wave", 0.0),
+        ("ripple", np.cos(3.0 * np.pi * 0.3125**0.5)),
+        ("pyramid", 0.5),
+        ("ramp", 0.5),
+        ("flat", 0.0),
+    ],
+)
+def test_a_named_shape_has_the_values_of_its_formula(name: str, value: float) -> None:
+    found = SHAPES[name](np.array([0.5]), np.array([0.25]))
+    assert found[0] == pytest.approx(value, abs=1e-12)
+
+
+def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_finger_left() -> None:
+    table = {
+        "layout": {"rows": 1, "columns": 1},
+        "control": {"method": "force_display", "release_time": 0.0225},
+    }
+    behaviour = assemble(resolve(table)).controller
+    place, full = grid(Layout(1, 1)).place(np.arange(1)), np.full(1, 40e-3)
+    mode, own, follows = np.full(1, Mode.FORCE_FOLLOW, np.int8), np.zeros((behaviour.rows, 1)), []
+    for _ in range(6):
+        _, given = behaviour.command(None, Measurement(place, full, np.zeros(1), full, mode, own))
+        mode = given.mode
+        follows.append(bool(mode[0] == Mode.FORCE_FOLLOW))
+    # 4 periods of 5 ms are within 22.5 ms, 5 are not.
+    assert follows == [True] * 4 + [False] * 2

@@ -55,6 +55,16 @@ def test_a_shut_valve_stands_still(parts: dict[str, Any]) -> None:
     assert master_cell(cell(**parts), 5e-3).speed(0.0) == 0.0
 
 
+def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
+    one, period, start, command = cell(), 5e-3, 0.3, 0.9
+    found, _ = master_cell(one, period).after(40e-3, start, command)
+    times = (np.arange(2000) + 0.5) / 2000 * period
+    opening = command + (start - command) * np.exp(-times / one.lag.time_constant)
+    flow = one.flow.flow(opening, np.full(2000, one.supply.high))
+    # Two Gauss points: the fourth derivative of a square of exponentials over 2.5 time constants.
+    assert found - 40e-3 == pytest.approx(period * flow.mean() / one.actuator.area, rel=0.01)
+
+
 def test_felt_again_it_is_elsewhere_and_no_longer_alone_and_else_the_same() -> None:
     heading = Heading(0.1, 0.2, 1.0, 0.0)
     assert MASTER.at(21.0, 22.0, heading) == MASTER._replace(x=21.0, y=22.0, heading=heading, alone=0)
