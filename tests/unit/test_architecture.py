@@ -21,22 +21,25 @@ CORE = PACKAGE / "core"
 
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
-    "body npz toml_text feature_region spline errors modes png closed_form filled some "
+    "feature_region feature_skeleton feature_branches "
+    "body npz toml_text spline errors modes png closed_form filled some "
     "control.travel metrics_signal set_point stack.columns processes safe_names",
+    "feature_network "
     "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
     "metrics_path sweep_axis",
     "mesh_in_placed mesh_in_checks mesh_in_obj "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
-    "mesh_in_gltf mesh_in_threemf finger_range feature_crest pins_solid skin_membrane metrics series_folder "
+    "mesh_in_gltf mesh_in_threemf finger_range feature_lattice pins_solid skin_membrane metrics series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
+    "feature_line "
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
-    "sheet shape_file physics scene stack.control",
-    "features system observer steppers.bernoulli_plan steppers.explicit "
+    "sheet feature_crest shape_file physics scene stack.control",
+    "feature_parts system observer steppers.bernoulli_plan steppers.explicit "
     "control.bench control.master control.master_cell scene_table "
     "control.drive control.neighbours control.shapes stack.physics strained",
-    "steppers.bernoulli stack.gathering stack.fingers stack.bernoulli",
+    "features steppers.bernoulli stack.gathering stack.fingers stack.bernoulli",
     "feature_solids "
     "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
     "control.elastic control.plastic control.viscous "

@@ -174,9 +174,9 @@ def test_neighbours_exactly_at_the_threshold_leave_no_triangle_without_area():
 
 def test_the_table_is_in_millimetres():
     head, row = table(features(formed(lambda x, y: ridge(x, y))))
-    assert head == ("feature", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
-    assert row[0] == "boss_1"
-    assert row[3] == "6.00"
+    assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    assert row[:2] == ("boss_1", "ridge")
+    assert row[4] == "6.00"
 
 
 @pytest.mark.parametrize("bad", [0.0, -1e-3, np.nan, np.inf, "wide"])

@@ -42,7 +42,7 @@ def test_features_are_listed_in_a_table(run: Path, capsys: pytest.CaptureFixture
     assert main(["features", "run"]) == 0
     counted, head, _, row = capsys.readouterr().out.splitlines()
     assert counted == "0 bosses and 1 crease"
-    assert head.split()[:2] == ["feature", "pins"]
+    assert head.split()[:3] == ["feature", "form", "pins"]
     assert row.split()[0] == "crease_1"
 
 

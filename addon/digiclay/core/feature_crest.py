@@ -1,187 +1,202 @@
-"""The crest of a boss, or the lowest line of a crease: traced from pin to pin along the top."""
+"""Crests: the lines along the top of a boss, or the bottom of a crease, to a fraction of a pitch.
+
+The pins along the top give their number and their order (feature_skeleton, feature_network). Each line is
+then drawn through the middle of the feature's sections, and ends where its spine does: half the width at half
+its height before the height has fallen to a half (feature_line). A line that is not as long as the feature is
+wide is the top of a mound, and no crest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .formed import Formed
+from .feature_lattice import Lattice
+from .feature_line import LEVEL, Field, even, smoothed
+from .feature_network import Chain, chains, reaches_out
+from .feature_skeleton import half_width, skeleton
 
-__all__ = ["Lattice", "crests"]
+__all__ = ["Crest", "Ridge", "ridges"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
-#: Steps to the neighbours, (rows, columns), counter-clockwise; a shifted bed has one list for rows
-#: that stand back and one for rows that are shifted forward along x.
-SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
-BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
-FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
-#: How far along a closed crest its two ends may be apart and be joined all the same, steps.
-NEARLY_CLOSED = 3
-#: A crest falls less than this share of what its sides fall; on a round top, where all directions are alike,
-#: there is none.
-SHARE = 0.9
+#: Lines are parted where they are lower than this share of the lower one. Where they are as low for more half
+#: widths than so many, there is a ridge between two mounds.
+SADDLE = 0.5
+NOTCH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
-    """Pins and their neighbours.
+class Crest:
+    """A line along a feature.
 
     Attributes
     ----------
-    neighbour : ndarray of int (n, 8 or 6)
-        Counter-clockwise; -1 beyond the edge of the bed.
+    points : ndarray (p, 3)
+        m, a pitch apart at most.
+    off : ndarray (p,)
+        How far the feature is off its former place along it, m, positive.
+    closed : bool
+        Then the last point is the first.
+    half : float
+        Half the width of the feature at half its height, the median along the line, m.
+    crossed : bool
+        Whether it meets another line.
     """
 
-    neighbour: Pins
+    points: Floats
+    off: Floats
+    closed: bool
+    half: float
+    crossed: bool
 
-    @classmethod
-    def of(cls, formed: Formed) -> Lattice:
-        """Return the neighbours of all pins of a bed: 8 in an aligned one, else 6."""
-        row, column = np.divmod(np.arange(formed.rows * formed.columns), formed.columns)
-        lists = (SQUARE, SQUARE) if not formed.shift else (BACK, FORWARD)
-        lists = lists[::-1] if formed.shift < 0.0 else lists
-        steps = np.array(lists)[row % 2]
-        rows, columns = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
-        on_bed = (rows >= 0) & (rows < formed.rows) & (columns >= 0) & (columns < formed.columns)
-        return cls(np.where(on_bed, rows * formed.columns + columns, -1))
+    @property
+    def length(self) -> float:
+        """In space, m."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
-def crests(formed: Formed, lattice: Lattice, pins: Pins, off: Floats) -> tuple[Floats, ...]:
-    """Trace the crests of a feature.
+class Ridge(NamedTuple):
+    """What belongs together of a feature: lines that meet, or the top of a mound.
 
-    The feature is rounded over its own half width, so that a flat top has its crest in the middle. From its
-    highest pin the line goes both ways to the highest pin ahead, as long as it falls less along the line
-    than to the sides. Where a branch is further from the lines so far than the feature is wide, it is
-    traced the same way. Lines shorter than half that width are tops, and no crests.
+    Attributes
+    ----------
+    crests : tuple of Crest
+        The longest first; none for a mound.
+    core : ndarray (m, 2)
+        Places along the top, m.
+    half : float
+        Half its width, m.
+    """
+
+    crests: tuple[Crest, ...]
+    core: Floats
+    half: float
+
+
+def ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
+    """Return the ridges and mounds of a feature that are parted by saddles, with their crests.
 
     Parameters
     ----------
-    formed : Formed
     lattice : Lattice
     pins : ndarray of int (k,)
         The feature's, ascending.
-    off : ndarray (k,)
-        How far each of them is off where it was, m, positive.
-
-    Returns
-    -------
-    tuple of ndarray (p, 3)
-        Points of each line, m, p at least 2; none for a feature without one, such as a dome.
+    off : ndarray (n,)
+        How far every pin of the bed is off where it was, m, positive for pins of the feature.
+    height : ndarray (n,)
+        Pin tops, m.
+    least : float
+        A saddle is this deep at least, m.
     """
+    own = np.zeros(len(off))
+    own[pins] = off[pins]
     beside = lattice.neighbour[pins]
     place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
-    slope = _Slope(np.where(pins[place] == beside, place, -1), beside >= 0, off)
-    found = [line for line in slope.lines() if len(line) > slope.half]
-    return tuple(_smoothed(formed, pins[line]) for line in found)
+    among, on_bed = np.where(pins[place] == beside, place, -1), beside >= 0
+    line = skeleton(among, on_bed, off[pins])
+    position = lattice.formed.position[pins]
+    field = Field(lattice, own, height, 2.0 * (half_width(among, on_bed) + 2.0) * lattice.pitch)
+    half = field.half_widths(position[line])
+    found = chains(among, line, position, half, lattice.pitch) if len(line) > 1 else []
+    if not found:  # a single pin, or a ring of three
+        return (Ridge((), position[line], float(half.max())),)
+    usual = float(np.median(half))
+    pieces = [
+        piece
+        for chain in found
+        for piece in _parted(chain, field, usual, least)
+        if piece is chain or not any(piece.joined) or reaches_out(piece.points, usual, lattice.pitch)
+    ]
+    lines = [field.line(piece) for piece in pieces]
+    _meet(pieces, lines, lattice.pitch)
+    groups: list[tuple[set[int], list[int]]] = []
+    for number, piece in enumerate(pieces):
+        group = (set(piece.nodes), [number])
+        for other in [one for one in groups if one[0] & group[0]]:
+            groups.remove(other)
+            group = (group[0] | other[0], group[1] + other[1])
+        groups.append(group)
+    made = []
+    for _, numbers in groups:
+        own_crests = [_crest(field, pieces[n], lines[n]) for n in numbers]
+        kept = sorted((one for one in own_crests if one is not None), key=lambda one: -one.length)
+        core = np.concatenate([pieces[n].points for n in numbers])
+        if kept:
+            core = np.concatenate([one.points[:, :2] for one in kept])
+        wide = kept[0].half if kept else float(field.half_widths(core[[int(np.argmax(field.at(core)))]])[0])
+        made.append(Ridge(tuple(kept), core, wide))
+    return tuple(made)
 
 
-class _Slope:
-    """One feature: its pins are numbered from 0, and all around it is level ground.
-
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbours within the feature, -1 where there is none.
-    on_bed : ndarray of bool (k, 8 or 6)
-        Where the bed goes on, within the feature or outside it.
-    off : ndarray (k,)
-    """
-
-    def __init__(self, beside: Pins, on_bed: NDArray[np.bool_], off: Floats) -> None:
-        self.beside, self.on_bed = beside, on_bed
-        self.half = self._half_width()
-        self.top = off
-        for _ in range(self.half):
-            self.top = 0.5 * (self.top + self._heights(beside).sum(axis=1) / on_bed.sum(axis=1))
-
-    def lines(self) -> Iterator[Pins]:
-        """Give the lines, the one through the highest pin first; single pins too."""
-        untried = np.ones(len(self.top), bool)
-        traced: set[int] = set()
-        while untried.any():
-            start = int(np.argmax(np.where(untried, self.top, -np.inf)))
-            line = self._both_ways(start, traced)
-            traced.update(line.tolist())
-            untried[self._ring(line, 2 * self.half)] = False
-            yield line
-
-    def _heights(self, pins: Pins) -> Floats:
-        """Return the heights of pins, and of the ground for -1."""
-        heights: Floats = np.where(pins >= 0, self.top[pins], 0.0)
-        return heights
-
-    def _half_width(self) -> int:
-        """Return how many rings of pins can be taken off, one at least."""
-        inner, count = np.ones(len(self.beside), bool), 0
-        while inner.any():
-            # Where the bed ends the feature might go on.
-            kept = inner & np.all(np.where(self.beside >= 0, inner[self.beside], ~self.on_bed), axis=1)
-            if np.array_equal(kept, inner):  # it covers the whole bed
-                break
-            inner, count = kept, count + 1
-        return max(1, count)
-
-    def _ring(self, pins: Pins, steps: int) -> Pins:
-        """Return all pins within some steps of others."""
-        for _ in range(steps):
-            pins = np.unique(np.concatenate([pins, self.beside[pins].ravel()]))
-            pins = pins[pins >= 0]
-        return pins
-
-    def _both_ways(self, start: int, others: set[int]) -> Pins:
-        """Return the pins of a line through `start`; a line that meets another one ends on it."""
-        known = {start}
-        one = self._way(start, None, known, others)
-        if not one:
-            return np.array([start])
-        if len(one) > 2 * NEARLY_CLOSED and one[-1] in self._ring(np.array([start]), NEARLY_CLOSED):
-            return np.array([start, *one, start])
-        count = self.beside.shape[1]
-        first = int(np.flatnonzero(self.beside[start] == one[0])[0])
-        other = self._way(start, (first + count // 2) % count, known, others)
-        return np.array([*other[::-1], start, *one])
-
-    def _way(self, pin: int, direction: int | None, known: set[int], others: set[int]) -> list[int]:
-        """Follow the crest from a pin, ahead of a direction or, without one, wherever it goes on best."""
-        count = self.beside.shape[1]
-        way: list[int] = []
-        while pin not in others:
-            # It bends by one direction a step at most, so that it does not turn back at the end of a ridge.
-            ahead = range(count) if direction is None else range(direction - 1, direction + 2)
-            steps = [(turn % count, int(self.beside[pin, turn % count])) for turn in ahead]
-            steps = [(turn, to) for turn, to in steps if to >= 0 and to not in known]
-            steps.sort(key=lambda step: -float(self.top[step[1]]))
-            if direction is None:
-                steps = [step for step in steps if self._goes_on(pin, *step)]
-            if not steps or not self._goes_on(pin, *steps[0]):
-                break
-            direction, pin = steps[0]
-            way.append(pin)
-            known.add(pin)
-        return way
-
-    def _goes_on(self, here: int, direction: int, there: int) -> bool:
-        """Tell whether the crest goes on from a pin to its neighbour: it falls less ahead than aside."""
-        count = self.beside.shape[1]
-        falls = []
-        # Straight to the side, or between the two directions that are nearest to it.
-        for turns in ((2,), (-2,)) if count == 8 else ((1, 2), (-1, -2)):
-            side = [(direction + turn) % count for turn in turns]
-            side = [turn for turn in side if self.on_bed[there, turn]]
-            if side:
-                falls.append(self.top[there] - self._heights(self.beside[there, side]).mean())
-        ahead = float(self.top[here] - self.top[there])
-        return bool(falls) and ahead < SHARE * float(np.mean(falls))
+def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain]:
+    """Return the parts of a line between saddles that are short, and lower than half of what they part."""
+    points = chain.points
+    off = field.at(points)
+    if chain.closed:
+        low = int(np.argmin(off))
+        usual = float(np.median(off))
+        if off[low] >= SADDLE * usual or usual - off[low] < least or len(points) < 4:
+            return [chain]
+        opened = np.concatenate([points[low:-1], points[: low + 1]])
+        return _parted(Chain(opened, False, (False, False), chain.nodes), field, half, least)
+    before, after = np.maximum.accumulate(off), np.maximum.accumulate(off[::-1])[::-1]
+    banks = np.minimum(before, after)
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    for at in np.argsort(off / np.maximum(banks, 1e-12)).tolist():
+        if off[at] >= SADDLE * banks[at]:
+            return [chain]
+        first, last = _stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)
+        if banks[at] - off[at] >= least and run[last] - run[first] <= NOTCH * half and 0 < at < len(off) - 1:
+            first, last = _stretch(off < SADDLE * banks[at], at)
+            one = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
+            two = replace(
+                chain, points=points[min(last + 1, len(off) - 1) :], joined=(False, chain.joined[1])
+            )
+            return [*_parted(one, field, half, least), *_parted(two, field, half, least)]
+    return [chain]
 
 
-def _smoothed(formed: Formed, pins: Pins) -> Floats:
-    """Return the points of a line, smoothed so that an oblique one is no staircase and not too long."""
-    line = np.column_stack([formed.position[pins], formed.height[pins]])
-    for _ in range(2):
-        line[1:-1] = 0.25 * (line[:-2] + 2.0 * line[1:-1] + line[2:])
-    return line
+def _stretch(there: NDArray[np.bool_], at: int) -> tuple[int, int]:
+    """Return the first and the last of those about a place that all have something."""
+    out = np.flatnonzero(~there)
+    before, after = out[out < at], out[out > at]
+    return int(before[-1]) + 1 if len(before) else 0, int(after[0]) - 1 if len(after) else len(there) - 1
+
+
+def _meet(pieces: list[Chain], lines: list[Floats | None], pitch: float) -> None:
+    """Let lines that end at a junction end on the nearest line there, in place."""
+    for number, piece in enumerate(pieces):
+        for end in (0, -1):
+            mine = lines[number]
+            if mine is None or piece.closed or not piece.joined[end]:
+                continue
+            others = [
+                fine
+                for k, line in enumerate(lines)
+                if k != number and line is not None and pieces[k].nodes & piece.nodes
+                for fine in (even(line, pitch / 4.0),)
+                if fine is not None
+            ]
+            if others:
+                there = np.concatenate(others)
+                foot = there[[int(np.argmin(np.hypot(*(there - mine[end]).T)))]]
+                joined = np.concatenate([foot, mine] if end == 0 else [mine, foot])
+                lines[number] = even(joined, pitch)
+
+
+def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:
+    """Return the crest along a line, or none where it is no more than a top."""
+    if line is None:
+        return None
+    half = field.half_width(line, chain.closed)
+    top = np.nan_to_num(field.lattice.at(field.height, line), nan=float(field.height.mean()))
+    whole = smoothed(np.column_stack([line, top, field.at(line)]), 2, chain.closed)
+    if chain.closed:
+        whole[-1] = whole[0]
+    crest = Crest(whole[:, :3], whole[:, 3], chain.closed, half, len(chain.nodes) > 0)
+    return crest if crest.length >= 2.0 * half else None

@@ -1,4 +1,4 @@
-"""The part of a skin that lies more than a threshold off where it was: cut out along that contour."""
+"""Parts of a skin, cut out along contours: where it is off its former place, and nearer to one top."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Region", "components", "cut"]
+__all__ = ["Region", "components", "cut", "divided"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -89,10 +89,45 @@ def cut(place: Floats, former: Floats, off: Floats, faces: Indices, threshold: f
     threshold : float
         m.
     """
-    inside = off > threshold
+    values, pieces, whole = _clipped(np.column_stack([place, former, off]), faces, off, threshold)
+    values[whole:, 3] = threshold
+    return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
+
+
+def divided(region: Region, nearer: Floats) -> tuple[Region | None, Region | None]:
+    """Return the two parts of a region where a value at its points is above 0, and where it is not.
+
+    Together they are the region; one may have nothing.
+    """
+    values = np.column_stack([region.place, region.former, region.off])
+    # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
+    nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
+    found: list[Region | None] = []
+    for side in (nearer, -nearer):
+        some = region.faces[(side > 0.0)[region.faces].any(axis=1)]
+        kept, pieces, _ = _clipped(values, some, side, 0.0)
+        found.append(Region(kept[:, :2], kept[:, 2], kept[:, 3], pieces) if len(some) else None)
+    return found[0], found[1]
+
+
+def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[Floats, Indices, int]:
+    """Return what of some triangles lies where a value at their corners is above a level.
+
+    After the values at its points and its faces: how many of the points, the first, are corners.
+
+    Parameters
+    ----------
+    values : ndarray (m, c)
+        At the corners, straight within each triangle.
+    faces : ndarray of int (f, 3)
+        Each with one corner above the level at least.
+    by : ndarray (m,)
+    level : float
+    """
+    inside = by > level
     count = inside[faces].sum(axis=1)
     pieces = [faces[count == 3].astype(np.int64)]
-    m = len(off)
+    m = len(by)
     # A corner is named by its number; a point of the contour, between i inside and j outside, by m + i m + j.
     for wanted in (1, 2):
         some = faces[count == wanted].astype(np.int64)
@@ -107,10 +142,6 @@ def cut(place: Floats, former: Floats, off: Floats, faces: Indices, threshold: f
     names, numbers = np.unique(np.concatenate(pieces), return_inverse=True)
     whole = names[names < m]
     i, j = np.divmod(names[names >= m] - m, m)
-    share = np.clip((off[i] - threshold) / (off[i] - off[j]), MARGIN, 1.0 - MARGIN)
-    return Region(
-        np.concatenate([place[whole], place[i] + share[:, None] * (place[j] - place[i])]),
-        np.concatenate([former[whole], former[i] + share * (former[j] - former[i])]),
-        np.concatenate([off[whole], np.full(len(i), threshold)]),
-        numbers.reshape(-1, 3).astype(np.int32),
-    )
+    share = np.clip((by[i] - level) / (by[i] - by[j]), MARGIN, 1.0 - MARGIN)[:, None]
+    kept = np.concatenate([values[whole], values[i] + share * (values[j] - values[i])])
+    return kept, numbers.reshape(-1, 3).astype(np.int32), len(whole)

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .feature_crest import Lattice, crests
-from .feature_region import Region, components, cut
+from .feature_crest import ridges
+from .feature_lattice import Lattice
+from .feature_parts import Part, nearest, parts
+from .feature_region import Region, components, cut, divided
 from .quantity import Parameters, quantity
 from .sheet import Sheet
 
@@ -29,9 +31,17 @@ class Finding(Parameters):
     smallest: int = quantity(3, "pins a feature has at least", at_least=1)
 
 
+#: What a person calls a feature, by its kind: with one crest, without, and without but flat.
+FORMS = {"boss": ("ridge", "mound", "plateau"), "crease": ("valley", "hollow", "basin")}
+#: A top is flat when more than half of what is above half its height is above this share of it.
+FLAT = 0.9
+#: Saddles and mounds count from so many thresholds on.
+DEEP = 2.0
+
+
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A boss or a crease: a connected part of the skin more than the threshold off its former place.
+    """A boss or a crease: a part of the skin more than the threshold off its former place.
 
     Attributes
     ----------
@@ -45,7 +55,9 @@ class Feature:
     extreme : float
         Largest height of a boss, or depth of a crease, off the former surface, m.
     crests : tuple of ndarray (p, 3)
-        The lines along its top, or its bottom, m.
+        The lines along its top, or its bottom, m; the longest first. A closed one ends where it begins.
+    flat : bool
+        Whether most of its top is level.
     """
 
     kind: str
@@ -54,6 +66,17 @@ class Feature:
     region: Region
     extreme: float
     crests: tuple[Floats, ...]
+    flat: bool
+
+    @property
+    def form(self) -> str:
+        """What a person calls it: ridge, mound, plateau; valley, hollow, basin; ring; or several of them."""
+        line, top, plain = FORMS[self.kind]
+        if not self.crests:
+            return plain if self.flat else top
+        if len(self.crests) > 1:
+            return f"{len(self.crests)} {line}s"
+        return "ring" if np.array_equal(self.crests[0][0], self.crests[0][-1]) else line
 
     @property
     def name(self) -> str:
@@ -78,7 +101,8 @@ class Feature:
     def figures(self) -> dict[str, object]:
         """Return what is listed of it, in SI units."""
         return {
-            "name": self.name, "kind": self.kind, "pins": self.pins.tolist(), "area": self.area,
+            "name": self.name, "kind": self.kind, "form": self.form, "pins": self.pins.tolist(),
+            "area": self.area,
             "height" if self.kind == "boss" else "depth": self.extreme, "volume": self.volume,
             "crest_length": self.crest_length, "crests": [line.tolist() for line in self.crests],
         }  # fmt: skip
@@ -88,7 +112,7 @@ def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first.
 
     Points belong together that the skin's triangles join; so two bosses that only touch at
-    the threshold are two.
+    the threshold are two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
     """
     finding = finding or Finding()
     lattice = Lattice.of(sheet.formed)
@@ -115,8 +139,36 @@ def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: 
         if len(mine) < finding.smallest:
             continue
         region = cut(sheet.place, sheet.former, off, faces[block], finding.threshold)
-        lines = crests(sheet.formed, lattice, mine, at_pins[mine])
-        yield Feature(kind, 0, mine, region, float(region.off.max()), lines)
+        least = DEEP * finding.threshold
+        whole = ridges(lattice, mine, at_pins, sheet.formed.height, least)
+        every = [part for ridge in whole for part in parts(ridge, least)]
+        for part, own, piece in _shared_out(sheet, every, mine, region, finding.smallest):
+            lines = tuple(crest.points for crest in part.crests)
+            high = at_pins[own]
+            flat = np.mean(high[high >= 0.5 * high.max()] >= FLAT * high.max()) > 0.5
+            yield Feature(kind, 0, own, piece, float(piece.off.max()), lines, bool(flat))
+
+
+def _shared_out(
+    sheet: Sheet, every: list[Part], pins: NDArray[np.int64], region: Region, smallest: int
+) -> Iterator[tuple[Part, NDArray[np.int64], Region]]:
+    """Give each part its pins and its piece of a region; one with too few pins goes to those beside it."""
+    place = sheet.formed.position[pins]
+    while len(every) > 1:
+        owner = np.argmin(nearest(place, every), axis=0)
+        count = np.bincount(owner, minlength=len(every))
+        if count.min() >= smallest:
+            break
+        del every[int(np.argmin(count))]
+    rest: Region | None = region
+    while len(every) > 1 and rest is not None:
+        away = nearest(rest.place, every)
+        piece, rest = divided(rest, away[:-1].min(axis=0) - away[-1])
+        if piece is not None:
+            yield every[-1], pins[owner == len(every) - 1], piece
+        every = every[:-1]
+    if rest is not None:
+        yield every[0], pins if rest is region else pins[owner == 0], rest
 
 
 def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
@@ -129,10 +181,10 @@ def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
 
 def table(features: list[Feature]) -> list[tuple[str, ...]]:
     """Return what a person reads: a head, and a row of texts a feature, in mm."""
-    head = ("feature", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     rows = [
         (
-            one.name, str(len(one.pins)), f"{one.area * 1e6:.1f}", f"{one.extreme * 1e3:.2f}",
+            one.name, one.form, str(len(one.pins)), f"{one.area * 1e6:.1f}", f"{one.extreme * 1e3:.2f}",
             f"{one.crest_length * 1e3:.1f}", f"{one.volume * 1e9:.0f}",
         )
         for one in features

@@ -39,7 +39,7 @@ class FindFeatures(FindingOptions, bpy.types.Operator):  # type: ignore[misc]
         for one in found:
             extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
             crest = f", crest {one.crest_length * 1e3:.0f} mm" if one.crests else ""
-            lines.append(f"{one.name}: {extreme}{crest}")
+            lines.append(f"{one.name}: {extreme}{crest}, {one.form}")
             lines.append(f"    {one.area * 1e6:.0f} mm², {one.volume * 1e9:.0f} mm³, {len(one.pins)} pins")
         bed[LISTED] = "\n".join(lines)
         self.report({"INFO"}, lines[0])

@@ -1,0 +1,189 @@
+"""The pins along the top of a feature: what is left when it is taken off from its lowest pin upwards.
+
+A pin is taken off as long as that neither parts what is left nor opens a hole in it, the lowest first, on
+whatever side it stands; one at the end of a line stays. What is left is one pin wide, runs along the top,
+and is joined and closed as the feature itself is. A hollow that a person sees as the inside of a ring counts
+as a hole, even where its bottom belongs to the feature: it is opened first.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["half_width", "rounded", "skeleton"]
+
+Floats = NDArray[np.float64]
+Pins = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: A hollow is a hole when it is deeper than this share of the lowest way out of it.
+DEEP = 0.25
+#: The end of a line stays when it is higher than this share of the pin it hangs on.
+END = 0.5
+#: A pin is ahead when it is this much further that way than the neighbours are.
+AHEAD = 1.25
+
+
+def half_width(beside: Pins, on_bed: Flags) -> int:
+    """Return how many rings of pins can be taken off a feature, one at least; arguments as `skeleton`."""
+    inner, count = np.ones(len(beside), bool), 0
+    while inner.any():
+        # Where the bed ends the feature might go on.
+        kept = inner & np.all(np.where(beside >= 0, inner[beside], ~on_bed), axis=1)
+        if np.array_equal(kept, inner):  # it covers the whole bed
+            break
+        inner, count = kept, count + 1
+    return max(1, count)
+
+
+def rounded(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
+    """Return heights averaged with those of the neighbours, the ground's included, some times."""
+    count = on_bed.sum(axis=1)
+    for _ in range(times):
+        heights = np.where(beside >= 0, off[beside], 0.0)
+        off = 0.5 * (off + heights.sum(axis=1) / count)
+    return off
+
+
+def skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
+    """Return the pins along the top of a feature.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours within the feature, whose pins are numbered from 0; -1 where there is none.
+    on_bed : ndarray of bool (k, 8 or 6)
+        Where the bed goes on, within the feature or outside it.
+    off : ndarray (k,)
+        How far each pin is off where it was, m, positive.
+
+    Returns
+    -------
+    ndarray of int
+        Ascending; one at least.
+    """
+    # A flat top gets its crest in the middle when it is rounded over its own half width.
+    top = rounded(beside, on_bed, off, half_width(beside, on_bed))
+    near = rounded(beside, on_bed, off, 1)
+    holes = _hollows(beside, on_bed, near)
+    return _thinned(beside, top, holes)
+
+
+def _hollows(beside: Pins, on_bed: Flags, off: Floats) -> list[int]:
+    """Return the lowest pin of each hollow that is deep enough, found by filling them up."""
+    inside = np.all((beside >= 0) | ~on_bed, axis=1)
+    lower = np.any((beside >= 0) & (off[beside] < off[:, None]), axis=1)
+    if not np.any(inside & ~lower):
+        return []
+    # Which hollow a pin drains into; the last one is the ground outside, which is lower than all.
+    count = len(off)
+    hollow = list(range(count + 1))
+    lowest = [*off.tolist(), -np.inf]
+    bottom = list(range(count + 1))
+
+    def root(pin: int) -> int:
+        while hollow[pin] != pin:
+            hollow[pin] = hollow[hollow[pin]]
+            pin = hollow[pin]
+        return pin
+
+    height, flooded, holes = off.tolist(), [False] * count, []
+    neighbours = np.where(beside < 0, np.where(on_bed, count, -1), beside).tolist()
+    for pin in np.argsort(off, kind="stable").tolist():
+        flooded[pin] = True
+        for other in neighbours[pin]:
+            if other < 0 or (other < count and not flooded[other]):
+                continue
+            one, two = root(pin), root(other)
+            if one == two:
+                continue
+            if lowest[one] < lowest[two]:
+                one, two = two, one
+            # The shallower of two hollows ends here, at the lowest way out of it.
+            if height[pin] - lowest[one] > DEEP * height[pin]:
+                holes.append(bottom[one])
+            hollow[one] = two
+    return holes
+
+
+def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
+    """Take pins off, the lowest first."""
+    count, ways = beside.shape
+    simple, ends = (_SIMPLE[ways], _ENDS[ways])
+    neighbours, height = beside.tolist(), top.tolist()
+    left = [True] * count + [False]  # the last one stands for no pin, number -1
+    for pin in holes:
+        left[pin] = False
+    waiting = [True] * count
+    heap = [(height[pin], pin) for pin in range(count) if left[pin]]
+    heapq.heapify(heap)
+    while heap:
+        _, pin = heapq.heappop(heap)
+        waiting[pin] = False
+        if not left[pin]:
+            continue
+        around = neighbours[pin]
+        code = 0
+        for bit, other in enumerate(around):
+            if left[other]:
+                code |= 1 << bit
+        if not simple[code]:
+            continue
+        high = ends[code] and height[pin] >= END * max(height[other] for other in around if left[other])
+        if high and (ends[code] == 1 or _goes_on(neighbours, left, around, code)):
+            continue
+        left[pin] = False
+        for other in around:
+            if left[other] and not waiting[other]:
+                waiting[other] = True
+                heapq.heappush(heap, (height[other], other))
+    return np.flatnonzero(left[:count])
+
+
+def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
+    """Tell whether a line two pins wide goes on from a pin with two neighbours: all beyond them lies ahead.
+
+    Beside a line, what is beyond them lies along it.
+    """
+    ways = len(around)
+    steps = _STEPS[ways]
+    two = [bit for bit in range(ways) if code >> bit & 1]
+    ahead = [0.5 * (steps[two[0]][axis] + steps[two[1]][axis]) for axis in (0, 1)]
+    near = ahead[0] ** 2 + ahead[1] ** 2
+    for bit in two:
+        for turn, other in enumerate(neighbours[around[bit]]):
+            step = [steps[bit][axis] + steps[turn][axis] for axis in (0, 1)]
+            beyond = abs(step[0]) + abs(step[1]) > 1e-9 and not any(other == around[k] for k in two)
+            if beyond and left[other] and step[0] * ahead[0] + step[1] * ahead[1] < AHEAD * near:
+                return False
+    return True
+
+
+def _is_simple(code: int, ways: int) -> bool:
+    """Tell whether what is left stays joined as it is without a pin whose neighbours have these bits."""
+    there = [bool(code >> bit & 1) for bit in range(ways)]
+    if ways == 6:
+        return sum(there[k] and not there[k - 1] for k in range(ways)) == 1
+    # Squares: what is left is joined across corners, what is gone is not.
+    gone = [not one for one in there]
+    crossings = (gone[k] and not (gone[k + 1] and gone[(k + 2) % 8]) for k in range(0, 8, 2))
+    return sum(crossings) == 1
+
+
+_SIMPLE = {ways: [_is_simple(code, ways) for code in range(1 << ways)] for ways in (6, 8)}
+#: How many neighbours the end of a line has with these bits, one or two side by side; 0 where it is no end.
+_ENDS = {
+    ways: [
+        code.bit_count() if code.bit_count() < 3 and _is_simple(code, ways) else 0
+        for code in range(1 << ways)
+    ]
+    for ways in (6, 8)
+}
+_STEPS = {
+    6: [(math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0)) for k in range(6)],
+    8: [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -1.0), (1.0, -1.0)],
+}

@@ -1,0 +1,234 @@
+"""What a person would call a ridge, a mound, a ring, a crossing: shapes with known answers.
+
+With DIGICLAY_PICTURES=DIR pictures of all shapes, with the lines that are found, are written there.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.features import Feature, Finding, find
+from digiclay.core.formed import Formed
+from digiclay.core.layout import Layout, grid
+from digiclay.core.sheet import stretched
+
+#: Pitch in mm; three of a kind that no ridge here fits to.
+BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))
+#: A crest is as long as the line its shape was drawn along, to this share.
+LENGTH = 0.05
+Heights = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def round_top(away: np.ndarray, half: float) -> np.ndarray:
+    """A parabola 1 high, as wide as `half` to either side."""
+    return np.clip(1.0 - (away / half) ** 2, 0.0, None)
+
+
+def line(*points: tuple[float, float]) -> Heights:
+    """How far it is to a line of straight pieces."""
+
+    def away(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        found = np.full(np.shape(x), np.inf)
+        for (ax, ay), (bx, by) in itertools.pairwise(points):
+            dx, dy = bx - ax, by - ay
+            t = np.clip(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0)
+            found = np.minimum(found, np.hypot(x - ax - t * dx, y - ay - t * dy))
+        return found
+
+    return away
+
+
+def arc(x: float, y: float, radius: float, start: float, end: float) -> Heights:
+    """How far it is to an arc; angles in half turns."""
+    turn = np.pi * np.linspace(start, end, 40)
+    points = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+    return line(*map(tuple, points))
+
+
+def ridges(height: float, half: float, *lines: Heights) -> Heights:
+    """Round ridges along lines."""
+    return lambda x, y: height * round_top(np.min([one(x, y) for one in lines], axis=0), half)
+
+
+def disc(x: np.ndarray, y: np.ndarray, at: float, half: float) -> np.ndarray:
+    """A round mound 1 high about a point of the x axis."""
+    return round_top(np.hypot(x - at, y), half)
+
+
+def circle(at: float, radius: float) -> Heights:
+    """How far it is to a circle about a point of the x axis."""
+    return lambda x, y: np.abs(np.hypot(x - at, y) - radius)
+
+
+def lemniscate() -> np.ndarray:
+    """An eight whose line crosses itself."""
+    t = np.linspace(0.0, 2.0 * np.pi, 100)
+    across = 34.0 * np.cos(t) / (1.0 + np.sin(t) ** 2)
+    return np.column_stack([across, 1.6 * across * np.sin(t)])
+
+
+EIGHT = lemniscate()
+SLANTED = line((-25, -6), (25, 8)), line((-4, -25), (4, 25))
+ON_RIDGE = line((-30, 0), (30, 0))
+#: Shapes: heights in mm over x and y in mm, and what is to be found: kind, form, lengths of crests in plan.
+Known = list[tuple[str, str, list[float]]]
+SHAPES: dict[str, tuple[Heights, Known]] = {
+    "ridge": (ridges(12, 7, line((-18, -10), (20, 9))), [("boss", "ridge", [42.5])]),
+    "cross": (
+        ridges(12, 7, line((-25, 0), (25, 0)), line((0, -25), (0, 25))), [("boss", "2 ridges", [50, 50])],
+    ),
+    "slanted cross": (ridges(12, 7, *SLANTED), [("boss", "2 ridges", [51.9, 50.6])]),
+    "valleys that cross": (ridges(-9, 7, *SLANTED), [("crease", "2 valleys", [51.9, 50.6])]),
+    "X": (
+        ridges(12, 6, line((-25, -12), (25, 12)), line((-25, 12), (25, -12))),
+        [("boss", "2 ridges", [55.5, 55.5])],
+    ),
+    "ring": (ridges(10, 6, circle(0, 20)), [("boss", "ring", [125.7])]),
+    "eight of two circles": (ridges(10, 6, circle(-19, 19), circle(19, 19)), [("boss", "ring", [238.8])]),
+    "eight": (
+        ridges(10, 6, line(*map(tuple, EIGHT))),
+        [("boss", "ring", [float(np.hypot(*np.diff(EIGHT, axis=0).T).sum())])],
+    ),
+    "L": (ridges(12, 7, line((-20, 20), (-20, -18), (18, -18))), [("boss", "ridge", [76])]),
+    "T": (
+        ridges(12, 7, line((-25, 15), (25, 15)), line((0, 15), (0, -22))), [("boss", "2 ridges", [50, 37])],
+    ),
+    "S": (
+        ridges(10, 6, arc(0, 14, 14, 0.1, 1.5), arc(0, -14, 14, -0.9, 0.5)), [("boss", "ridge", [123.2])],
+    ),
+    "H": (
+        ridges(10, 6, line((-14, -25), (-14, 25)), line((14, -25), (14, 25)), line((-14, 0), (14, 0))),
+        [("boss", "3 ridges", [50, 50, 28])],
+    ),
+    "crater": (
+        lambda x, y: 10 * round_top(np.hypot(x, y) - 16, 7) - 6 * round_top(np.hypot(x, y), 10),
+        [("boss", "ring", [100.5]), ("crease", "hollow", [])],
+    ),
+    "crater above ground": (
+        lambda x, y: np.maximum(10 * round_top(np.hypot(x, y) - 16, 7), 4.0 * (np.hypot(x, y) < 16)),
+        [("boss", "ring", [100.5])],
+    ),
+    "plateau": (lambda x, y: 8.0 * ((np.abs(x) < 15) & (np.abs(y) < 13)), [("boss", "plateau", [])]),
+    "dome": (lambda x, y: 12 * disc(x, y, 1, 14), [("boss", "mound", [])]),
+    "two domes": (
+        lambda x, y: 12 * np.maximum(disc(x, y, -9.5, 11), disc(x, y, 9.5, 11)), [("boss", "mound", [])] * 2,
+    ),
+    "ridge to the edge": (ridges(12, 7, line((-80, -6), (10, 9))), [("boss", "ridge", [52.7])]),
+    "ridge with a mound at its end": (
+        lambda x, y: np.maximum(ridges(12, 7, line((-24, 0), (20, 0)))(x, y), 24 * disc(x, y, 20, 9)),
+        [("boss", "mound", []), ("boss", "ridge", [44])],
+    ),
+    "two mounds on a ridge": (
+        lambda x, y: np.maximum(
+            ridges(10, 7, ON_RIDGE)(x, y), 22 * np.maximum(disc(x, y, -14, 9), disc(x, y, 14, 9))
+        ),
+        [("boss", "mound", [])] * 2 + [("boss", "ridge", [60])],
+    ),
+    "sloping ridge": (
+        lambda x, y: round_top(line((-20, 0), (20, 0))(x, y), 7) * (9 + 0.2 * x), [("boss", "ridge", [40])],
+    ),
+    "noise": (lambda x, y: np.random.default_rng(1).normal(0.0, 0.14, np.shape(x)), []),
+    "noisy cross": (
+        lambda x, y: ridges(12, 7, *SLANTED)(x, y) + np.random.default_rng(2).normal(0.0, 0.2, np.shape(x)),
+        [("boss", "2 ridges", [51.9, 50.6])],
+    ),
+}  # fmt: skip
+
+
+def formed(name: str, arrangement: str, pitch: float) -> Formed:
+    """A bed of 84 mm x 84 mm."""
+    spacing = pitch * (np.sqrt(0.75) if arrangement == "hexagonal" else 1.0)
+    layout = Layout(int(84 / spacing) + 1, int(84 / pitch) + 1, pitch * 1e-3, arrangement)
+    place = grid(layout).positions
+    return Formed.of(place, 0.04 + 1e-3 * SHAPES[name][0](*(place.T * 1e3)), 0.04, 0.0, 0)
+
+
+def in_plan(crest: np.ndarray) -> float:
+    """Length of a crest seen from above, mm."""
+    return float(np.hypot(*np.diff(crest[:, :2], axis=0).T).sum()) * 1e3
+
+
+@pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_is_found_as_what_it_is(name: str, arrangement: str, pitch: float) -> None:
+    bed = formed(name, arrangement, pitch)
+    found = find(stretched(bed, "bilinear", 1, 1e-3))
+    draw(name, arrangement, pitch, bed, found)
+    wanted = SHAPES[name][1]
+    assert sorted((one.kind, one.form) for one in found) == sorted((kind, form) for kind, form, _ in wanted)
+    for kind, form, lengths in wanted:
+        if lengths:
+            (one,) = [one for one in found if (one.kind, one.form) == (kind, form)]
+            # The crest of a ridge that runs to the edge ends at the outermost pins, up to a pitch inside it.
+            slack = pitch if name == "ridge to the edge" else 0.0
+            measured = [in_plan(crest) for crest in one.crests]
+            assert measured == [pytest.approx(length, abs=LENGTH * length + slack) for length in lengths]
+
+
+@pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
+def test_the_crests_of_a_cross_keep_to_its_lines(arrangement: str, pitch: float) -> None:
+    (boss,) = find(stretched(formed("slanted cross", arrangement, pitch), "bilinear", 1, 1e-3))
+    for crest in boss.crests:
+        x, y = crest[:, :2].T * 1e3
+        assert min(one(x, y).max() for one in SLANTED) < 0.5 * pitch
+    assert np.argmin([one(*(boss.crests[0][0, :2] * 1e3)) for one in SLANTED]) == 0  # the longer one first
+
+
+@pytest.mark.parametrize("name", ["ridge with a mound at its end", "two mounds on a ridge", "two domes"])
+@pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
+def test_the_parts_of_a_boss_share_its_pins_area_and_volume(
+    name: str, arrangement: str, pitch: float
+) -> None:
+    bed = formed(name, arrangement, pitch)
+    parts = find(stretched(bed, "bilinear", 1, 1e-3))
+    whole = np.flatnonzero(bed.raised > Finding().threshold)
+    np.testing.assert_array_equal(np.sort(np.concatenate([one.pins for one in parts])), whole)
+    # Without what divides them: saddles and mounds as deep as nothing here is.
+    place = np.concatenate([one.region.place[one.region.faces] for one in parts])
+    assert sum(one.area for one in parts) == pytest.approx(area(place), rel=1e-9)
+    (undivided,) = find(stretched(bed, "bilinear", 1, 1e-3), Finding(smallest=len(whole) // 2 + 1))
+    # The smaller parts have too few pins then.
+    assert sum(one.area for one in parts) == pytest.approx(undivided.area, rel=1e-9)
+    assert sum(one.volume for one in parts) == pytest.approx(undivided.volume, rel=1e-9)
+
+
+def area(corners: np.ndarray) -> float:
+    """Area in plan of triangles (f, 3, 3), m²."""
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return float(np.abs(ax * by - ay * bx).sum() / 2.0)
+
+
+def test_a_mound_on_a_ridge_is_as_high_as_it_is_and_the_ridge_no_higher_than_its_foot() -> None:
+    found = find(stretched(formed("ridge with a mound at its end", "aligned", 3.0), "bilinear", 1, 1e-3))
+    height = {one.form: one.extreme * 1e3 for one in found}
+    assert height["mound"] == pytest.approx(24.0, abs=1.0)  # between the pins
+    assert height["ridge"] < 16.0
+    (crest,) = next(one.crests for one in found if one.form == "ridge")
+    assert np.ptp(crest[:, 2]) < 1e-3  # it goes on under the mound, level
+
+
+def draw(name: str, arrangement: str, pitch: float, bed: Formed, found: list[Feature]) -> None:
+    """Write a picture of a shape, if asked for."""
+    folder = os.environ.get("DIGICLAY_PICTURES")
+    if not folder:
+        return
+    from digiclay.plots.figure import empty, save
+
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    with empty(4.0, 4.4) as figure:
+        axes = figure.add_axes((0.0, 0.0, 1.0, 0.9))
+        x, y = bed.position.T * 1e3
+        axes.tricontourf(x, y, bed.raised * 1e3, levels=20, cmap="Greys_r")
+        for number, one in enumerate(found):
+            axes.plot(*(bed.position[one.pins].T * 1e3), ".", color=f"C{number}", markersize=2)
+            for crest in one.crests:
+                axes.plot(*(crest[:, :2].T * 1e3), color=f"C{number + 1}")
+        axes.set(aspect="equal")
+        axes.set_axis_off()
+        axes.set_title(f"{name}\n" + ", ".join(one.form for one in found), fontsize=9)
+        save(figure, Path(folder) / f"{name} {arrangement} {pitch}.png".replace(" ", "_"))
