@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from digiclay.cli import main
 
@@ -32,21 +34,54 @@ def claims(text: str) -> list[list[str]]:
 
 
 def test_every_file_the_page_names_is_there_and_nothing_else(folder: Path, text: str) -> None:
-    named = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
-    assert len(named) >= 6
+    named = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(named) >= 16
     assert sorted(path.name for path in folder.iterdir()) == sorted([*named, "paper.md", "metrics.json"])
 
 
-def test_every_picture_is_a_png_of_some_size(folder: Path) -> None:
-    small = [
-        p.name for p in folder.glob("*.png") if p.read_bytes()[:4] != b"\x89PNG" or p.stat().st_size < 2e4
-    ]
-    assert small == []
+def test_every_picture_is_a_vector_file_with_lettered_panels(folder: Path) -> None:
+    for path in folder.glob("*.svg"):
+        content = path.read_text(encoding="utf-8")
+        assert content.startswith("<?xml")
+        # Letters are outlines, and what they say is a comment beside each.
+        letters = re.findall(r"<!-- \(([a-z])\)", content)
+        assert sorted(letters) == [chr(ord("a") + number) for number in range(len(letters))] != []
+
+
+def test_every_figure_has_its_data_beside_it(folder: Path) -> None:
+    for path in folder.glob("*.svg"):
+        with path.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert len(rows) >= 8  # two curves of two points in each of two panels
+        # Two panels have names for one axis.
+        named = {"in the surface"}
+        numbers = [row[name] for row in rows for name in ("x", "y") if row[name] not in named]
+        assert np.isfinite(np.array(numbers, dtype=float)).all()
+        assert [row for row in rows if "panel" in row and not row["x_axis"]] == []
+
+
+def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path) -> None:
+    with (folder / "fig10_surfaces.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
+    for method in ("virtual_master", "cell_states"):
+        heights = [float(row["height (mm)"]) for row in rows if row["method"] == method]
+        # Six digits are written.
+        assert max(heights) == pytest.approx(1e3 * known[method]["highest"], rel=1e-5)
+        assert len(heights) == 625
+
+
+def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_rim(folder: Path) -> None:
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["sections"]
+    assert [name for name, one in known["virtual_master"].items() if not one["meets"]] == []
+    mound = known["cell_states"]["along ridge and mound"]
+    assert not mound["meets"]
+    assert mound["rim"] > 3e-3  # 4.5 mm, of a mound 25 mm high
 
 
 def test_every_claim_says_what_the_paper_says_what_was_measured_and_how_it_came_out(text: str) -> None:
     rows = claims(text)
-    assert len(rows) == 10
+    assert len(rows) == 16
     assert [row for row in rows if len(row) != 4 or not all(row[:3])] == []
 
 

@@ -17,9 +17,10 @@ from digiclay.paper.claim import Claim, verdict
 from digiclay.paper.claims import carried_out
 from digiclay.paper.claims_following import tracking
 from digiclay.paper.claims_force import onset, trade
-from digiclay.paper.figures_session import heights_and_force
+from digiclay.paper.figures_session import details, heights_and_force
 from digiclay.paper.page import page
-from digiclay.paper.trials import SESSION, WAYS, Results, Session, Swing, sessions
+from digiclay.paper.results import SESSION, WAYS, Results, Session, Swing
+from digiclay.paper.trials import sessions
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
@@ -27,7 +28,7 @@ GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 def results(*swings: Swing, **bad: Follows) -> Results:
     """Return results that follow everything but what is bad, by method."""
     simple = {(method, name): bad.get(method, GOOD) for method in scenes.METHODS for name in WAYS}
-    session = Session(resolve({}), {}, {}, [], 0.0)
+    session = Session(resolve({}), {}, {}, {}, [], 0.0)
     return Results(simple=simple, swings=list(swings), printed={scenes.METHODS[0]: session})
 
 
@@ -150,9 +151,10 @@ def test_the_page_explains_the_modes_of_the_virtual_spring() -> None:
 
 
 def test_a_claim_is_a_row_of_the_page_with_its_verdict() -> None:
-    text = page(results(), [Claim("said", "one; two", "differs", "because")], {"a.png": "caption"}, 1.0, "0")
+    text = page(results(), [Claim("said", "one; two", "differs", "because")], {"a": "caption"}, 1.0, "0")
     assert "| said | one;<br>two | **differs** | because |" in text
-    assert "![caption](a.png)" in text
+    assert "![caption](a.svg)" in text
+    assert "[Data](a.csv)" in text
 
 
 #: A lift of 10 mm/s at its fastest: Method I follows it, Method II's cells rise at 8.7 mm/s at the most.
@@ -202,3 +204,22 @@ def test_a_session_is_drawn_with_the_same_cells_and_scales_for_both_methods(lost
     one, two = (axes for axes in figure.axes if axes.get_label().endswith("heights"))
     assert len(one.get_lines()) == len(two.get_lines()) > 0
     assert one.get_ylim() == two.get_ylim()
+
+
+def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_period(lost: Results) -> None:
+    figure = details(lost, "title")
+    press, lift = figure.axes[:2]
+    session = lost.printed["virtual_master"]
+    time, height = session.detail["time"], session.detail["height"]
+    # The finger presses the middle of the bed, x = 0; the next cells are a pitch apart.
+    assert [line.get_label() for line in press.get_lines()] == [f"x = {x} mm" for x in (0, 3, 6, 9, 12)]
+    shown = press.get_lines()[0]
+    within = (time >= 0.5 - 1e-9) & (time <= 1.5 + 1e-9)
+    np.testing.assert_array_equal(shown.get_xdata(), time[within])
+    np.testing.assert_array_equal(shown.get_ydata(), 1e3 * height[within, 84])
+    assert np.diff(shown.get_xdata()).max() == pytest.approx(5e-3, rel=1e-9)
+    # The lift's own course, of millimetres, is left out: what remains is in micrometres.
+    rising = (time >= 2.4 - 1e-9) & (time <= 3.4 + 1e-9)
+    assert np.ptp(height[rising, 84]) > 2e-3
+    assert np.abs(lift.get_lines()[0].get_ydata()).max() < 100.0
+    assert len(figure.axes) == 4

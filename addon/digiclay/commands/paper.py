@@ -18,10 +18,11 @@ __all__ = ["add"]
 
 EXAMPLES = """\
 examples:
-  digiclay paper                           into ./paper, in a minute or two
+  digiclay paper                           into ./paper, in one to three minutes
   digiclay paper --out results --overwrite
 
-The folder holds paper.md (start there), the figures, and metrics.json with every number.
+The folder holds paper.md (start there), the figures as SVG with their data as CSV beside them, and
+metrics.json with every number.
 """
 
 
@@ -40,7 +41,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Simulate, draw, write, and tell how the claims came out."""
     may_be_written(arguments.out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
-    from ..paper.trials import FULL, QUICK
+    from ..paper.results import FULL, QUICK
     from ..paper.work import produce
 
     with (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from .results import Results
 from .scenes import METHODS, NAMES
-from .trials import Results
 
 __all__ = ["MM", "ONE", "SHORT", "TWO", "Claim", "speed", "times", "verdict"]
 

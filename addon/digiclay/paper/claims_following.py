@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..core.metrics_speed import Criterion, Follows
 from . import scenes
 from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict
+from .results import PAPER_SPEED, WAYS, Results
 from .scenes import METHODS
-from .trials import PAPER_SPEED, WAYS, Results
 
 __all__ = ["largest_speed", "tracking"]
 

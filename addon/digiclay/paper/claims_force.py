@@ -6,8 +6,8 @@ import math
 
 from . import scenes
 from .claim import MM, ONE, SHORT, TWO, Claim, times, verdict
+from .results import PAPER_SPEED, Results, Swing, onset_among
 from .scenes import METHODS, PRESSED
-from .trials import PAPER_SPEED, Results, Swing, onset_among
 
 __all__ = ["deviations", "onset", "reference_force", "trade"]
 
@@ -44,11 +44,13 @@ def deviations(results: Results) -> Claim:
     known = results.session[TWO]
     control = known.scene.control
     each = getattr(control, "force_setpoint", 0.0)
+    level = [f"{one.rfd:.3f} N {name}" for (method, name), one in results.simple.items() if method == TWO]
     why = (
         f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {known.followers:.1f} cells follow it on "
         f"average. Its set point, {each:g} N times the cells that follow at the moment, is "
         f"{_newton(known.metrics['set_point'])} on average and changes as the finger passes from cell to "
-        "cell: the total force varies with it, and deviates less from it than it varies."
+        "cell. A cell that is to rise needs a force below its set point, so the force falls short while the "
+        "finger lifts: in level drags the RFD is " + ", ".join(level) + "."
     )
     return Claim(
         "Method II's deviations of height and force are much greater",

@@ -9,8 +9,8 @@ import numpy as np
 from ..core.metrics_trial import Trial
 from ..core.modes import Mode
 from ..plots.figure import INK, LINES, MM, canvas, legend_above
+from .results import Results
 from .scenes import METHODS, NAMES
-from .trials import Results
 
 __all__ = ["blisters", "freezing"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..plots.figure import INK, LINES, MM, canvas, legend_above
+from .results import PAPER_SPEED, SUSTAINED, Results
 from .scenes import METHODS, NAMES, PRESSED
-from .trials import PAPER_SPEED, SUSTAINED, Results
 
 __all__ = ["oscillation", "tracking"]
 
@@ -96,6 +96,7 @@ def tracking(results: Results) -> Any:
             axes.axhline(limit * factor, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
             axes.axvline(PAPER_SPEED * MM, color=INK, linewidth=1.0, linestyle=(0, (1, 2)))
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
+            axes.set_title(label.split(" (")[0])
         first = panels[0][-1]
         first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
         first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="criterion")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from ..core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
 from ..core.modes import MEANINGS, Mode
 from .claim import Claim
-from .trials import Results
+from .results import Results
 
 __all__ = ["page"]
 
@@ -29,7 +29,7 @@ def page(results: Results, found: list[Claim], pictures: Mapping[str, str], took
     results : Results
     found : list of Claim
     pictures : mapping
-        File name to caption.
+        Name of the files, without an ending, to caption.
     took : float
         Time of all simulations, s.
     version : str
@@ -60,8 +60,8 @@ def _lines(
         yield f"| {claim.printed} | {measured} | **{claim.verdict}** | {claim.why} |"
     yield "\n## Figures\n"
     for name, caption in pictures.items():
-        yield f"![{caption}]({name})\n"
-        yield f"*{caption}*\n"
+        yield f"![{caption}]({name}.svg)\n"
+        yield f"*{caption}.* [Data]({name}.csv)\n"
     yield "Fig. 7, pins, forces and modes in motion, is the view in Blender.\n"
     yield "## Fig. 3: Method I, the virtual master\n"
     yield "| Stage | What it does |"

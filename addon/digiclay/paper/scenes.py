@@ -15,7 +15,7 @@ from ..core.scene import Path, Scene
 from ..core.scene_table import resolve
 
 __all__ = [
-    "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "blister", "fastest_lift",
+    "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "at_rest", "blister", "fastest_lift",
     "free_speed", "held", "slowed", "unintended",
 ]  # fmt: skip
 
@@ -47,15 +47,18 @@ def blister(method: str, height: float, profile: str) -> Scene:
     return _with_path(resolve(table), points)
 
 
-def held(gain: float, position_gain: float, device: Device | None = None) -> tuple[Scene, float]:
-    """Return a scene of Method I that shapes, is pressed quickly by `PRESSED` and held; and when, s.
+def held(
+    gain: float, position_gain: float, device: Device | None = None, method: str = "virtual_master"
+) -> tuple[Scene, float]:
+    """Return a scene that shapes, is pressed quickly by `PRESSED` and held; and when, s.
 
     Parameters
     ----------
     gain, position_gain : float
-        K_f, 1/N, and K_p, 1/m.
+        K_f of Method I or K_FF of Method II, 1/N, and K_p, 1/m.
     device : mapping, optional
         Sections of the scene that are not the default ones, such as `QUICKER`.
+    method : str, optional
     """
     size = PRESSED
     quick = 2.2 + size / QUICKLY
@@ -64,8 +67,23 @@ def held(gain: float, position_gain: float, device: Device | None = None) -> tup
         (quick + 2.4, -3.5e-3 - size),
     ]  # fmt: skip
     gains = {"force_gain": gain, "position_gain": position_gain}
-    table = _table("virtual_master", 13, gains, {}) | dict(device or {})
+    table = _table(method, 13, gains, {}) | dict(device or {})
     return _with_path(resolve(table), points), quick
+
+
+def at_rest(noise: float, radius: float | None = None) -> Scene:
+    """Return a scene of Method I that presses and holds still, with noisy force sensors.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of a cell's force sensor, N.
+    radius : float, optional
+        r_VM, m.
+    """
+    known = {} if radius is None else {"radius": radius}
+    table = _table("virtual_master", 13, known, {}) | {"sensors": {"force_noise": noise}}
+    return _with_path(resolve(table), [(0.0, 2e-3), (1.2, -4e-3), (3.2, -4e-3)])
 
 
 def _table(

@@ -10,14 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..core.export import write_whole
 from ..plots.figure import save
-from . import figures_blister, figures_limits, figures_session
+from . import figures_blister, figures_limits, figures_session, figures_variants
 from .claims import claims
 from .page import page
+from .panel import curves, letter, table
+from .relief import LIMITS, sections
+from .results import Extent, Results
 from .scenes import METHODS
-from .trials import Extent, Results, Told, simulate
+from .trials import Told, simulate
 
 __all__ = ["produce"]
+
+#: The figure whose data are heights of pins, and no curves.
+SURFACES = "fig10_surfaces"
 
 
 def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
@@ -34,7 +41,14 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
     drawn = {}
     for name, (caption, draw) in _pictures(results).items():
         told(f"drawing {name}")
-        save(draw(), folder / name)
+        picture = draw()
+        if name == SURFACES:
+            rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
+        else:
+            letter(picture)
+            rows = table(curves(picture))
+        save(picture, folder / f"{name}.svg")
+        write_whole(folder / f"{name}.csv", rows.encode())
         drawn[name] = caption
     found = claims(results)
     (folder / "paper.md").write_text(page(results, found, drawn, took, __version__), encoding="utf-8")
@@ -48,15 +62,15 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
     slow = f", {results.slow:g} times as long" if results.slow > 1.0 else ""
     title = f"The paper's session{slow}"
     pictures: dict[str, tuple[str, Callable[[], Any]]] = {
-        "fig04_blisters.png": (
+        "fig04_blisters": (
             "Fig. 4: blisters in section, convex and concave, both profiles and both methods",
             lambda: figures_blister.blisters(results),
         ),
-        "fig06_freezing.png": (
+        "fig06_freezing": (
             "Fig. 6: sections along a drag at several times, with the frozen cells",
             lambda: figures_blister.freezing(results),
         ),
-        "fig08_session.png": (
+        "fig08_session": (
             f"Fig. 8: heights of selected cells and total force over time{slow}",
             lambda: figures_session.heights_and_force(results.session, title),
         ),
@@ -69,17 +83,29 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
             ),
         )
     return pictures | {
-        "fig09_oscillation.png": (
-            "Fig. 9: oscillation of the virtual master, and where it sets in",
-            lambda: figures_limits.oscillation(results),
+        "fig09_details": (
+            "Fig. 9: a detail of the session's heights: the first press, and what swings in the lift",
+            lambda: figures_session.details(results, "Details of the heights in the paper's session"),
         ),
-        "fig10_surfaces.png": (
+        SURFACES: (
             f"Fig. 10: final surfaces{slow}",
             lambda: figures_session.surfaces(results.session, f"Final surfaces. {title}"),
         ),
-        "tracking.png": (
+        "fig10_sections": (
+            f"Sections through the surfaces of Fig. 10, formed and asked for{slow}",
+            lambda: figures_session.profiles(results.session, f"Sections. {title}"),
+        ),
+        "oscillation": (
+            "Oscillation of the virtual master, and where it sets in",
+            lambda: figures_limits.oscillation(results),
+        ),
+        "tracking": (
             "How fast a finger is followed: RFD and lag against speed",
             lambda: figures_limits.tracking(results),
+        ),
+        "variants": (
+            "What the rise, the search radius and Method II's gain do",
+            lambda: figures_variants.variants(results),
         ),
     }
 
@@ -100,6 +126,26 @@ def _numbers(results: Results) -> dict[str, Any]:
         },
         "oscillation": [one._asdict() for one in results.swings],
         "oscillation_of_a_quicker_device": [one._asdict() for one in results.quicker],
+        "oscillation_of_method_two": [one._asdict() for one in results.cell_swings],
+        "variants": {
+            ", ".join(key): {**one._asdict(), "follows": _finite(asdict(one.follows))}
+            for key, one in results.dragged.items()
+        },
+        "located": [one._asdict() for one in results.located],
+        "sections": {
+            method: {
+                one.name: {
+                    "rms": one.rms,
+                    "largest": one.largest,
+                    "rim": one.rim,
+                    "relief": one.relief,
+                    "level": one.level,
+                    "meets": one.meets(LIMITS),
+                }
+                for one in sections(results.session[method])
+            }
+            for method in METHODS
+        },
     }
 
 

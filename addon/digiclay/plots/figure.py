@@ -1,4 +1,4 @@
-"""What all plots share: an empty figure in one style, its colours, its legend, and a PNG written whole.
+"""What all plots share: an empty figure in one style, its colours, its legend, a picture written whole.
 
 matplotlib is imported where it is used, and drawn with its Agg canvas only: no window, no
 global state. Colours are Okabe and Ito's palette and cividis, told apart by people with
@@ -71,8 +71,18 @@ def legend_above(axes: Axes, columns: int = 6) -> None:
 
 
 def save(figure: Figure, out: str | Path) -> Path:
-    """Write a figure as a PNG, whole or not at all, and return its path; OutputError when it cannot."""
+    """Write a figure, whole or not at all, and return its path; OutputError when it cannot.
+
+    As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else as
+    a PNG. What an artist marks as rasterized is pixels in an SVG.
+    """
     content, path = io.BytesIO(), Path(out)
-    figure.savefig(content, format="png", metadata={"Software": "digiclay"})
+    if path.suffix == ".svg":
+        from matplotlib import rc_context
+
+        with rc_context({"svg.fonttype": "path", "svg.hashsalt": "digiclay"}):
+            figure.savefig(content, format="svg", metadata={"Creator": "digiclay", "Date": None})
+    else:
+        figure.savefig(content, format="png", metadata={"Software": "digiclay"})
     write_whole(path, content.getvalue())
     return path

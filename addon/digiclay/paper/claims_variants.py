@@ -1,0 +1,167 @@
+"""Claims that take a run with one thing changed: no rise, other gains, noise, another bed or profile."""
+
+from __future__ import annotations
+
+from .claim import MM, ONE, SHORT, TWO, Claim, verdict
+from .claims_force import MUCH
+from .results import AHEAD, AS_IT_IS, PAPER_SPEED, Dragged, Results, onset_among
+from .scenes import PRESSED
+from .variants import GAUSSIAN, NO_RISE, STAGGERED
+
+__all__ = ["ahead", "escape", "gaussian", "radius", "rise", "staggered"]
+
+#: Cells ahead count as lowered by this share of how far the finger is in the surface.
+LOWERED = 0.1
+#: A search radius rejects noise that leaves at most this share of the scatter there is without it.
+REJECTED = 0.5
+
+
+def rise(results: Results) -> Claim:
+    """Whether Method II's forces come from the slight rise of its blister."""
+    told, holds = [], []
+    for variant, method, name in results.dragged:
+        if variant != NO_RISE:
+            continue
+        less, more = results.dragged[variant, method, name], results.dragged[AS_IT_IS, method, name]
+        told.append(
+            f"{name}: {more.force:.2f} N with the rise and {less.force:.2f} N without, "
+            f"{more.followers:.1f} and {less.followers:.1f} cells follow, "
+            f"RFD {more.follows.rfd:.3f} and {less.follows.rfd:.3f} N{_lost(less)}"
+        )
+        holds += [more.force > MUCH * less.force, more.follows.rfd > MUCH * less.follows.rfd]
+    return Claim(
+        "The slight rise of Method II's blister causes its greater forces",
+        f"Drags at {PAPER_SPEED * MM:g} mm/s: " + "; ".join(told),
+        verdict(holds),
+        f"It holds where both the force and the RFD are {MUCH:g} times as great with the rise. The rise has "
+        "cells around the finger feel it, and each that follows asks for its own force; without it fewer "
+        "cells follow, and along a ridge too few to keep the finger.",
+    )
+
+
+def ahead(results: Results) -> Claim:
+    """Whether Method I lowers cells before the finger is over them."""
+    told, holds = [], []
+    for variant, method, name in results.dragged:
+        one = results.dragged[variant, method, name]
+        if variant != AS_IT_IS or name not in DEPTH or one.ahead is None:
+            continue
+        told.append(f"{SHORT[method]}, {name}: {one.ahead * MM:+.2f} mm")
+        if method == ONE:
+            holds.append(-one.ahead > LOWERED * DEPTH[name])
+    near, far = (f"{one * MM:g}" for one in AHEAD)
+    return Claim(
+        "Method I lowers the cells ahead of a finger in the surface",
+        f"Mean height over the bed at rest, {near} to {far} mm ahead of the finger, of cells that do not "
+        "feel it: " + "; ".join(told),
+        verdict(holds or [False]),
+        f"It holds where they are lowered by {LOWERED:.0%} of the finger's depth or more. {SHORT[TWO]} is "
+        "there for comparison: its blister stands higher by the rise.",
+    )
+
+
+#: How far the finger is in the surface, m.
+DEPTH = {"in the surface": 4.5e-3, "a valley": 10e-3}
+
+
+def escape(results: Results) -> Claim:
+    """Whether Method II stays clear of the oscillation of Method I."""
+    row = sorted(results.cell_swings, key=lambda one: one.gain)
+    calm, first = onset_among(row)
+    own = getattr(results.printed[TWO].scene.control, "force_gain", 0.0)
+    told = [
+        f"K_FF = {one.gain:g} 1/N: {one.amplitude:.3f} N"
+        + (f" at {one.frequency:.0f} Hz" if one.sustained and one.frequency else "")
+        for one in row
+    ]
+    used = results.printed[ONE].scene.control
+    wild = results.onset(getattr(used, "position_gain", 0.0))[1]
+    why = f"Its own gain is {own:g} 1/N. "
+    if first is not None:
+        why += (
+            f"A cycle that goes on sets in {'' if calm is None else f'above {calm:g}, '}at {first:g} 1/N, "
+            f"{first / own:.1f} times that; each cell has a valve and a dead time of its own. "
+        )
+    if wild is not None:
+        gain = getattr(used, "force_gain", 1.0)
+        why += f"Method I's sets in at {wild / gain:.1f} times its own K_f."
+    return Claim(
+        "Method II, without a virtual master, escapes the oscillation",
+        f"Amplitude of the force in the last second of a hold after a quick press of {PRESSED * MM:g} mm: "
+        + "; ".join(told),
+        verdict([not one.sustained for one in row]),
+        why.strip(),
+    )
+
+
+def radius(results: Results) -> Claim:
+    """Whether looking for the finger only near the master rejects what noisy sensors add elsewhere."""
+    told, holds, lost = [], [], []
+    least = min((one.radius for one in results.located), default=0.0)
+    for near in (one for one in results.located if one.radius == least):
+        same = near.noise, near.thresholds
+        (wide,) = (
+            one for one in results.located if (one.noise, one.thresholds) == same and one.radius != least
+        )
+        called = "thresholds by the noise" if near.thresholds else "no such thresholds"
+        told.append(
+            f"{near.noise * MM:g} mN, {called}: {_scatter(near.scatter)} with and {_scatter(wide.scatter)} "
+            "without the radius"
+        )
+        known = near.scatter is not None and wide.scatter is not None
+        holds.append(known and (near.scatter or 0.0) <= REJECTED * (wide.scatter or 0.0))
+        if near.losses or wide.losses:
+            lost.append(f"{near.noise * MM:g} mN, {called}: {near.losses} and {wide.losses} times")
+    return Claim(
+        "A search radius around the virtual master rejects noise",
+        f"How far Method I's master wanders under a finger held still (rms), r_VM {least * MM:g} mm, by "
+        "noise of the force sensors: " + "; ".join(told),
+        verdict(holds or [False]),
+        f"It holds where the radius leaves {REJECTED:.0%} at most of what there is without it. Without it "
+        "all cells the fingertip may touch are looked at. Where readings below five standard deviations "
+        "count as none, as they do in this program, few are left outside the radius for it to reject. "
+        + (f"The finger was lost with and without the radius: {', '.join(lost)}." if lost else ""),
+    )
+
+
+def _scatter(value: float | None) -> str:
+    return "never shapes" if value is None else f"{value * MM:.3f} mm"
+
+
+def staggered(results: Results) -> Claim:
+    """Whether both methods work on a staggered bed."""
+    return _varied(results, STAGGERED, "Both methods work on a staggered bed", "staggered")
+
+
+def gaussian(results: Results) -> Claim:
+    """Whether both methods drag a Gaussian blister."""
+    return _varied(results, GAUSSIAN, "Both methods drag a Gaussian blister as they do a cone", "Gaussian")
+
+
+def _varied(results: Results, variant: str, printed: str, called: str) -> Claim:
+    """Set the drags of a variant beside those of the scene as it is."""
+    told, holds, worse = [], [], []
+    for which, method, name in results.dragged:
+        if which != variant:
+            continue
+        one, other = results.dragged[which, method, name], results.dragged[AS_IT_IS, method, name]
+        told.append(f"{SHORT[method]}, {name}: {_beside(other)}, {called} {_beside(one)}")
+        if other.follows.meets(results.criterion):
+            holds.append(one.follows.meets(results.criterion))
+            worse += [] if holds[-1] else [f"{SHORT[method]}, {name}"]
+    return Claim(
+        printed,
+        f"Drags at {PAPER_SPEED * MM:g} mm/s, lag and RFD: " + "; ".join(told),
+        verdict(holds or [False]),
+        "It holds where what is followed without the change is followed with it. "
+        + (f"Not so: {'; '.join(worse)}." if worse else ""),
+    )
+
+
+def _beside(one: Dragged) -> str:
+    return f"{one.follows.lag * MM:.1f} mm, {one.follows.rfd:.3f} N{_lost(one)}"
+
+
+def _lost(one: Dragged) -> str:
+    lost = one.follows.losses
+    return f" (finger lost {lost} time{'' if lost == 1 else 's'})" if lost else ""
