@@ -9,9 +9,11 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core.fingertip import Fingertip
 from digiclay.device import view
 from digiclay.device.roles import BALL, ROLE
 from digiclay.live import running, tick
+from digiclay.recorded import bake
 
 from tests.blender.at_hand import added, beds, done, housings, looked, redone, select, undone, whole
 from tests.blender.session.live import Clock, press, started
@@ -19,8 +21,20 @@ from tests.blender.session.live import Clock, press, started
 pytestmark = pytest.mark.usefixtures("watched")
 
 
-def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(tmp_path: Path) -> None:
+def still(bed: Any) -> bake.Moments:
+    """Return a bake of two frames in which nothing moves."""
+    cells = bridge.read_cells(bed.data)
+    twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
+    return bake.Moments(cells["position"], **twice, pose=np.array([bridge.pose(view.fingertip_of(bed))] * 2))
+
+
+@pytest.mark.parametrize("baked", [False, True])
+def test_a_bed_that_is_appended_comes_with_its_fingertip_and_nothing_else(
+    tmp_path: Path, baked: bool
+) -> None:
     bed = added()
+    if baked:
+        bake.apply(bed, still(bed), 1, Fingertip(), keyframe_finger=False)
     at = bridge.pose(view.fingertip_of(bed))
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
