@@ -31,7 +31,8 @@ LEVELS = (
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods export run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
-    "mesh_in_gltf mesh_in_threemf finger_range feature_lattice pins_solid skin_membrane metrics series_folder "
+    "mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane metrics "
+    "series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "feature_line "
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",

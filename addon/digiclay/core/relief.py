@@ -34,11 +34,14 @@ class Tops(NamedTuple):
     covered : ndarray (n,) of bool
     overhang : ndarray (n,) of bool
         Pins over which another part of the shape lies below the top: it cannot be displayed.
+    filled : int
+        Pins under small holes, whose values are taken from around.
     """
 
     value: Floats
     covered: Flags
     overhang: Flags
+    filled: int = 0
 
 
 class Relief(Protocol):

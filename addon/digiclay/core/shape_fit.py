@@ -38,6 +38,8 @@ class Fitted:
         Cells over which more of the shape lies below its top surface; only the top is displayed.
     too_low, too_high : int
         Cells clipped at the bed's floor, at the end of the stroke.
+    filled : int
+        Cells under small holes of the shape, whose heights are taken from around.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Fitted:
     overhanging: int
     too_low: int
     too_high: int
+    filled: int = 0
 
     def told(self) -> str:
         """Return all that in one line."""
@@ -65,6 +68,8 @@ class Fitted:
             parts.append("no cell clipped")
         if self.overhanging:
             parts.append(f"overhangs under the top at {_cells(self.overhanging)}")
+        if self.filled:
+            parts.append(f"{_cells(self.filled)} under holes filled from around")
         return ", ".join(parts)
 
 
@@ -168,7 +173,8 @@ def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitt
     # Less than a nanometre beyond an end is rounding.
     low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
     within = np.clip(heights, 0.0, actuator.stroke)
-    counts = (int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high))
+    counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]
+    counts.append(tops.filled)
     return Fitted(name, within, *counts)
 
 

@@ -13,6 +13,7 @@ from .errors import ParameterError
 from .layout import ON_THE_SIDE, Grid
 from .relief import Placement, Tops
 from .shape import UPWARDS
+from .shape_holes import filled
 
 __all__ = ["ShapeMesh", "shape_mesh"]
 
@@ -25,6 +26,8 @@ CHUNK = 2_000_000
 #: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
 #: float32 or to six digits, which moves the rim by up to a micrometre, and no pin is placed as exactly.
 EDGE = 1e-3
+#: Faces of a mesh are known to be turned outwards if more than this share of the pins sees an upper side.
+UPPER = 0.8
 #: Two hits of a ray are one when they are closer than this share of the mesh's height.
 SAME = 1e-5
 
@@ -84,25 +87,35 @@ class ShapeMesh:
         """Return the highest hit of each pin's ray, and where the ray passes through more than one layer.
 
         A closed mesh is passed through once, from its top to its underside; an open one is hit once.
+        Small holes of an open one are filled from around.
         """
-        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), np.empty(0, np.bool_))]
-        cell, z, over = (np.concatenate([hit[part] for hit in hits]) for part in range(3))
+        none = np.empty(0, np.bool_)
+        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
+        cell, z, over, up = (np.concatenate([hit[part] for hit in hits]) for part in range(4))
         known = np.zeros(grid.count, np.bool_)
         known[cell[over]] = True
         used = over | ~known[cell]
-        cell, z = cell[used], z[used]
-        order = np.lexsort((z, cell))
-        cell, z = cell[order], z[order]
+        cell, z, up = cell[used], z[used], up[used]
+        order = np.lexsort((up, z, cell))
+        cell, z, up = cell[order], z[order], up[order]
         value, covered = np.zeros(grid.count), np.zeros(grid.count, np.bool_)
         last = np.append(cell[1:] != cell[:-1], True)[: cell.size]
         value[cell[last]], covered[cell[last]] = z[last], True
         same = SAME * float(np.ptp(self.used[:, 2]))
         new = np.append(True, (cell[1:] != cell[:-1]) | (np.diff(z) > same))[: cell.size]
         layers = np.bincount(cell[new], minlength=grid.count)
-        return Tops(value, covered, layers > (2 if self.closed else 1))
+        overhang = layers > (2 if self.closed else 1)
+        if self.closed:
+            return Tops(value, covered, overhang)
+        missing = ~covered
+        if np.count_nonzero(up[last]) > UPPER * np.count_nonzero(last):
+            # Seen from below: through a hole, on the inside of what lies under it.
+            missing[cell[last]] |= ~up[last]
+        value, hole = filled(grid, value, missing)
+        return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
-    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags]]:
-        """Give the cells whose rays hit a triangle or pass it closely, where, and whether they hit it."""
+    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
+        """Give cells whose rays hit or closely pass a triangle: where, if they hit it, and if from above."""
         plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
         corners, z = plan[self.faces], self.vertices[self.faces, 2]
         sides = corners[:, 1:] - corners[:, :1]
@@ -134,7 +147,8 @@ class ShapeMesh:
             near = np.hypot(dx - one * ax - two * bx, dy - one * ay - two * by) <= slack
             cell, over, face, one, two = cell[near], over[near], face[near], one[near], two[near]
             low = z[face, 0]
-            yield cell, low + one * (z[face, 1] - low) + two * (z[face, 2] - low), over
+            height = low + one * (z[face, 1] - low) + two * (z[face, 2] - low)
+            yield cell, height, over, area[face] > 0.0
 
 
 def _merged(vertices: Floats) -> Indices:
