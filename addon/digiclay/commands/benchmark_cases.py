@@ -60,6 +60,9 @@ SHALLOW = ((0.0, 0.0, 0.5e-3), (0.15, 0.0, -0.4e-3), (0.25, 1e-3, -0.4e-3), (0.4
 DEEP = ((0.0, 0.0, 1e-3), (0.12, 0.0, 1e-3), (0.16, 0.0, -15e-3), (0.3, 1e-3, -15e-3), (0.5, 3e-3, 3e-3))
 JUMP = ((0.0, 0.0, 48e-3), (0.1995, 0.0, 48e-3), (0.2, 0.0, -2e-3), (0.35, 0.0, -2e-3), (0.5, 3e-3, 3e-3))
 THROUGH = ((0.0, 0.0, 2e-3), (0.1995, 0.0, 2e-3), (0.2, 0.0, -60e-3), (0.35, 0.0, -60e-3), (0.5, 3e-3, 3e-3))
+#: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm; and when they begin and end, s.
+JUMPS = (0.0, 0.05, 0.051, 0.15, 0.155, 0.25, 0.27, 0.35, 0.4, 0.5)
+FROM_AFAR = (1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0)
 BIG_GAINS = {"position_gain": 5e6, "force_gain": 5e4}
 
 #: Beds, and a blister that fits on them.
@@ -71,6 +74,16 @@ ONE_PIN = {
     "layout": {"rows": 1, "columns": 1},
     "blister": {"radius": 1.4e-3, "edge_radius": 2e-3, "flat_radius": 1e-3},
 }
+
+
+def _jumping(across: float, up: float, *, away_first: bool) -> Case:
+    """Return a case whose finger jumps by so much, m, out of a press or into one."""
+    path = tuple(
+        (time, across * (far if away_first else 1.0 - far), up * (far if away_first else 1.0 - far) - 4e-3)
+        for time, far in zip(JUMPS, FROM_AFAR, strict=True)
+    )
+    return Case(path=path, why="jumps within a step, and e^(m x) = 3000", straight=True)
+
 
 CASES: dict[str, Case] = {
     EASY: Case(),
@@ -92,6 +105,10 @@ CASES: dict[str, Case] = {
     "finger through the bed": Case(
         path=THROUGH, why="e^(m x) = 1e52, within half a step of 1 ms", straight=True
     ),
+    "jumps sideways, in first": _jumping(0.1, 0.0, away_first=True),
+    "jumps sideways, out first": _jumping(0.1, 0.0, away_first=False),
+    "jumps down first": _jumping(0.0, 0.1, away_first=True),
+    "jumps up first": _jumping(0.0, 0.1, away_first=False),
     "openings of 1e-9": Case(
         {"control": {"position_gain": 1e-6, "force_gain": 1e-8}}, borrowed=True, factor=1e-8
     ),

@@ -15,6 +15,8 @@ from ..core.accuracy import SHARE, judging
 from ..core.assembly import assemble
 from ..core.control.replay import Replay
 from ..core.errors import DivergenceError
+from ..core.fingertip import forms, underside
+from ..core.physics import speeds
 from ..core.simulation import begin, periods
 from ..core.system import System
 from ..core.trajectory import Trajectory
@@ -33,6 +35,8 @@ STEPS = (1e-3, 5e-3, 20e-3, 50e-3)
 PERIOD = 5e-3
 #: Physics step of the reference, by Richardson extrapolation, s.
 FINE, ROUGH = 0.2e-3, 0.5e-3
+#: Steppers that hold every pin within what its valve and the finger can do, by construction.
+BOUNDED = ("bernoulli", "richardson", "adaptive")
 #: From this height error on, m, a run has to know by itself that it is wrong.
 WRONG = 1e-4
 
@@ -95,14 +99,29 @@ def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats,
         When an invariant breaks.
     """
     rows, heights, commands, most = system.rows, [], [], 0.0
-    for state in periods(system, trajectory, begin(system), count):
+    state = begin(system)
+    before, bounded = state.row(0), system.stepper.name in BOUNDED
+    for state in periods(system, trajectory, state, count):
         height, force = state.row(0), state.row(rows.force)
         wrong = allowed_range(height, force, system.cell.actuator.stroke)
+        if bounded and not wrong and not _within_reach(system, trajectory, state.period - 1, before, height):
+            wrong = "a pin where none can be"
         assert not wrong, wrong
+        before = height
         heights.append(height)
         commands.append(state.row(rows.command))
         most = max(most, float(force.max()))
     return np.array(heights), np.array(commands), most
+
+
+def _within_reach(system: System, trajectory: Trajectory, period: int, before: Floats, after: Floats) -> bool:
+    """Tell whether heights, (n,), are within `Speeds.reach` of those a control period before."""
+    poses = trajectory.poses(period * system.period + system.instants)
+    places = system.grid.place(np.arange(system.grid.count))
+    under = underside(*forms(system.cell.touch.fingertip.outline(poses)), places)
+    lowest, highest = speeds(system.cell).reach(before, under, system.period)
+    # Rounding: these undersides are worked out from other products.
+    return bool((after >= lowest - 1e-12).all() and (after <= highest + 1e-12).all())
 
 
 def period_of(step: float) -> float:
