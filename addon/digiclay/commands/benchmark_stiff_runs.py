@@ -99,9 +99,9 @@ def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats,
         When an invariant breaks.
     """
     rows, heights, commands, most = system.rows, [], [], 0.0
-    state = begin(system)
-    before, bounded = state.row(0), system.stepper.name in BOUNDED
-    for state in periods(system, trajectory, state, count):
+    start = begin(system)
+    before, bounded = start.row(0), system.stepper.name in BOUNDED
+    for state in periods(system, trajectory, start, count):
         height, force = state.row(0), state.row(rows.force)
         wrong = allowed_range(height, force, system.cell.actuator.stroke)
         if bounded and not wrong and not _within_reach(system, trajectory, state.period - 1, before, height):
