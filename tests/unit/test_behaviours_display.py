@@ -48,6 +48,18 @@ def test_a_move_waits_no_longer_than_its_patience() -> None:
     assert memory.move == 5
 
 
+def test_a_move_waits_as_long_as_its_patience() -> None:
+    behaviour = control(shape="pyramid", refresh="one_time", patience=0.0525)
+    place, full = grid(Layout(5, 5)).place(np.arange(25)), np.full(25, 40e-3)
+    stuck = Measurement(place, full, np.zeros(25), full, np.zeros(25, np.int8), np.zeros((0, 25)))
+    memory, moves = behaviour.begin(), []
+    for _ in range(25):
+        memory, _ = behaviour.command(memory, stuck)
+        moves.append(memory.move)
+    # The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.
+    assert np.flatnonzero(np.diff([0, *moves])).tolist() == [0, 11, 22]
+
+
 def test_heights_are_read_from_a_file(tmp_path: Path) -> None:
     heights = np.linspace(30e-3, 50e-3, 25).reshape(5, 5)
     np.save(tmp_path / "mine.npy", heights)
