@@ -151,7 +151,7 @@ def profiles(sessions: Mapping[str, Session], title: str) -> Any:
     with canvas(13.5, 8.6, title) as (figure, place):
         for number in range(count):
             row, column = divmod(number, 3)
-            axes = place(f"section {number}", 0.85 + 4.3 * column, 4.55 - 3.85 * row, 3.65, 2.7)
+            axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
             for method, colour, marker in zip(METHODS, LINES, "os", strict=False):
                 one = found[method][number]
                 name = NAMES[method].split(",")[0]

@@ -90,10 +90,12 @@ def _radius(axes: Any, results: Results) -> None:
             for one in sorted(results.located, key=lambda one: one.noise)
             if (one.thresholds, one.radius) == (known, radius) and one.scatter is not None
         ]
+        # With thresholds both lie upon each other: the smaller markers on top.
         near = f"$r_{{VM}}$ = {radius * MM:g} mm" if radius == least else "no radius"
         axes.plot(
             [one.noise * MM for one in row], [(one.scatter or 0.0) * MM for one in row],
             color=LINES[int(radius != least)], marker="os"[int(radius != least)],
+            markersize=5 if radius == least else 9, zorder=3 if radius == least else 2,
             linestyle="--" if known else "-", markerfacecolor="white" if known else None,
             label=near + (", thresholds" if known else ""),
         )  # fmt: skip
