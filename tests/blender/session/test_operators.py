@@ -47,6 +47,18 @@ def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
     assert not bpy.ops.digiclay.session_rewind.poll()
 
 
+def test_within_one_press_backspace_goes_back_gesture_by_gesture(bed: Any, clock: Clock) -> None:
+    bed.location = (30.0, -70.0, 10.0)  # there 32 bits put the finger a little beside
+    started(bed)
+    move(bed, clock, [(-6.0, z) for z in np.linspace(46, 38, 10)] + [(-6.0, 38.0)] * 20)
+    move(bed, clock, [(x, 38.0) for x in np.linspace(-6, 6, 10)])
+    for left in (1, 0):
+        assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
+        clock.tick(3)
+        assert len(running.of(bed).gestures) == left
+    assert (exact(bed) == 40e-3).all()
+
+
 @pytest.mark.parametrize("live", [True, False])
 def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock: Clock, live: bool) -> None:
     assert not bpy.ops.digiclay.session_reset.poll()
