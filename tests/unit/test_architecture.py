@@ -22,7 +22,7 @@ CORE = PACKAGE / "core"
 #: Modules of the core, level by level; a module imports from the levels above its own line only.
 LEVELS = (
     "feature_region feature_skeleton feature_branches "
-    "body npz toml_text spline errors modes png closed_form filled some "
+    "body npz toml_text picture_size spline errors modes png closed_form filled some "
     "control.travel metrics_signal set_point stack.columns processes safe_names",
     "feature_network "
     "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "

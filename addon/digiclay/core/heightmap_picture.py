@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ParameterError
+from .picture_size import told_size
 
 __all__ = ["MOST", "PICTURES", "READERS", "pixels", "refuse_too_many"]
 
@@ -23,6 +24,8 @@ Pixels = NDArray[np.generic]
 
 #: Pictures by extension.
 PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr")
+#: Pillow's names of those it reads here: by others a file with such an ending could have programs started.
+FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB")
 #: Those that Pillow cannot read.
 BLENDER_ONLY = (".exr", ".hdr")
 #: Pillow's names for pictures of one channel; all others are turned into brightness.
@@ -41,6 +44,7 @@ def pixels(path: Path) -> Pixels:
     ParameterError
         When it cannot be read, or is too large.
     """
+    _refuse_by_head(path)
     if READERS:
         return READERS[-1](path)
     if path.suffix.lower() in BLENDER_ONLY:
@@ -53,10 +57,11 @@ def pixels(path: Path) -> Pixels:
             "shape", "file", "must be a mesh or an array where Pillow is not installed", str(path),
             "Run 'pip install digiclay[images]'.",
         ) from None  # fmt: skip
+    image.init()  # formats that are named are not looked for
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", image.DecompressionBombWarning)
         try:
-            with image.open(path) as opened:
+            with image.open(path, formats=FORMATS) as opened:
                 refuse_too_many(path, *opened.size)
                 grey = opened if opened.mode in GREY else opened.convert("L")
                 return np.flipud(np.asarray(grey))
@@ -67,6 +72,16 @@ def pixels(path: Path) -> Pixels:
         except (ValueError, SyntaxError, EOFError) as error:
             said = " ".join(str(error).split())[:100]
     raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {said}")
+
+
+def _refuse_by_head(path: Path) -> None:
+    """Refuse a picture whose head says that it is too large, whoever reads it."""
+    try:
+        size = told_size(path)
+    except OSError:
+        return  # said by who reads it
+    if size:
+        refuse_too_many(path, *size)
 
 
 def refuse_too_many(path: Path, width: int, height: int) -> None:
