@@ -57,3 +57,8 @@ def test_a_high_reservoir_below_the_low_one_is_refused() -> None:
         ParameterError, match=r"^Supply\.high must be above Supply\.low \(got -60000 Pa, low -50000 Pa\)\.$"
     ):
         Supply(high=-0.6e5)
+
+
+def test_a_high_reservoir_as_low_as_the_low_one_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"^Supply\.high must be above Supply\.low \(got -50000 Pa"):
+        Supply(high=-0.5e5)
