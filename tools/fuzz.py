@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import copy
 import json
 import sys
 import warnings
@@ -59,7 +60,7 @@ def odd(chance: np.random.Generator, usual: Any) -> Any:
         return [odd(chance, one) for one in usual]
     if draw < 0.85:
         return NUMBERS[chance.integers(len(NUMBERS))]
-    return OTHERS[chance.integers(len(OTHERS))]
+    return copy.deepcopy(OTHERS[chance.integers(len(OTHERS))])  # lists among them are changed later
 
 
 def table(chance: np.random.Generator) -> dict[str, Any]:

@@ -147,3 +147,8 @@ def test_a_folder_is_gone_again_when_what_it_was_made_for_is_refused(here: Path)
         pass
     with pytest.raises(OutputError, match="cannot be used"), series(here / "file" / "o", KIND, {}):
         pass
+
+
+def test_a_small_file_that_an_editor_has_marked_as_utf_8_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text('{"name": "größe"}', encoding="utf-8-sig")
+    assert read_json(tmp_path / "a.json") == {"name": "größe"}

@@ -111,7 +111,7 @@ def _is_bare(path: Path, kind: Kind) -> bool:
 def read_json(path: Path) -> dict[str, Any] | None:
     """Return what a small file says; None where it cannot be read."""
     try:
-        read = json.loads(path.read_text(encoding="utf-8"))
+        read = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
         return None
     return read if isinstance(read, dict) else None

@@ -41,7 +41,7 @@ class Folder:
         found = {}
         for path in self.path.glob(f"{POINTS}/*.json"):
             try:
-                record = json.loads(path.read_text(encoding="utf-8"))
+                record = json.loads(path.read_text(encoding="utf-8-sig"))
             except (OSError, ValueError):
                 continue  # a file that cannot be read is a point to be done again
             if path.stem.isdecimal() and isinstance(record, dict) and record.keys() & {"figures", "error"}:
