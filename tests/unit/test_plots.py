@@ -14,6 +14,7 @@ from digiclay.core.layout import Layout, grid
 from digiclay.core.modes import Mode
 from digiclay.core.set_point import SetPoint
 from digiclay.plots import run as plots
+from digiclay.plots.relief import hidden
 
 from tests.patience import HANGS
 
@@ -155,6 +156,22 @@ def test_the_surface_is_to_scale():
     ratio = relief._box_aspect / extent
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)  # the same mm on all three axes
     assert axes(figure, "map").get_aspect() == 1.0
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "share"), [(5, 5, 0.0), (3, 25, 1.0), (25, 25, 0.02), (12, 14, -1.5)]
+)
+def test_no_text_on_the_relief_hides_another(rows, columns, share):
+    case = drag(rows, columns)
+    case["height"] = 0.04 + (case["height"] - 0.04) * share
+    relief = axes(plots.surface_figure(case), "relief")
+    assert hidden(relief) == []
+    # Nor does it leave its own half of the picture.
+    width = relief.figure.bbox.width
+    texts = [relief.xaxis.label, relief.yaxis.label, relief.zaxis.label]
+    assert all(
+        0.0 <= text.get_window_extent().x0 < text.get_window_extent().x1 < 0.6 * width for text in texts
+    )
 
 
 def test_the_colour_bar_spans_the_final_heights():

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.metrics import in_contact
 from ..core.surface import grid_shape, skin, solid
 from .figure import INK, LINES, MM, legend_above
+from .relief import fit_relief
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -83,15 +84,13 @@ def draw_relief(axes: Any, history: History) -> None:
     low, high = ends(top * MM, 1.0)
     level, light = bright[:, :, 2].mean(axis=1), bright[:, :, 3].mean(axis=1)
     colour = colormaps["cividis"]((level - low) / (high - low))[:, :3] * light[:, None]
-    for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], colour)):
-        axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
     limits = [(side.min(), side.max()) for side in vertices.T]
     axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)), zlabel="height (mm)")
-    axes.set_xlabel("x (mm)", labelpad=12)
-    axes.set_ylabel("y (mm)", labelpad=12)
-    axes.locator_params(nbins=5)
-    axes.set_box_aspect(np.ptp(vertices, axis=0), zoom=0.84)
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
     axes.view_init(elev=34, azim=-62)
+    fit_relief(axes, np.ptp(vertices, axis=0), limits)
+    for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], colour)):
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
 
 
 def _light(vertices: Floats, over: NDArray[np.int64]) -> Floats:
