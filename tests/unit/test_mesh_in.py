@@ -159,6 +159,7 @@ def test_a_byte_order_mark_changes_nothing(tmp_path: Path, kind: str) -> None:
          "9000000000 vertex without properties"),
         ("bad.ply", "ply\nproperty float x\nend_header\n", "'property float x' in its head"),
         ("many.off", "OFF\n9000000000 9 0\n0 0 0\n", "at most 20 million triangles"),
+        ("inside.stl", "solid a\nfacet normal 0 0 1\nouter loop\nendsolid a\n", "1 facets begin, 0 end"),
         ("few.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "3 of its 4 lines"),
     ],
 )  # fmt: skip
