@@ -11,6 +11,8 @@ from hypothesis import HealthCheck, Phase, settings
 
 # Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
 os.environ.setdefault("MPLBACKEND", "Agg")
+# pytest makes errors of warnings in its own process; in those that tests start, numpy's are errors by this.
+os.environ.setdefault("PYTHONWARNINGS", "error::RuntimeWarning")
 SETTINGS = tempfile.TemporaryDirectory(prefix="digiclay-blender-")
 if "PYTEST_XDIST_WORKER" in os.environ or "BLENDER_USER_RESOURCES" not in os.environ:
     os.environ["BLENDER_USER_RESOURCES"] = SETTINGS.name  # each worker its own: presets, extensions

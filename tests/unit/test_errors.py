@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from digiclay.core.contact import Contact
@@ -57,3 +60,12 @@ def test_the_closed_form_step_does_not_diverge_where_the_explicit_one_does() -> 
     rows = run_too_stiff("bernoulli").rows
     assert len(rows) == 201
     assert np.isfinite(rows).all()
+
+
+def test_a_warning_of_numpy_is_an_error_in_the_processes_that_tests_start() -> None:
+    code = "import numpy; numpy.exp(numpy.array([1000.0]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert "RuntimeWarning: overflow encountered in exp" in done.stderr
