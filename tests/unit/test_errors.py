@@ -11,6 +11,7 @@ from digiclay.core.contact import Contact
 from digiclay.core.errors import DigiclayError, DivergenceError, OutputError, ParameterError, SceneError
 
 from tests.assemble import Record, one_cell, path, record, scripted
+from tests.patience import HANGS
 
 
 def test_a_parameter_error_names_owner_field_rule_and_value() -> None:
@@ -65,7 +66,7 @@ def test_the_closed_form_step_does_not_diverge_where_the_explicit_one_does() -> 
 def test_a_warning_of_numpy_is_an_error_in_the_processes_that_tests_start() -> None:
     code = "import numpy; numpy.exp(numpy.array([1000.0]))"
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=HANGS, check=False
     )
     assert done.returncode == 1
     assert "RuntimeWarning: overflow encountered in exp" in done.stderr
