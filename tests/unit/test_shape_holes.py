@@ -106,6 +106,13 @@ def test_a_sheet_turned_inside_out_is_displayed_as_it_is() -> None:
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.02
 
 
+def test_a_sheet_whose_faces_are_turned_at_random_has_no_holes() -> None:
+    mixed = scan()
+    turned = np.random.default_rng(2).random(len(mixed.faces)) < 0.85
+    mixed.faces[turned] = mixed.faces[turned][:, ::-1]
+    assert shape(mixed).tops(grid(Layout(25, 25, 3e-3)), IN_PLACE).filled == 0
+
+
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_slope_goes_on_through_a_hole(arrangement: str) -> None:
     bed = grid(Layout(21, 21, 3e-3, arrangement))
