@@ -87,20 +87,6 @@ def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
     assert len(hand.move(session, [(5.0, 38.0)] * 30).gestures) == 2
 
 
-def test_a_marked_gesture_is_taken_back_to_where_it_began_though_the_finger_never_rested() -> None:
-    # A finger undo has put somewhere moves on at once: without the mark the gesture began there.
-    hand = Hand()
-    session = hand.press(started(), -6.0)
-    session = sculpting.restored(session, session.kept, session.pose)
-    session = hand.move(session, [(3.0, 46.0), (6.0, 46.0)])
-    session, gesture = sculpting.marked(session)
-    kept, at = session.kept, session.pose
-    session = sculpting.taken_back(hand.press(session, 9.0), gesture)
-    assert session.kept == kept
-    assert np.array_equal(session.pose, at)
-    assert at[0] == 6e-3
-
-
 @pytest.mark.parametrize("off", [0.0, 1e-6])
 def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_finger_moves(
     off: float,

@@ -17,7 +17,9 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 LIMIT = 1200
 
 
-def played(script: str, out: Path, size: tuple[int, int] = (1280, 800)) -> dict[str, Any]:
+def played(
+    script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False
+) -> dict[str, Any]:
     """Play a script of this folder in a Blender with a copy of the extension installed.
 
     Parameters
@@ -28,6 +30,8 @@ def played(script: str, out: Path, size: tuple[int, int] = (1280, 800)) -> dict[
         An empty folder for what is installed, seen and shot.
     size : (int, int)
         The window's, pixels: software GL draws a small one much quicker.
+    by_hand : bool
+        Events come from outside Blender, as a hand's do: Blender takes those or simulated ones, not both.
 
     Returns
     -------
@@ -38,7 +42,8 @@ def played(script: str, out: Path, size: tuple[int, int] = (1280, 800)) -> dict[
     shutil.copytree(ADDON, installed, ignore=shutil.ignore_patterns("__pycache__", ".*"))
     # `timeout` ends Blender with SIGTERM, so that a launcher can take its children along.
     command = ["timeout", "--kill-after=10", str(LIMIT), BLENDER]
-    command += ["--factory-startup", "--enable-event-simulate", "--python-exit-code", "3"]
+    command += ["--factory-startup", "--python-exit-code", "3"]
+    command += [] if by_hand else ["--enable-event-simulate"]
     command += ["--window-geometry", "0", "0", str(size[0]), str(size[1])]
     command += ["--python", str(HERE / "driver.py"), "--", str(out), str(HERE / script)]
     # A launcher that makes a screen for Blender makes it as large as the window.

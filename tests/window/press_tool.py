@@ -126,7 +126,7 @@ def depths(blender: Any) -> Iterator[float | None]:
     note(blender, "before the wheel")
     at = on_the_bed(blender, -20, -20)
     for _ in range(8):
-        blender.event("WHEELDOWNMOUSE", "PRESS", at)
+        blender.event("WHEELDOWNMOUSE", "PRESS", at, ctrl=True)
         yield 0.1
     yield from come(blender)
     note(blender, "after the wheel")

@@ -12,6 +12,7 @@ from ..compat import bpy
 from ..overlay import views
 from . import keys, loop, recovery, running, tick
 from .running import Running
+from .stroke_queue import drop_strokes
 
 __all__ = ["STOPPED", "abandoned", "end_all", "ended", "register", "unregister", "watch"]
 
@@ -25,7 +26,7 @@ STOPPED = "was stopped; the bed keeps its state"
 def take_up(*_: Any) -> None:
     """Have every session take up, two ticks later, what undo or redo has put into its bed."""
     for session in running.all():
-        running.put(replace(session, stale=STALE))
+        running.put(replace(drop_strokes(session), stale=STALE))
 
 
 @bpy.app.handlers.persistent

@@ -14,6 +14,7 @@ from ..core.shadow import LiveErrors, Shadow
 from ..core.state import State
 from ..core.system import System
 from ..core.trace import Trace
+from .stroke import Stroke
 
 __all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put", "said", "say"]
 
@@ -137,6 +138,13 @@ class Running:
     rested : float
         How long the finger has not moved, s of simulated time.
     recording : Recording or None
+    strokes : tuple of Stroke
+        What the Press tool has drawn and the finger has not finished, oldest first: the finger goes along
+        these, wherever the fingertip is.
+    stroke_start : Gesture or None
+        Where the first of them began.
+    drawn : int
+        How many strokes the finger has finished.
     """
 
     uid: int
@@ -159,6 +167,9 @@ class Running:
     coming: Gesture | None = None
     rested: float = 0.0
     recording: Recording | None = None
+    strokes: tuple[Stroke, ...] = ()
+    stroke_start: Gesture | None = None
+    drawn: int = 0
 
     @property
     def factor(self) -> float:

@@ -22,10 +22,11 @@ from ..core.trace import begun as trace_begun
 from ..core.trace import extended, felt, picked, row
 from ..device.instant import CLEARANCE
 from .running import Gesture, Recording, Running
+from .stroke_queue import drop_strokes, take_path
 
 __all__ = [
-    "adapted", "advanced", "begun", "marked", "recording", "reset", "restored", "rewound", "stepped",
-    "taken_back",
+    "adapted", "advanced", "begun", "recording", "reset", "restored", "rewound", "stepped",
+    "taken_back", "withdraw_stroke",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -121,11 +122,14 @@ def stepped(running: Running) -> Running:
 
 
 def followed(running: Running, pose: Floats, count: int) -> Running:
-    """Simulate control periods while the finger goes to a pose; the session is used up."""
+    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advanced`."""
     system, state, shadow = running.system, running.state, running.shadow
-    pose = reachable(pose, system.cell.actuator.stroke)
-    running = _about_to_touch(running, pose, count)
-    path = way(running.pose, pose, count)
+    if running.strokes:
+        running, path = take_path(running, count)
+    else:
+        pose = reachable(pose, system.cell.actuator.stroke)
+        running = _about_to_touch(running, pose, count)
+        path = way(running.pose, pose, count)
     rows, errors = [], running.errors
     started = time.perf_counter()
     # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
@@ -137,7 +141,7 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
                 errors, shadow = found or errors, cast_from(shadow, state)
             if state.period % running.trace.every == 0:
                 rows.append(row(system, state, running.scene.set_point, running.trace.pins))
-    clock = spent(running.clock, count, time.perf_counter() - started)
+    clock = spent(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
         running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, shadow=shadow,
         errors=errors, trace=extended(running.trace, rows),
@@ -203,16 +207,21 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
 
 def rewound(running: Running) -> Running:
     """Take back the last gesture: state and finger are where it began; nothing changes if there is none."""
+    if running.strokes:
+        return withdraw_stroke(running)
     if not running.gestures:
         return running
     *earlier, last = running.gestures
     return taken_back(replace(running, gestures=tuple(earlier)), last)
 
 
-def marked(running: Running) -> tuple[Running, Gesture]:
-    """Have a gesture begin now, as a tool knows that a fingertip left to itself does not tell."""
-    gesture = Gesture(running.state.period, running.kept, running.pose)
-    return replace(running, coming=gesture), gesture
+def withdraw_stroke(running: Running) -> Running:
+    """Take back the last stroke: state and finger are where it began, or it never begins."""
+    *earlier, last = running.strokes
+    if last.height is None:
+        return replace(running, strokes=tuple(earlier))
+    assert running.stroke_start is not None
+    return drop_strokes(taken_back(running, running.stroke_start))
 
 
 def taken_back(running: Running, gesture: Gesture) -> Running:
@@ -235,7 +244,7 @@ def reset(running: Running) -> Running:
     before = Gesture(-1, running.kept, running.pose)
     pose = running.pose.copy()
     pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restored(replace(running, gestures=()), None, pose, moment=-1)
+    back = restored(replace(drop_strokes(running), gestures=()), None, pose, moment=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
@@ -244,7 +253,14 @@ def adapted(running: Running, scene: Scene) -> tuple[Running, str]:
     if scene == running.scene:
         return running, ""
     other, said = begun(running.uid, running.name, scene, running.pose, running.kept, running.moment)
-    kept_on = {} if said else {"recording": None, "gestures": running.gestures}
+    kept_on = {"drawn": running.drawn}
+    if not said:
+        kept_on |= {
+            "recording": None,
+            "gestures": running.gestures,
+            "strokes": running.strokes,
+            "stroke_start": running.stroke_start,
+        }
     trace = picked(other.trace, running.trace.pins, other.system.grid.count)
     return replace(other, paused=running.paused, waits=running.waits, trace=trace, **kept_on), said
 

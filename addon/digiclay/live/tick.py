@@ -19,9 +19,10 @@ from ..recorded.bake import is_baked
 from ..settings import properties
 from . import bed_state, running, sculpting
 from .running import Floats, Running
+from .stroke_queue import drop_strokes
 from .waiting import found, obstacle
 
-__all__ = ["Note", "place", "show", "start", "stop", "tick"]
+__all__ = ["Note", "place", "show", "start", "stop", "tick", "withdraw_strokes"]
 
 #: Ticks from one look at the bed's settings to the next.
 LOOK = 8
@@ -85,6 +86,18 @@ def place(context: Any, bed: Any, session: Running) -> None:
         context.view_layer.update()
 
 
+def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
+    """Take back the last unfinished stroke of one session, or of each; tell whether there was one."""
+    busy = [session for session in running.all() if session.strokes and uid in (None, session.uid)]
+    for session in busy:
+        bed = found(session.uid, session.name)
+        if bed is not None:
+            back = sculpting.withdraw_stroke(session)
+            show(bed, back)
+            place(context, bed, back)
+    return bool(busy)
+
+
 def tick(context: Any, now: float) -> list[Note]:
     """Let every session go on up to now, by a clock that never goes back, s; return what there is to tell."""
     notes: list[Note] = []
@@ -125,9 +138,11 @@ def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> 
         )
     except DivergenceError as error:
         back = sculpting.restored(session, session.kept, session.pose)
-        later = replace(back, paused=True)
+        later = replace(drop_strokes(back), paused=True)
         notes.append(Note("ERROR", f"The session of {bed.name} is paused: {error}"))
     running.put(later)
+    if session.strokes:
+        place(context, bed, later)
     bed_state.write(bed, later, before)
     # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
     if before.stale or said or not np.array_equal(seen, _seen(later)):

@@ -1,17 +1,18 @@
-"""The Press tool's gesture: the fingertip goes under the mouse and presses as long as the button is held."""
+"""The Press tool's operator: what the hand draws while the button is held is queued for the session."""
 
 # No postponed annotations here: Blender reads an operator's properties from them.
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from .. import bridge, preferences
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device import view
-from ..live import running, sculpting, tick, waiting
+from ..live import running, tick
+from ..live.stroke import DEEPEST, deepen, draw
+from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..press import aim
-from ..press.gesture import DEEPEST, DONE, advanced, begun, deeper, dragged
 from . import status
 from .reasons import allowed
 
@@ -20,7 +21,9 @@ __all__ = ["Press"]
 #: Depth of a turn of the wheel, and of a pixel of Ctrl-drag at a UI scale of 1; m.
 WHEEL, PIXEL = 0.25e-3, 0.02e-3
 WHEELS = {"WHEELUPMOUSE": -WHEEL, "WHEELDOWNMOUSE": WHEEL}
-KEYS = "Depth {:.2f} mm  |  Wheel, or Ctrl and drag: depth  |  Esc or right click: take the gesture back"
+KEYS = (
+    "Depth {:.2f} mm  |  Ctrl and wheel, or Ctrl and drag: depth  |  Esc or right click: take the press back"
+)
 
 
 class Press(bpy.types.Operator):  # type: ignore[misc]
@@ -28,7 +31,8 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
-    bl_options = {"UNDO"}  # noqa: RUF012
+    # No undo step of its own: the session makes it when the finger has finished the stroke.
+    bl_options = {"INTERNAL"}  # noqa: RUF012
 
     depth: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Depth (mm)",
@@ -61,117 +65,109 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
             return {"PASS_THROUGH"}
         try:
             session = _session(context, found.bed)
-            tip = view.fingertip_of(found.bed)
-            at, finger = bridge.pose(tip), bridge.finger_of(tip)
         except (DigiclayError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
-        if session.stale:
-            self.report({"INFO"}, "The bed is just taking up what was undone: press again")
-            return {"CANCELLED"}
         if session.paused:
-            self.report({"WARNING"}, "The session is paused: the pins follow when it goes on")
-        place = float(found.point[0]), float(found.point[1])
-        self.uid, self.seen = session.uid, session.state.period
-        session, self.start = sculpting.marked(session)
-        running.put(session)
-        self.gesture = begun(found.grid, found.height, finger, at, place, 1e-3 * self.depth)
+            self.report({"WARNING"}, "The session is paused: the finger follows when it goes on")
+        # The hand draws on the surface it has seen when it began, not on pins that give way under it.
+        self.uid, self.grid, self.height = session.uid, found.grid, found.height.copy()
+        self.region, self.began, self.before = context.region, time.perf_counter(), event.mouse_y
+        self.full, self.pressure, self.ticked = 1e-3 * self.depth, 1.0, 0.0
         self._feel(event)
-        self.region, self.last, self.before = context.region, time.perf_counter(), event.mouse_y
-        rate = preferences.of(context).redraw_rate
-        self.timer = context.window_manager.event_timer_add(1.0 / rate, window=context.window)
+        place = float(found.point[0]), float(found.point[1])
+        session, self.number = queue_stroke(session, *place, self.full * self.pressure)
+        running.put(session)
         context.window_manager.modal_handler_add(self)
         self._tell(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Follow the mouse; timers go on to the session."""
+        """Draw the stroke on; whatever is not for it goes on to Blender, to turn the view for instance."""
         bed = _bed(self.uid)
-        tip = None if bed is None else view.fingertip_of(bed)
-        if tip is None or running.of(bed) is None:
-            self.report({"WARNING"}, "The gesture ended: its session, bed or fingertip is gone")
-            self._end(context)
-            return {"CANCELLED"}
-        if event.type == "TIMER":
-            return self._timed(context, bed, tip)
+        session = running.of(bed)
+        stroke = session and find_stroke(session, self.number)
+        if stroke is None:
+            if bed is None or session is None:
+                self.report({"WARNING"}, "The press ended: its session or bed is gone")
+            return self._end({"CANCELLED", "PASS_THROUGH"})
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
-            return self._taken_back(context, bed)
+            tick.withdraw_strokes(context, self.uid)
+            return self._end({"CANCELLED"})
         if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE"):
-            self._moved(context, bed, event)
-        elif event.type in WHEELS:
-            self.gesture = deeper(self.gesture, WHEELS[event.type])
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            self.gesture = replace(self.gesture, held=False)
+            self._move(context, bed, event)
+        elif event.type in WHEELS and event.ctrl:
+            self._deepen(WHEELS[event.type])
+        elif event.type == "LEFTMOUSE":
+            self._move(context, bed, event)
+            self._change(lambda stroke: replace(stroke, held=False))
+            self._keep_depth(context)
+            # A press while it is held: another operator has had the release. That one is another stroke.
+            again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
+            return self._end({"FINISHED"} | again)
+        else:
+            if event.type == "TIMER":
+                # Blender may hand a timer over before moves that were made earlier; not so the one before.
+                self._change(lambda stroke: replace(stroke, known=self.ticked))
+                self.ticked = self._time()
+            return {"PASS_THROUGH"}
         self._tell(context)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
         """Blender ends the operator, for instance to load a file."""
-        self._end(context)
+        self._change(lambda stroke: replace(stroke, held=False))
+        self._end(set())
 
-    def _moved(self, context: Any, bed: Any, event: Any) -> None:
-        """Follow the mouse over the surface as it was, or with Ctrl change the depth."""
-        if not self.gesture.held:
-            return
+    def _move(self, context: Any, bed: Any, event: Any) -> None:
+        """Draw on to the place under the mouse, or with Ctrl change the depth."""
         down, self.before = self.before - event.mouse_y, event.mouse_y
         self._feel(event)
-        if event.ctrl:
-            scale = context.preferences.system.ui_scale
-            self.gesture = deeper(self.gesture, PIXEL * down / scale)
+        if event.ctrl and event.type != "LEFTMOUSE":
+            self._deepen(PIXEL * down / context.preferences.system.ui_scale)
             return
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
-            point = aim.meets(bpy.context, bed, self.gesture.grid, self.gesture.height, xy)
-        if point is not None:
-            self.gesture = dragged(self.gesture, (float(point[0]), float(point[1])))
+            point = aim.meets(bpy.context, bed, self.grid, self.height, xy)
+        if point is not None and event.value != "PRESS":
+            x, y = float(point[0]), float(point[1])
+            self._change(partial(draw, time=self._time(), x=x, y=y, depth=self.full * self.pressure))
+
+    def _deepen(self, by: float) -> None:
+        """Press deeper, m, from here on."""
+        self.full = min(max(self.full + by, 0.0), DEEPEST)
+        self._change(partial(deepen, time=self._time(), by=by * self.pressure))
+
+    def _change(self, change: Any) -> None:
+        """Put a changed stroke into the session's queue."""
+        session = running.of(_bed(self.uid))
+        if session is not None:
+            running.put(change_stroke(session, self.number, change))
+
+    def _time(self) -> float:
+        """Return the time since the mouse went down, s."""
+        return time.perf_counter() - self.began
 
     def _feel(self, event: Any) -> None:
         """Take a pen's pressure."""
-        if self.use_pressure and event.is_tablet and self.gesture.held:
-            self.gesture = replace(self.gesture, pressure=min(max(float(event.pressure), 0.0), 1.0))
-
-    def _timed(self, context: Any, bed: Any, tip: Any) -> set[str]:
-        """Let the finger go on, and hand the timer on to the session."""
-        now, session = time.perf_counter(), running.of(bed)
-        still = session.paused or bool(session.waits)
-        simulated = (session.state.period - self.seen) * session.system.period
-        seconds = now - self.last if still else max(0.0, simulated)
-        self.gesture = advanced(self.gesture, seconds, None if still else session.pose)
-        self.last, self.seen = now, session.state.period
-        bridge.place_fingertip(tip, self.gesture.at, self.gesture.finger)
-        if self.gesture.phase != DONE:
-            return {"PASS_THROUGH"}
-        self._keep_depth(context)
-        self._end(context)
-        return {"FINISHED"}
-
-    def _taken_back(self, context: Any, bed: Any) -> set[str]:
-        """Bring bed and fingertip back to where the gesture began; a session that waits, the finger alone."""
-        self._end(context)
-        session = running.of(bed)
-        if waiting.obstacle(context, bed, session.system.grid.count):
-            bridge.place_fingertip(view.fingertip_of(bed), self.start.pose, self.gesture.finger)
-            return {"CANCELLED"}
-        back = sculpting.taken_back(session, self.start)
-        tick.show(bed, back)
-        tick.place(context, bed, back)
-        return {"CANCELLED"}
+        if self.use_pressure and event.is_tablet:
+            self.pressure = min(max(float(event.pressure), 0.0), 1.0)
 
     def _keep_depth(self, context: Any) -> None:
-        """Let the next gesture start with the depth this one ended with."""
-        self.depth = 1e3 * self.gesture.depth
+        """Let the next press start with the depth this one ended with; the tool's header shows it."""
+        self.depth = 1e3 * self.full
         tool = context.workspace.tools.from_space_view3d_mode("OBJECT")
         if tool is not None and tool.idname == "digiclay.press_tool":
             tool.operator_properties(self.bl_idname).depth = self.depth
 
     def _tell(self, context: Any) -> None:
         """Show depth and keys in the status bar."""
-        status.tell(context, KEYS.format(1e3 * self.gesture.depth * self.gesture.pressure))
+        status.tell(context, KEYS.format(1e3 * self.full * self.pressure))
 
-    def _end(self, context: Any) -> None:
-        """Give back timer and status bar."""
-        context.window_manager.event_timer_remove(self.timer)
+    def _end(self, result: set[str]) -> set[str]:
+        """Give back the status bar."""
         status.clear()
+        return result
 
 
 def _bed(uid: int) -> Any | None:

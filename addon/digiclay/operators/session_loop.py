@@ -36,13 +36,17 @@ class Looping:
         """Tick with the timer; leave every other event to whoever it is for."""
         if self.token != loop.token():
             return {"CANCELLED"}
+        if _undoes(context, event) and tick.withdraw_strokes(context):
+            return {"RUNNING_MODAL"}
         if event.type == "ESC" and event.value == "PRESS" and not self.newer & _others(context):
-            handlers.end_all(handlers.STOPPED)
-            return {"FINISHED"}
+            return {"FINISHED"} if _stop(context) else {"RUNNING_MODAL"}
         now = time.perf_counter()
         if event.type != "TIMER" or not loop.due(context, now):
             return {"PASS_THROUGH"}
+        drawn = _drawn()
         self.tell(tick.tick(context, now))
+        if _drawn() > drawn:
+            bpy.ops.ed.undo_push(message="Press")
         loop.drawn(context, now)
         if not running.all():
             handlers.end_all(handlers.STOPPED)
@@ -100,8 +104,37 @@ class Escape(bpy.types.Operator):  # type: ignore[misc]
 
     def execute(self, context: Any) -> set[str]:
         """Stop them, as Esc does at any other time."""
-        handlers.end_all(handlers.STOPPED)
+        _stop(context)
         return {"FINISHED"}
+
+
+def _drawn() -> int:
+    """Return how many strokes the fingers of all sessions have finished."""
+    return sum(session.drawn for session in running.all())
+
+
+def _stop(context: Any) -> bool:
+    """Take back unfinished strokes; without any, end all sessions, and return that they ended."""
+    if tick.withdraw_strokes(context):
+        return False
+    handlers.end_all(handlers.STOPPED)
+    return True
+
+
+def _undoes(context: Any, event: Any) -> bool:
+    """Tell whether an event is the user's key for Undo while a stroke is unfinished: it has no step yet."""
+    if event.value != "PRESS" or not any(session.strokes for session in running.all()):
+        return False
+    keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
+    items = keymap.keymap_items if keymap else ()
+    return any(item.idname == "ed.undo" and item.active and _struck(item, event) for item in items)
+
+
+def _struck(item: Any, event: Any) -> bool:
+    """Tell whether an event is the key of a keymap's item, with the keys held that it wants."""
+    return item.type == event.type and all(
+        bool(getattr(item, held)) == getattr(event, held) for held in ("ctrl", "shift", "alt", "oskey")
+    )
 
 
 def _saves(context: Any) -> bool:

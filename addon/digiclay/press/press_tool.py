@@ -8,9 +8,11 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
+from ..core.fingertip import Fingertip
 from ..core.layout import Grid
 from ..core.pointing import patch
 from ..device import view
+from ..live import running
 from ..overlay.picture import Line
 from . import aim
 
@@ -54,12 +56,28 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         return
     depth = 1e-3 * tool.operator_properties("digiclay.press").depth
     rim = outline(found.bed, found.grid, found.height, found.point, depth)
-    points = aim.on_screen(context, found.bed, np.concatenate([rim, rim[:1]]))
-    points += (region.x, region.y)
-    if not np.isfinite(points).all():
-        return
+    drawn = [np.concatenate([rim, rim[:1]]), *_trail(found)]
+    corner = np.array([region.x, region.y])
+    lines = [corner + aim.on_screen(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
-    cursor([Line(points, DARK, 4.0 * width), Line(points, LIGHT, 2.0 * width)])
+    shown = [points for points in lines if np.isfinite(points).all()]
+    cursor([Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown])
+
+
+def _trail(found: aim.Target) -> list[Floats]:
+    """Return what the finger has still to go along, and its rim where it is now, on the pins; or nothing."""
+    session = running.of(found.bed)
+    if session is None or not session.strokes:
+        return []
+    finger, pose = session.scene.fingertip or Fingertip(), session.pose
+    rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
+    places = [stroke.ahead for stroke in session.strokes]
+    ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], places[0]]), *places[1:]]
+    return [
+        np.column_stack([way, found.height[found.grid.at(way[:, 0], way[:, 1])]])
+        for way in ways
+        if len(way) > 1
+    ]
 
 
 class PressTool(bpy.types.WorkSpaceTool):  # type: ignore[misc]
@@ -71,7 +89,7 @@ class PressTool(bpy.types.WorkSpaceTool):  # type: ignore[misc]
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; the wheel, or Ctrl and drag, sets how deep; a pen presses by itself"
+        "Drag to sculpt; Ctrl and the wheel, or Ctrl and drag, set how deep; a pen presses by itself"
     )
     bl_icon = "ops.transform.push_pull"
     bl_keymap = (

@@ -1,0 +1,70 @@
+"""The strokes of a session that its finger has not finished: queued, drawn on, taken in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.fingertip import Fingertip
+from .running import Gesture, Running
+from .stroke import Stroke, follow, start
+
+__all__ = ["change_stroke", "drop_strokes", "find_stroke", "queue_stroke", "take_path"]
+
+Floats = NDArray[np.float64]
+
+
+def queue_stroke(running: Running, x: float, y: float, depth: float) -> tuple[Running, int]:
+    """Queue the stroke of a mouse that goes down at a place, m; return its number as well."""
+    number = 1 + (running.strokes[-1].number if running.strokes else running.drawn)
+    return replace(running, strokes=(*running.strokes, start(number, x, y, depth))), number
+
+
+def find_stroke(running: Running, number: int) -> Stroke | None:
+    """Return the stroke of a number, or None when it is finished or was taken back."""
+    return next((stroke for stroke in running.strokes if stroke.number == number), None)
+
+
+def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
+    """Return the session with one of its strokes changed, if it still has it."""
+    strokes = tuple(change(one) if one.number == number else one for one in running.strokes)
+    return replace(running, strokes=strokes)
+
+
+def drop_strokes(running: Running) -> Running:
+    """Return the session without what the finger has not finished; it stays where it is."""
+    return replace(running, strokes=(), stroke_start=None)
+
+
+def take_path(running: Running, count: int) -> tuple[Running, Floats]:
+    """Take from the first stroke where the finger goes in the next control periods.
+
+    Parameters
+    ----------
+    running : Running
+        With a stroke at least.
+    count : int
+        Most control periods.
+
+    Returns
+    -------
+    running : Running
+        Without the stroke when that ends here. Where it began is where a gesture began.
+    path : ndarray (k + 1, 7)
+        Poses between the periods, k at most `count`.
+    """
+    system, first = running.system, running.strokes[0]
+    if first.height is None:
+        begun = Gesture(running.state.period, running.kept, running.pose)
+        running = replace(running, coming=begun, stroke_start=begun)
+    finger = running.scene.fingertip or Fingertip()
+    height = running.state.row(0)
+    stroke, path = follow(first, system.grid, height, finger, running.pose, count, system.period)
+    left = (stroke, *running.strokes[1:])
+    running = replace(running, strokes=left)
+    if stroke.done:
+        running = replace(running, strokes=left[1:], stroke_start=None, drawn=running.drawn + 1)
+    return running, path

@@ -1,0 +1,155 @@
+"""A stroke of the Press tool: its finger comes from above, goes along the whole path, and leaves upwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from digiclay.core.fingertip import LEVEL, Fingertip
+from digiclay.core.layout import Layout, grid
+from digiclay.live.stroke import (
+    APPROACH,
+    DEEPEST,
+    DRAG,
+    SPEED,
+    Stroke,
+    deepen,
+    draw,
+    follow,
+    start,
+)
+from numpy.typing import NDArray
+
+CELLS = grid(Layout(rows=20, columns=20))
+PERIOD = 5e-3
+#: A level bed with one pin that stands out, m.
+HEIGHT = np.full(CELLS.count, 0.040)
+HEIGHT[0] = 0.055
+AT = np.array([0.0, 0.0, 0.046, *LEVEL])
+
+
+def line(duration: float, end: float = 0.02, moves: int = 20, held: bool = False) -> Stroke:
+    """Return a stroke drawn evenly along x from (0, 5) mm on, 4 mm deep."""
+    stroke = start(1, 0.0, 0.005, 4e-3)
+    for part in np.arange(1, moves + 1) / moves:
+        stroke = draw(stroke, part * duration, part * end, 0.005, 4e-3)
+    return replace(stroke, held=held, known=duration)
+
+
+def path(
+    stroke: Stroke, at: NDArray[np.float64] = AT, chunk: int = 10_000
+) -> tuple[Stroke, NDArray[np.float64]]:
+    """Let the finger go on for 20 s at most, a chunk of periods at a time."""
+    poses = [at]
+    while not stroke.done and len(poses) < 4000:
+        stroke, part = follow(stroke, CELLS, HEIGHT, Fingertip(), poses[-1], min(chunk, 4000), PERIOD)
+        poses += list(part[1:])
+    return stroke, np.array(poses)
+
+
+def pressed(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the poses at full depth."""
+    return poses[np.abs(poses[:, 2] - 0.036) < 1e-9]
+
+
+@pytest.mark.parametrize("duration", [0.01, 0.3, 3.0])
+def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(duration: float) -> None:
+    stroke, poses = path(line(duration))
+    assert stroke.done
+    down = pressed(poses)
+    assert (down[0, 0], down[-1, 0]) == pytest.approx((0.0, 0.02), abs=1e-12)
+    # No column is skipped: a control period is DRAG times its length at the most.
+    assert np.diff(down[:, 0]).max() <= DRAG * PERIOD + 1e-12
+
+
+def test_it_makes_no_difference_how_many_periods_are_asked_for_at_a_time() -> None:
+    np.testing.assert_array_equal(path(line(0.3))[1], path(line(0.3), chunk=7)[1])
+
+
+def test_the_finger_crosses_the_bed_above_all_pins() -> None:
+    _, poses = path(line(0.3), np.array([-0.02, -0.02, 0.030, *LEVEL]))
+    for before, after in pairwise(poses):
+        sideways = np.hypot(*(after - before)[:2]) > 0.0
+        assert not sideways or before[2] > 0.055 or abs(before[2] - 0.036) < 1e-9
+
+
+def test_the_finger_presses_to_its_depth_before_it_drags_and_no_faster_than_a_finger() -> None:
+    _, poses = path(line(0.3))
+    first = int(np.argmax(poses[:, 2] <= 0.036 + 1e-9))
+    assert poses[first, 0] == 0.0
+    falls = -np.diff(poses[: first + 1, 2])
+    assert falls.max() <= APPROACH * PERIOD + 1e-12
+    assert falls[poses[1 : first + 1, 2] < 0.040 - 1e-9].max() <= SPEED * PERIOD + 1e-12
+
+
+def test_the_finger_keeps_the_hands_times_where_it_can() -> None:
+    _, poses = path(line(2.0, moves=100))
+    moved = np.diff(pressed(poses)[:, 0])
+    # It comes down for 0.39 s while the hand goes on, and catches up; then it goes at the hand's 10 mm/s.
+    assert np.median(moved[moved > 0.0]) == pytest.approx(10e-3 * PERIOD, rel=0.5)
+    assert len(pressed(poses)) * PERIOD == pytest.approx(2.0 - 0.39, abs=0.05)
+
+
+def test_the_finger_is_never_ahead_of_the_hand() -> None:
+    resting = line(0.2, held=True)
+    stroke, poses = follow(resting, CELLS, HEIGHT, Fingertip(), AT, 600, PERIOD)
+    assert not stroke.done
+    assert poses[-1, 0] == pytest.approx(0.02)
+    assert poses[-1, 2] == pytest.approx(0.036)
+
+
+def test_moves_that_are_not_known_yet_are_waited_for_and_not_made_up_for_in_haste() -> None:
+    stroke = replace(line(1.0, moves=100, held=True), known=0.5)
+    stroke, poses = follow(stroke, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD)
+    assert poses[-1, 0] == pytest.approx(0.01, abs=3e-4)
+    stroke, after = follow(replace(stroke, known=1.0), CELLS, HEIGHT, Fingertip(), poses[-1], 40, PERIOD)
+    # At the hand's 20 mm/s, not at DRAG.
+    assert np.diff(after[:, 0]).max() < 0.3e-3
+
+
+def test_moves_that_waited_while_blender_drew_get_back_their_times() -> None:
+    stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.1, 0.001, 0.0, 4e-3)
+    for count in range(1, 6):
+        stroke = draw(stroke, 0.6 + 1e-4 * count, 0.001 * (count + 1), 0.0, 4e-3)
+    np.testing.assert_allclose(
+        [one.time for one in stroke.samples], [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], atol=1e-3
+    )
+
+
+def test_a_hand_that_has_rested_does_not_creep_before_it_goes_on() -> None:
+    stroke = draw(start(1, 0.0, 0.0, 4e-3), 5.0, 0.001, 0.0, 4e-3)
+    stroke = draw(stroke, 5.001, 0.002, 0.0, 4e-3)
+    assert stroke.samples[1].time >= 4.0
+
+
+def test_nothing_is_drawn_after_the_hand_let_go() -> None:
+    stroke = line(0.3)
+    assert draw(stroke, 1.0, 0.03, 0.0, 4e-3) is stroke
+
+
+def test_a_click_is_a_whole_press_and_ends_above_all_pins() -> None:
+    stroke, poses = path(replace(start(1, 0.01, 0.005, 4e-3), held=False))
+    assert stroke.done
+    assert poses[:, 2].min() == pytest.approx(0.036, abs=1e-9)
+    assert poses[-1, 2] == pytest.approx(0.055 + 4e-3, abs=1e-9)
+
+
+def test_depth_counts_from_the_surface_as_it_was_when_the_finger_began() -> None:
+    held = replace(start(1, 0.0, 0.0, 4e-3), known=10.0)
+    stroke, poses = follow(held, CELLS, HEIGHT, Fingertip(), AT, 200, PERIOD)
+    _, after = follow(stroke, CELLS, HEIGHT - 0.01, Fingertip(), poses[-1], 200, PERIOD)
+    assert after[-1, 2] == pytest.approx(0.036, abs=1e-9)
+
+
+def test_the_finger_never_goes_below_the_beds_floor() -> None:
+    low = np.full(CELLS.count, 0.001)
+    stroke = replace(start(1, 0.0, 0.0, 4e-3), held=False)
+    _, poses = follow(stroke, CELLS, low, Fingertip(), AT, 1000, PERIOD)
+    assert poses[:, 2].min() == 0.0
+
+
+@pytest.mark.parametrize(("by", "depth"), [(-1.0, 0.1e-3), (1.0, DEEPEST), (1e-3, 5e-3)])
+def test_the_depth_stays_within_what_can_be_pressed(by: float, depth: float) -> None:
+    assert deepen(start(1, 0.0, 0.0, 4e-3), 0.1, by).samples[-1].depth == pytest.approx(depth, rel=1e-12)

@@ -1,0 +1,163 @@
+"""Draws with the Press tool as a hand does: X events from outside Blender, in continuous motion."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+#: Half the length of a stroke, mm.
+HALF = 27.0
+#: Duration of a stroke, s, and moves a second.
+STROKES = ((0.3, 125), (1.0, 60), (3.0, 125), (8.0, 60))
+#: Places of three taps within a second, mm.
+TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
+
+Pixel = tuple[int, int]
+
+
+def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> Pixel:
+    """Return where a place in the bed's space, mm, is on the screen: pixels from its top left corner."""
+    from mathutils import Vector
+
+    blender.evaluate()
+    scale = blender.part("bridge").SCALE * 1e-3
+    left, up = blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
+    return left, blender.window().height - 1 - up
+
+
+def hand(*words: str) -> subprocess.Popen[bytes]:
+    """Start a hand that does what it is told, whatever Blender is about."""
+    return subprocess.Popen(["xdotool", *" ".join(words).split()])
+
+
+def to(at: Pixel, pause: float = 0.05) -> str:
+    """Return what moves the hand to a pixel and leaves it there for a while, s."""
+    return f"mousemove {at[0]} {at[1]} sleep {pause:.4f}"
+
+
+def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
+    """Return what moves the hand evenly from pixel to pixel."""
+    count = max(2, round(duration * rate))
+    way = np.linspace(start, end, count + 1)[1:].round().astype(int)
+    return " ".join(to((int(x), int(y)), duration / count) for x, y in way)
+
+
+def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
+    """Wait until the hand is done, and then until the finger is, and the pins have come to rest."""
+    running = blender.part("live.running")
+    yield from blender.until(lambda: process.poll() is not None)
+    yield 0.5
+    yield from blender.until(lambda: not any(session.strokes for session in running.all()))
+    yield from blender.settle(10)
+
+
+def note(blender: Any, name: str) -> None:
+    """Write down the heights, how many strokes the finger has finished, and how the view is turned."""
+    blender.look(name)
+    bed = blender.beds()[0]
+    session = blender.part("live.running").of(bed)
+    area, _ = blender.view()
+    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
+    blender.SEEN[name] |= {
+        "bed": (1e3 * height).round(3).tolist(),
+        "drawn": session.drawn if session else 0,
+        "view": list(area.spaces.active.region_3d.view_rotation),
+        "distance": area.spaces.active.region_3d.view_distance,
+    }
+
+
+def ends(blender: Any, y: float = 0.0) -> tuple[Pixel, Pixel]:
+    """Return the ends of a stroke along a row."""
+    return on_the_bed(blender, -HALF, y), on_the_bed(blender, HALF, y)
+
+
+def reset(blender: Any) -> Iterator[float | None]:
+    """Bring the bed back to rest."""
+    if blender.call(bpy.ops.digiclay.session_reset.poll):
+        blender.call(bpy.ops.digiclay.session_reset)
+    yield from blender.settle(5)
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a hand does."""
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    blender.call(bpy.ops.object.delete)
+    blender.call(bpy.ops.mesh.digital_clay_add)
+    blender.call(bpy.ops.view3d.view_all)
+    # A frame takes software GL half a second: the session catches up between two of them.
+    entry = bpy.context.preferences.addons.new()
+    entry.module = blender.EXTENSION
+    entry.preferences.most_periods = 1000
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
+    # A window that no manager has made active takes a button to be pressed where the pointer is by now.
+    hand("search --onlyvisible --class blender windowfocus").wait(30)
+    yield 1.0
+    for duration, rate in STROKES:
+        start, end = ends(blender)
+        began = time.perf_counter()
+        process = hand(to(start), "mousedown 1", drag(start, end, duration, rate), "mouseup 1")
+        yield from blender.until(lambda process=process: process.poll() is not None)
+        took = time.perf_counter() - began
+        blender.shot(f"hand_{duration:g}")
+        yield from finish(blender, process)
+        note(blender, f"stroke {duration:g}")
+        blender.SEEN[f"stroke {duration:g}"]["took"] = took
+        yield from reset(blender)
+    yield from taps(blender)
+    yield from navigation(blender)
+    yield from taken_back(blender)
+
+
+def taps(blender: Any) -> Iterator[float | None]:
+    """Press three times within a second; then Ctrl-Z takes back one of them."""
+    note(blender, "before the taps")
+    began = time.perf_counter()
+    clicks = " ".join(to(on_the_bed(blender, *place), 0.08) + " click 1 sleep 0.15" for place in TAPS)
+    process = hand(clicks)
+    yield from blender.until(lambda: process.poll() is not None)
+    took = time.perf_counter() - began
+    yield from finish(blender, process)
+    note(blender, "taps")
+    blender.SEEN["taps"]["took"] = took
+    yield from finish(blender, hand(to(on_the_bed(blender, 0.0, -30.0)), "key ctrl+z"))
+    note(blender, "one tap undone")
+    yield from reset(blender)
+
+
+def navigation(blender: Any) -> Iterator[float | None]:
+    """Turn the view and zoom in the middle of a stroke, and draw on."""
+    start, end = ends(blender)
+    middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
+    note(blender, "before orbit")
+    process = hand(
+        to(start), "mousedown 1", drag(start, middle, 0.5, 60),
+        "mousedown 2 sleep 0.05", drag(middle, (middle[0] + 60, middle[1]), 0.3, 60), "mouseup 2 sleep 0.1",
+        "click 4 sleep 0.2",
+    )  # fmt: skip
+    yield from blender.until(lambda: process.poll() is not None)
+    yield 1.0
+    note(blender, "in mid-stroke")
+    process = hand(drag(end, on_the_bed(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
+    yield from finish(blender, process)
+    note(blender, "after orbit")
+    blender.shot("hand_orbit")
+    yield from reset(blender)
+
+
+def taken_back(blender: Any) -> Iterator[float | None]:
+    """Take a stroke back that the finger has not finished, by Ctrl-Z and by Esc."""
+    running = blender.part("live.running")
+    for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
+        start, end = ends(blender)
+        process = hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "sleep 2")
+        yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in running.all()))
+        yield from finish(blender, hand(f"key {key} sleep 0.2"))
+        hand("mouseup 1")
+        yield from finish(blender, process)
+        note(blender, name)
