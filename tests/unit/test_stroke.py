@@ -44,7 +44,7 @@ def path(
     """Let the finger go on for 20 s at most, a chunk of periods at a time."""
     poses = [at]
     while not stroke.done and len(poses) < 4000:
-        stroke, part = follow(stroke, CELLS, HEIGHT, Fingertip(), poses[-1], min(chunk, 4000), PERIOD)
+        stroke, part = follow(stroke, CELLS, HEIGHT, Fingertip(), poses[-1], min(chunk, 4000), PERIOD, 0.0)
         poses += list(part[1:])
     return stroke, np.array(poses)
 
@@ -94,7 +94,7 @@ def test_the_finger_keeps_the_hands_times_where_it_can() -> None:
 
 def test_the_finger_is_never_ahead_of_the_hand() -> None:
     resting = line(0.2, held=True)
-    stroke, poses = follow(resting, CELLS, HEIGHT, Fingertip(), AT, 600, PERIOD)
+    stroke, poses = follow(resting, CELLS, HEIGHT, Fingertip(), AT, 600, PERIOD, 0.0)
     assert not stroke.done
     assert poses[-1, 0] == pytest.approx(0.02)
     assert poses[-1, 2] == pytest.approx(0.036)
@@ -102,11 +102,23 @@ def test_the_finger_is_never_ahead_of_the_hand() -> None:
 
 def test_moves_that_are_not_known_yet_are_waited_for_and_not_made_up_for_in_haste() -> None:
     stroke = replace(line(1.0, moves=100, held=True), known=0.5)
-    stroke, poses = follow(stroke, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD)
+    stroke, poses = follow(stroke, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD, 0.0)
     assert poses[-1, 0] == pytest.approx(0.01, abs=3e-4)
-    stroke, after = follow(replace(stroke, known=1.0), CELLS, HEIGHT, Fingertip(), poses[-1], 40, PERIOD)
+    stroke, after = follow(replace(stroke, known=1.0), CELLS, HEIGHT, Fingertip(), poses[-1], 40, PERIOD, 0.0)
     # At the hand's 20 mm/s, not at DRAG.
     assert np.diff(after[:, 0]).max() < 0.3e-3
+
+
+def test_a_slow_session_does_not_make_a_rest_of_the_hand_longer() -> None:
+    resting = replace(draw(start(1, 0.0, 0.005, 4e-3), 20.0, 0.01, 0.005, 4e-3), held=False)
+    stroke, poses, periods = resting, AT[None], 0
+    for now in np.arange(0.0, 60.0):
+        if not stroke.done:
+            # A second by the wall is ten control periods: a twentieth of real time.
+            stroke, poses = follow(stroke, CELLS, HEIGHT, Fingertip(), poses[-1], 10, PERIOD, now)
+            periods += len(poses) - 1
+    assert stroke.done
+    assert periods * PERIOD < 2.0
 
 
 def test_moves_that_waited_while_blender_drew_get_back_their_times() -> None:
@@ -138,15 +150,15 @@ def test_a_click_is_a_whole_press_and_ends_above_all_pins() -> None:
 
 def test_depth_counts_from_the_surface_as_it_was_when_the_finger_began() -> None:
     held = replace(start(1, 0.0, 0.0, 4e-3), known=10.0)
-    stroke, poses = follow(held, CELLS, HEIGHT, Fingertip(), AT, 200, PERIOD)
-    _, after = follow(stroke, CELLS, HEIGHT - 0.01, Fingertip(), poses[-1], 200, PERIOD)
+    stroke, poses = follow(held, CELLS, HEIGHT, Fingertip(), AT, 200, PERIOD, 0.0)
+    _, after = follow(stroke, CELLS, HEIGHT - 0.01, Fingertip(), poses[-1], 200, PERIOD, 0.0)
     assert after[-1, 2] == pytest.approx(0.036, abs=1e-9)
 
 
 def test_the_finger_never_goes_below_the_beds_floor() -> None:
     low = np.full(CELLS.count, 0.001)
     stroke = replace(start(1, 0.0, 0.0, 4e-3), held=False)
-    _, poses = follow(stroke, CELLS, low, Fingertip(), AT, 1000, PERIOD)
+    _, poses = follow(stroke, CELLS, low, Fingertip(), AT, 1000, PERIOD, 0.0)
     assert poses[:, 2].min() == 0.0
 
 

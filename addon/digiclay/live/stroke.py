@@ -44,6 +44,9 @@ NEAR = 1e-9
 #: Moves that come within this time of each other have waited together while Blender drew, s: their times are
 #: spread over the time since the one before, of which no more than this is taken for drawing, s.
 BURST, DRAWING = 4e-3, 1.0
+#: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
+#: in seconds is not to take minutes. The path stays whole, since the finger drags no faster than `DRAG`.
+LATE = 0.5
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,9 @@ class Stroke:
     reached : int
         Index of the sample the finger is at, or past.
     clock : float
-        Simulated time since the finger came above the path's first place, s.
+        Time since the finger came above the path's first place, s: simulated, or by the wall less `LATE`.
+    began : float
+        When it came there, by the wall, s.
     height : ndarray (n,) or None
         Heights of the pins when the finger began, m; None before.
     known : float
@@ -100,6 +105,7 @@ class Stroke:
     phase: int = WAITING
     reached: int = 0
     clock: float = 0.0
+    began: float = 0.0
     height: Floats | None = None
     known: float = 0.0
     heard: float = 0.0
@@ -157,7 +163,14 @@ def _pressable(depth: float) -> float:
 
 
 def follow(
-    stroke: Stroke, grid: Grid, height: Floats, finger: Fingertip, pose: Floats, count: int, period: float
+    stroke: Stroke,
+    grid: Grid,
+    height: Floats,
+    finger: Fingertip,
+    pose: Floats,
+    count: int,
+    period: float,
+    now: float,
 ) -> tuple[Stroke, Floats]:
     """Let the finger go on along a stroke.
 
@@ -175,6 +188,8 @@ def follow(
         Most control periods to go on for.
     period : float
         Control period, s.
+    now : float
+        Time by the wall, s, by a clock that never goes back.
 
     Returns
     -------
@@ -186,7 +201,7 @@ def follow(
         stroke = replace(stroke, height=height.copy(), phase=ABOVE)
     path = [pose]
     while len(path) <= count and not stroke.done:
-        stroke, place = _step(stroke, grid, finger, path[-1], period)
+        stroke, place = _step(stroke, grid, finger, path[-1], period, now)
         path.append(np.array([*place, *pose[3:]]))
     return stroke, np.array(path)
 
@@ -194,16 +209,18 @@ def follow(
 Place = tuple[float, float, float]
 
 
-def _step(stroke: Stroke, grid: Grid, finger: Fingertip, pose: Floats, period: float) -> tuple[Stroke, Place]:
+def _step(
+    stroke: Stroke, grid: Grid, finger: Fingertip, pose: Floats, period: float, now: float
+) -> tuple[Stroke, Place]:
     """Return the stroke after a control period, and where the finger is then."""
     assert stroke.height is not None
     x, y, z = pose[:3].tolist()
     # It waits for moves that may have been made, or it would stop short and then make haste.
     if not stroke.held or stroke.clock < stroke.known:
-        stroke = replace(stroke, clock=stroke.clock + period)
+        stroke = replace(stroke, clock=max(stroke.clock + period, now - stroke.began - LATE))
     safe = float(stroke.height.max()) + CLEARANCE
     if stroke.phase == ABOVE:
-        return _cross(stroke, (x, y, z), safe, period)
+        return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
     if stroke.phase == LEAVING:
         z = min(safe, z + LIFT * period)
         return (replace(stroke, phase=DONE) if z >= safe - NEAR else stroke), (x, y, z)
@@ -231,7 +248,7 @@ def _cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[St
     far, length = math.hypot(first.x - x, first.y - y), CROSS * period
     if far > length:
         return stroke, (x + (first.x - x) * length / far, y + (first.y - y) * length / far, z)
-    return replace(stroke, phase=PRESSING, clock=0.0), (first.x, first.y, z)
+    return replace(stroke, phase=PRESSING), (first.x, first.y, z)
 
 
 def _sink(z: float, surface: float, lowest: float, period: float) -> float:

@@ -62,7 +62,8 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
         running = replace(running, coming=begun, stroke_start=begun)
     finger = running.scene.fingertip or Fingertip()
     height = running.state.row(0)
-    stroke, path = follow(first, system.grid, height, finger, running.pose, count, system.period)
+    now = running.clock.seen or first.began
+    stroke, path = follow(first, system.grid, height, finger, running.pose, count, system.period, now)
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
