@@ -12,14 +12,15 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.control.shapes import SHAPES
-from ..core.quantity import Parameters, Quantity
+from ..core.quantity import EXTENTS, Parameters, Quantity
 from .shown_units import shown, unit_of
 
 __all__ = ["INT_MAX", "Update", "group", "listed", "title"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
-#: How far inside a bound that is not allowed itself a property ends, as a share of the default.
+#: How far inside a bound that is not allowed itself a property ends, as a share of the default; no nearer than
+#: numbers of the unit can be, by the same share of those, since Blender's numbers are rounded.
 INSIDE = 1e-6
 #: How many times the default dragging the mouse reaches; typing reaches all of the range.
 REACH = 10.0
@@ -86,7 +87,8 @@ def listed(values: tuple[float, ...], power: int) -> str:
 def _numbers(known: Quantity, default: float, power: int) -> dict[str, Any]:
     """Return default, range, and how a number is shown and dragged."""
     start = shown(default, power)
-    inside = INSIDE * (abs(start) or 1.0)
+    least = shown(EXTENTS[known.unit][0], power)
+    inside = max(INSIDE * (abs(start) or 1.0), (1.0 + INSIDE) * least)
     reach = REACH * (abs(start) or 0.1)
     low, high = (
         _bound(known.at_least, known.above, power, inside),
