@@ -19,8 +19,8 @@ __all__ = ["INT_MAX", "Update", "group", "listed", "title"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
-#: How far inside a bound that is not allowed itself a property ends, as a share of the default; no nearer than
-#: numbers of the unit can be, by the same share of those, since Blender's numbers are rounded.
+#: How far inside a bound that is not allowed itself a property ends, as a share of the default; no nearer
+#: than numbers of the unit can be, by the same share of those, since Blender's numbers are rounded.
 INSIDE = 1e-6
 #: How many times the default dragging the mouse reaches; typing reaches all of the range.
 REACH = 10.0
