@@ -91,6 +91,21 @@ def test_a_pin_rests_exactly_at_its_end_stop(control: object, stop: float, stepp
     assert run.height[-10:, 0].tolist() == [stop] * 10
 
 
+@pytest.mark.parametrize(("stepper", "step"), STEPPERS)
+def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(
+    stepper: str, step: float
+) -> None:
+    # The valve is open downwards: the stop holds the pin, and the finger presses on it.
+    contact, start = Contact(offset=0.5e-3), Actuator(rest_height=0.0)
+    system = one_cell(
+        actuator=start, contact=contact, relaxation=None, control=LOWER, stepper=stepper, step=step
+    )
+    run = record(system, path((0.0, 0.0, 0.0, 1.0), (0.05, 0.0, 0.0, -1.5), (0.1, 0.0, 0.0, -1.5)), 20)
+    m, wanted = contact.exponent, contact.share * contact.stiffness / contact.exponent
+    assert run.height[-1, 0] == 0.0
+    assert run.force[-1, 0] == pytest.approx(wanted * math.expm1(m * 1.0e-3), rel=1e-9)
+
+
 def test_a_pin_leaves_its_end_stop_at_once() -> None:
     turn = scripted(lambda t, x, y: 1.0 if t < 0.05 else -1.0)
     system = one_cell(actuator=Actuator(rest_height=100e-3), valve_lag=None, dead_time=0.0, control=turn)
