@@ -42,9 +42,9 @@ def test_the_size_is_the_beds(meshes: Path, ending: str) -> None:
 
 @pytest.mark.parametrize("ending", ["ascii.stl", "obj", "glb", "3mf"])
 def test_each_feature_is_a_mesh_of_its_own_where_the_format_has_such(meshes: Path, ending: str) -> None:
-    assert int(read(meshes / "bilinear" / f"features.{ending}")["Meshes"]) == 2
+    assert int(read(meshes / "bilinear" / f"features.{ending}")["Meshes"]) == 3
 
 
 def test_the_groups_of_an_obj_are_meshes(meshes: Path) -> None:
     said = told("assimp", "info", meshes / "bilinear" / "surface.obj", "--raw")
-    assert {"rest", "boss_1", "crease_1"} <= set(re.findall(r"\w+", said))
+    assert {"rest", "boss_1", "boss_2", "crease_1"} <= set(re.findall(r"\w+", said))

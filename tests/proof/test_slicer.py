@@ -16,7 +16,8 @@ COMPLAINTS = re.compile(
 )
 SOLIDS = [
     "bilinear/surface.stl", "bilinear/surface.3mf", "bilinear/surface.obj", "bilinear/pins.3mf",
-    "smooth/surface.stl", "membrane/surface.3mf", "smooth/boss_1.stl", "smooth/crease_1.3mf",
+    "smooth/surface.stl", "membrane/surface.3mf", "smooth/boss_1.stl", "smooth/boss_2.stl",
+    "smooth/crease_1.3mf",
 ]  # fmt: skip
 
 
