@@ -66,8 +66,7 @@ def test_a_long_recording_copies_itself_seldom() -> None:
 def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     hand = Hand()
     session = hand.press(sculpting.recording(started(), True), -6.0)
-    session, gesture = sculpting.marked(session)
-    session = hand.press(sculpting.taken_back(hand.press(session), gesture), 6.0)
+    session = hand.press(sculpting.rewound(hand.press(session)), 6.0)
     keep = session.recording
     assert keep is not None
     *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
@@ -76,8 +75,9 @@ def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
 
 def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
     hand = Hand()
-    session, gesture = sculpting.marked(started())
-    session = hand.press(sculpting.recording(hand.press(session), True), 6.0)
+    session = hand.press(started())
+    (gesture,) = session.gestures
+    session = hand.press(sculpting.recording(session, True), 6.0)
     assert sculpting.taken_back(session, gesture).recording is None
 
 

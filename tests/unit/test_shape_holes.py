@@ -12,7 +12,7 @@ from digiclay.core.layout import Layout, grid
 from digiclay.core.relief import Placement
 from digiclay.core.shape import Shape
 from digiclay.core.shape_file import fitted_to
-from digiclay.core.shape_holes import SMALL, filled
+from digiclay.core.shape_holes import SMALL, fill_holes
 from digiclay.core.shape_mesh import ShapeMesh, shape_mesh
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -118,7 +118,7 @@ def test_a_slope_goes_on_through_a_hole(arrangement: str) -> None:
     bed = grid(Layout(21, 21, 3e-3, arrangement))
     slope = 7.0 + 300.0 * bed.x - 200.0 * bed.y
     missing = np.hypot(bed.x - 3e-3, bed.y) < 7e-3
-    value, hole = filled(bed, np.where(missing, -99.0, slope), missing)
+    value, hole = fill_holes(bed, np.where(missing, -99.0, slope), missing)
     assert np.array_equal(hole, missing)
     # 300 rounds bring a hole four pins wide to rest.
     assert np.abs(value - slope).max() < 1e-9
@@ -129,7 +129,7 @@ def test_a_hole_is_small_up_to_a_twentieth_of_the_covered_pins() -> None:
     for count in (20, 21, 22):
         missing = np.zeros(bed.count, np.bool_)
         missing[21 * 5 + 2 : 21 * 5 + 13] = missing[21 * 6 + 2 : 21 * 6 + 2 + count - 11] = True
-        _, hole = filled(bed, np.zeros(bed.count), missing)
+        _, hole = fill_holes(bed, np.zeros(bed.count), missing)
         assert hole.any() == (count <= SMALL * (bed.count - count))
 
 
@@ -137,7 +137,7 @@ def test_a_bed_without_holes_and_one_that_is_missed_are_left_alone() -> None:
     bed = grid(Layout(5, 5, 3e-3))
     value = np.arange(25.0)
     for missing in (np.zeros(25, np.bool_), np.ones(25, np.bool_)):
-        kept, hole = filled(bed, value, missing)
+        kept, hole = fill_holes(bed, value, missing)
         assert not hole.any()
         np.testing.assert_array_equal(kept, value)
 

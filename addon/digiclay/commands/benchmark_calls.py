@@ -140,7 +140,7 @@ def _counting() -> Iterator[None]:
         counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
         return state._replace(gathered=dataclasses.replace(held, **counted))
 
-    constants = [module for module in _core() if hasattr(module, "filled")]
+    constants = [module for module in _core() if getattr(module, "filled", None) is filled]
 
     def full(*arguments: Any) -> Any:
         return _fields_counted(filled(*arguments))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .feature_region import components
 from .layout import Grid
 
-__all__ = ["SMALL", "filled"]
+__all__ = ["SMALL", "fill_holes"]
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -24,7 +24,7 @@ ODD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 ROUNDS = 300
 
 
-def filled(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
+def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
     """Return the values with those over small holes taken from around, and which pins these are.
 
     A hole is a group of neighbouring pins that the surface misses, with pins under the surface all

@@ -13,7 +13,7 @@ from .errors import ParameterError
 from .layout import ON_THE_SIDE, Grid
 from .relief import Placement, Tops
 from .shape import UPWARDS
-from .shape_holes import filled
+from .shape_holes import fill_holes
 
 __all__ = ["ShapeMesh", "shape_mesh"]
 
@@ -111,7 +111,7 @@ class ShapeMesh:
         if np.count_nonzero(up[last]) > UPPER * np.count_nonzero(last):
             # Seen from below: through a hole, on the inside of what lies under it.
             missing[cell[last]] |= ~up[last]
-        value, hole = filled(grid, value, missing)
+        value, hole = fill_holes(grid, value, missing)
         return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
     def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
