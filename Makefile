@@ -47,7 +47,7 @@ lint: ## check style, format and types
 MODULES ?=
 mutants: ## change the core's physics and control here and there, and list what no test notices
 	@$(ENVIRONMENT) requirements/mutation.txt $(IN_311)
-	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 150 --limit 360 --most 0.25 $(MODULES)
+	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 150 --limit 600 --most 0.25 $(MODULES)
 
 test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
 	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix
