@@ -41,4 +41,4 @@ def _no_gesture(context: Any) -> str:
     """The fingertip has formed nothing yet."""
     _, session = session_of(context)
     said = "There is no gesture to take back: the fingertip has not touched since"
-    return "" if session.gestures else said
+    return "" if session.gestures or session.strokes else said
