@@ -78,6 +78,15 @@ def pixel(place: Any) -> tuple[int, int]:
     return region.x + round(at.x), region.y + round(at.y)
 
 
+def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
+    """Return where a place in the first bed's space, mm, is seen, window pixels; 40 mm: the pins at rest."""
+    from mathutils import Vector
+
+    evaluate()
+    scale = part("bridge").SCALE * 1e-3
+    return pixel(beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
+
+
 def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
     """Call an operator as the 3D view would."""
     area, region = view()

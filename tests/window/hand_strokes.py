@@ -20,13 +20,9 @@ TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
 Pixel = tuple[int, int]
 
 
-def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> Pixel:
-    """Return where a place in the bed's space, mm, is on the screen: pixels from its top left corner."""
-    from mathutils import Vector
-
-    blender.evaluate()
-    scale = blender.part("bridge").SCALE * 1e-3
-    left, up = blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
+def on_the_screen(blender: Any, x: float, y: float) -> Pixel:
+    """Return where a place on the pins at rest, mm, is on the screen: pixels from its top left corner."""
+    left, up = blender.on_the_bed(x, y)
     return left, blender.window().height - 1 - up
 
 
@@ -73,7 +69,7 @@ def note(blender: Any, name: str) -> None:
 
 def ends(blender: Any, y: float = 0.0) -> tuple[Pixel, Pixel]:
     """Return the ends of a stroke along a row."""
-    return on_the_bed(blender, -HALF, y), on_the_bed(blender, HALF, y)
+    return on_the_screen(blender, -HALF, y), on_the_screen(blender, HALF, y)
 
 
 def reset(blender: Any) -> Iterator[float | None]:
@@ -118,14 +114,14 @@ def taps(blender: Any) -> Iterator[float | None]:
     """Press three times within a second; then Ctrl-Z takes back one of them."""
     note(blender, "before the taps")
     began = time.perf_counter()
-    clicks = " ".join(to(on_the_bed(blender, *place), 0.08) + " click 1 sleep 0.15" for place in TAPS)
+    clicks = " ".join(to(on_the_screen(blender, *place), 0.08) + " click 1 sleep 0.15" for place in TAPS)
     process = hand(clicks)
     yield from blender.until(lambda: process.poll() is not None)
     took = time.perf_counter() - began
     yield from finish(blender, process)
     note(blender, "taps")
     blender.SEEN["taps"]["took"] = took
-    yield from finish(blender, hand(to(on_the_bed(blender, 0.0, -30.0)), "key ctrl+z"))
+    yield from finish(blender, hand(to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z"))
     note(blender, "one tap undone")
     yield from reset(blender)
 
@@ -143,7 +139,7 @@ def navigation(blender: Any) -> Iterator[float | None]:
     yield from blender.until(lambda: process.poll() is not None)
     yield 1.0
     note(blender, "in mid-stroke")
-    process = hand(drag(end, on_the_bed(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
+    process = hand(drag(end, on_the_screen(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
     yield from finish(blender, process)
     note(blender, "after orbit")
     blender.shot("hand_orbit")

@@ -13,15 +13,6 @@ def modal() -> list[str]:
     return [one.bl_idname for one in bpy.context.window_manager.windows[0].modal_operators]
 
 
-def on_the_bed(blender: Any, x: float, y: float) -> tuple[int, int]:
-    """Return where a place on the pins at rest, mm, is seen in the first 3D view."""
-    from mathutils import Vector
-
-    blender.evaluate()
-    scale = blender.part("bridge").SCALE * 1e-3
-    return blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, 40 * scale)))
-
-
 def click(blender: Any, at: tuple[int, int]) -> Iterator[float | None]:
     """Click at a place of the window."""
     blender.event("MOUSEMOVE", "NOTHING", at)
@@ -47,7 +38,7 @@ def pick(blender: Any) -> Iterator[float | None]:
     picked = blender.part("device.display").picked
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
-    yield from click(blender, on_the_bed(blender, -6, -9))
+    yield from click(blender, blender.on_the_bed(-6, -9))
     blender.SEEN["picked"] = list(picked(blender.beds()[0]))
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Animation"]
@@ -58,7 +49,7 @@ def pick(blender: Any) -> Iterator[float | None]:
     blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
     blender.key("HOME", blender.middle())
     yield None
-    yield from click(blender, on_the_bed(blender, 6, -9))
+    yield from click(blender, blender.on_the_bed(6, -9))
     blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
     blender.SEEN["told in"] = list(blender.part("operators.status")._TOLD)
     blender.key("RET", blender.middle())

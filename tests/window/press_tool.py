@@ -13,19 +13,10 @@ import numpy as np
 TICKS = 5
 
 
-def on_the_bed(blender: Any, x: float, y: float, z: float = 40.0) -> tuple[int, int]:
-    """Return where a place in the bed's space, mm, is seen."""
-    from mathutils import Vector
-
-    blender.evaluate()
-    scale = blender.part("bridge").SCALE * 1e-3
-    return blender.pixel(blender.beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
-
-
 def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> Iterator[float | None]:
     """Hold the mouse along a way over the bed, mm, at its start until the finger is there; it stays down."""
     for step, (x, y) in enumerate(way):
-        at = on_the_bed(blender, x, y)
+        at = blender.on_the_bed(x, y)
         blender.event("MOUSEMOVE", "NOTHING", at)
         yield 0.15
         if step == 0:
@@ -56,7 +47,7 @@ def come(blender: Any) -> Iterator[float | None]:
 
 def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
     """Let the mouse button go, and wait until the finger is off the bed."""
-    blender.event("LEFTMOUSE", "RELEASE", on_the_bed(blender, x, y))
+    blender.event("LEFTMOUSE", "RELEASE", blender.on_the_bed(x, y))
     yield from come(blender)
 
 
@@ -92,7 +83,7 @@ def script(blender: Any) -> Iterator[float | None]:
     note(blender, "added")
     # An outline about 625 pins is what takes software GL longest.
     blender.call(bpy.ops.object.select_all, action="DESELECT")
-    blender.event("MOUSEMOVE", "NOTHING", on_the_bed(blender, -15, 5))
+    blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(-15, 5))
     yield 1.0
     blender.shot("press_cursor")
 
@@ -124,7 +115,7 @@ def depths(blender: Any) -> Iterator[float | None]:
     """Change the depth by the wheel and by Ctrl, and take a gesture back with Esc."""
     yield from drag(blender, [(-20.0, -20.0)])
     note(blender, "before the wheel")
-    at = on_the_bed(blender, -20, -20)
+    at = blender.on_the_bed(-20, -20)
     for _ in range(8):
         blender.event("WHEELDOWNMOUSE", "PRESS", at, ctrl=True)
         yield 0.1
@@ -148,7 +139,7 @@ def depths(blender: Any) -> Iterator[float | None]:
 def disabled(blender: Any) -> Iterator[float | None]:
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
     yield from blender.add_bed()
-    workspace, at = bpy.context.window_manager.windows[0].workspace, on_the_bed(blender, -15, 5)
+    workspace, at = bpy.context.window_manager.windows[0].workspace, blender.on_the_bed(-15, 5)
     held = [workspace.tools.from_space_view3d_mode("OBJECT").idname]
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 1.0
@@ -169,9 +160,9 @@ def shown(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     for x in (-12.0, 0.0, 12.0):
-        blender.event("MOUSEMOVE", "NOTHING", on_the_bed(blender, x, -27))
+        blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(x, -27))
         yield 0.2
-        blender.key("LEFTMOUSE", on_the_bed(blender, x, -27))
+        blender.key("LEFTMOUSE", blender.on_the_bed(x, -27))
         yield 0.3
     blender.key("RET", blender.middle())
     yield 0.5
