@@ -1,6 +1,6 @@
-"""Write docs/nomenclature.md: `python tools/nomenclature.py`.
+"""Generator of docs/nomenclature.md: `python tools/nomenclature.py`.
 
-The parameters come from their declarations in the core; the variables are listed here.
+The parameters come from their declarations in the core; terms and variables are listed here.
 """
 
 from __future__ import annotations
@@ -20,14 +20,72 @@ from digiclay.core.scene import SECTIONS, parameters  # noqa: E402
 INTRODUCTION = """\
 # Nomenclature
 
-Everything is in SI units inside. Heights grow upwards from the floor of the bed; a force that presses a pin
-down is positive; flow into a cylinder is positive; a valve command lies in −1 to 1, above 0 for the high
-reservoir.
+Units are SI. Height is positive upwards from the floor of the bed. A force that presses a pin down is
+positive. Flow into a cylinder is positive. A valve command lies in −1 to 1; a command above 0 opens to the
+high reservoir.
 
-This page is made by `tools/nomenclature.py`; a test compares the two.
+`tools/nomenclature.py` generates this page. A test compares the two.
 
-## Variables
+## Terms
+
+Each term has one meaning on all pages.
+
 """
+#: Term, its one meaning.
+TERMS = (
+    ("pin", "rod whose top is a point of the formed surface"),
+    ("cell", "pin with its cylinder, valve, conduit and sensors; the unit of all arrays"),
+    ("row, column", "line of cells along x, along y; only of the layout"),
+    ("bed", "all cells of one device"),
+    ("fingertip", "ellipsoid with a deformable pulp that presses on the pins"),
+    ("underside", "lower boundary of the fingertip, as a height over the bed"),
+    ("pulp", "soft tissue of the fingertip: exponential spring with relaxation"),
+    ("indentation", "pin top less underside"),
+    ("active cell", "cell that is integrated in a control period; the active set is all of them"),
+    ("part", "component of the model: valve lag, delay, conduit, relaxation, sensors, control, stepper"),
+    ("null part", "replacement of an omitted part; it has no state rows and computes nothing"),
+    (
+        "control method",
+        "algorithm that maps measurements to valve commands; Method I and Method II are the paper's",
+    ),
+    ("behaviour", "one of the six control methods without a blister"),
+    ("blister", "raised or lowered patch of pins under the fingertip, moved by Method I or II"),
+    ("virtual master", "simulated cell of Method I that follows the fingertip"),
+    ("set point", "total force that a control method holds"),
+    ("loss", "instant at which a control method ends the tracking of the fingertip"),
+    (
+        "mode",
+        "label of a cell's control: rest, hold, edge, blister, virtual spring, force follow, critical, frozen",
+    ),
+    ("state", "all quantities that vary in time, at one instant"),
+    ("control period", "time between two commands"),
+    ("physics step", "one step of the integration; a control period has one or more"),
+    ("tick", "one execution of Blender's timer; it simulates whole control periods"),
+    (
+        "scene",
+        "parameters and fingertip path of one simulation, a TOML file; Blender's own is a Blender scene",
+    ),
+    ("session", "simulation of one bed from an initial state; a live session takes place in Blender"),
+    ("run", "session of a scene together with its results in a run folder"),
+    (
+        "history",
+        "recorded heights, forces, commands and modes of a run; a row is one recorded control period",
+    ),
+    ("trace", "sums of each row from which the metrics are computed"),
+    ("take", "initial state and fingertip path of a live session, one pose a control period"),
+    ("bake", "Blender animation made from a take"),
+    ("batch", "several runs that are simulated in one call, with the run as the last array axis"),
+    ("job", "one run of a job series, with its meshes and pictures"),
+    ("job series", "all jobs of a JOBS file; the command `digiclay batch` executes it"),
+    ("sweep", "one scene over a grid of parameter values; a point is one combination of them"),
+    ("series", "a job series or a sweep, with its folder"),
+    ("shape", "mesh, picture or array to which the pins are driven before the fingertip arrives"),
+    ("skin", "interpolated surface through the pin tops"),
+    ("boss, crease", "region of the skin above, below the former surface; a feature is either"),
+    ("press stroke", "one drag of the Press tool; strokes of a cylinder and of a valve are lengths"),
+    ("RFD", "reference force deviation: rms of total force less set point"),
+)
+VARIABLES_HEADING = "\n## Variables\n"
 #: Symbol, name in code, unit, meaning.
 VARIABLES = (
     ("H", "`height`, row 0 of `State.rows`", "m", "height of a pin's top"),
@@ -39,9 +97,9 @@ VARIABLES = (
         "z_i",
         "`filters`, `Cell.pulp_rows`",
         "N",
-        "force the pulp over a cell has relaxed, one a relaxation time",
+        "relaxed force of the pulp over a cell, one a relaxation time",
     ),
-    ("x", "`depth`", "m", "indentation: pin top less underside of the finger"),
+    ("x", "`depth`", "m", "indentation: pin top less underside"),
     ("T", "`tension`", "N", "elastic force of the pulp (11)"),
     ("F", "`force`", "N", "force on a pin, `f_d max(T − Σ ĉ_i z_i, 0)` (14)"),
     ("ĉ_i", "`Relaxation.shares`", "1", "share of a relaxation time, c_i / Σ c"),
@@ -57,21 +115,20 @@ VARIABLES = (
     ("Re\\*", "in `valve.orifice`", "1", "modified Reynolds number (4)"),
     ("R", "`Conduit.resistance`", "Pa s/m3", "resistance of the conduit (8)"),
     ("μ", "`Fluid.dynamic_viscosity`", "Pa s", "dynamic viscosity ρ ν"),
-    ("r_VM", "`Master.x`, `Master.y`", "m", "place of the virtual master (13 again)"),
+    ("r_VM", "`Master.x`, `Master.y`", "m", "position of the virtual master (13 again)"),
 )
 LEGEND = """\
 
 ## Parameters
 
-The name is the key in a scene file. Source: P the paper, D derived, C chosen, or a
-reference of the list at the end. A default in
-brackets means several values, one after another. A range is in the parameter's own unit; rules that join
-several parameters are not in it. Where it has no end, a number beyond all devices is refused all the same:
+The name is the key in a scene file. The source is P (the paper), D (derived), C (chosen), or a reference of
+the last section. A default in brackets is a sequence of values. A range is in the unit of the parameter. It
+does not contain rules that join several parameters. A range without an end has the limits of its unit:
 
 | Unit | Least above 0 | Most |
 |---|---|---|
 """
-#: Where a value comes from that is neither the paper's nor chosen: its key, the work, what is taken from it.
+#: Key, work and extracted value of each reference beside the paper.
 REFERENCES = {
     "Jindrich 2003": (
         "D. L. Jindrich, Y. Zhou, T. Becker and J. T. Dennerlein, *Non-linear viscoelastic models "
@@ -112,14 +169,14 @@ RULE = "|---|---|---|---|---|---|---|"
 
 
 def shown(value: object) -> str:
-    """Write a default: the shortest digits that give it back."""
+    """Write a default with the fewest digits that restore it."""
     if isinstance(value, tuple):
         return "[" + ", ".join(shown(item) for item in value) + "]"
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 def bounds(known: Quantity) -> str:
-    """Write the range a parameter is taken from, ends included unless it says above or below."""
+    """Write the range of a parameter; its ends are included except after above and below."""
     ends = (
         ("above", known.above), ("from", known.at_least), ("below", known.below), ("up to", known.at_most),
     )  # fmt: skip
@@ -142,7 +199,9 @@ def section(name: str, method: str) -> list[str]:
 
 def page() -> str:
     """Return the page."""
-    lines = [INTRODUCTION, "| Symbol | Name in code | Unit | Meaning |", "|---|---|---|---|"]
+    lines = [INTRODUCTION + "| Term | Meaning |", "|---|---|"]
+    lines += ["| " + " | ".join(row) + " |" for row in TERMS]
+    lines += [VARIABLES_HEADING, "| Symbol | Name in code | Unit | Meaning |", "|---|---|---|---|"]
     lines += ["| " + " | ".join(row) + " |" for row in VARIABLES]
     lines.append(LEGEND.rstrip())
     lines += [f"| {unit or 1} | {least:g} | {most:g} |" for unit, (least, most) in EXTENTS.items()]
