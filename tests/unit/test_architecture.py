@@ -27,11 +27,11 @@ LEVELS = (
     "feature_network "
     "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
     "metrics_path sweep_axis",
-    "mesh_in_placed mesh_in_checks mesh_in_obj "
+    "mesh_in_placed mesh_in_checks mesh_in_obj whole_files "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods export run_folder metrics_force metrics_trace control.servo control.blister "
+    "formed methods run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
-    "mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane metrics "
+    "export mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane metrics "
     "series_folder "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "feature_line "

@@ -11,7 +11,8 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.errors import OutputError
 from digiclay.core.processes import host
-from digiclay.core.series_folder import Kind, read_json, series
+from digiclay.core.series_folder import Kind, series
+from digiclay.core.whole_files import read_json
 
 from tests.other_process import dead
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text

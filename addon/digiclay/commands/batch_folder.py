@@ -11,13 +11,13 @@ from typing import Any
 
 from .. import __version__
 from ..core.errors import OutputError
-from ..core.export import write_whole
 from ..core.finished import is_whole
 from ..core.jobs import JOB, SCENE, Batch, Job
 from ..core.run_folder import inside
 from ..core.scene_table import text
-from ..core.series_folder import Kind, read_json, series
+from ..core.series_folder import Kind, series
 from ..core.unfinished import remove_abandoned
+from ..core.whole_files import read_json, write_whole
 from .gallery import Card, page
 from .job import FILES, RUNS, TIMING
 from .progress import duration

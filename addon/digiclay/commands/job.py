@@ -15,14 +15,13 @@ from typing import Any
 from .. import __version__
 from ..core.accuracy import can_be_estimated, estimated
 from ..core.errors import DigiclayError, OutputError, one_line
-from ..core.export import write_whole
 from ..core.job_outputs import Outputs
 from ..core.jobs import JOB, SCENE, job_outputs
 from ..core.run_folder import written
 from ..core.scene import Scene
 from ..core.scene_file import load
-from ..core.series_folder import as_json
 from ..core.session import Result, run, save
+from ..core.whole_files import as_json, write_whole
 from .arguments import add_command
 from .exit_codes import STOPPED, WRONG
 from .export import exported, formats

@@ -17,13 +17,13 @@ from typing import Any, TextIO
 
 from .. import __version__
 from ..core.errors import DigiclayError, OutputError, ParameterError
-from ..core.export import write_whole
 from ..core.scene import Scene
 from ..core.scene_file import Setting, find
 from ..core.sweep import ERRORS, Point, Record, figure, finish, points
 from ..core.sweep_axis import Axis, axis
 from ..core.sweep_bundles import Bundles, bundles, evaluate_all, fallen_apart
 from ..core.sweep_folder import Folder, columns, grid, opened, table
+from ..core.whole_files import write_whole
 from .arguments import add_scene, settings_of
 from .exit_codes import STOPPED
 from .progress import PAUSE, WIDTH

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import OutputError
-from ..core.export import write_whole
 from ..core.png import png
+from ..core.whole_files import write_whole
 from ..device.heat import COLOURS
 
 __all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]

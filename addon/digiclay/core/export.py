@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 from . import mesh_file_glb, mesh_file_obj, mesh_file_ply, mesh_file_stl, mesh_file_threemf
 from .body import Body
 from .errors import OutputError, ParameterError
-from .unfinished import unfinished
+from .whole_files import open_whole
 
-__all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write", "write_whole"]
+__all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write"]
 
 #: File formats, by name, with what is said of them in the help.
 FORMATS: dict[str, str] = {
@@ -88,34 +87,6 @@ def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str 
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
     if not any(len(body.faces) for body in bodies):
         raise OutputError(f"There is nothing to write to {target}.")
-    with _whole(target) as file:
+    with open_whole(target) as file:
         writer(file, bodies, UNITS[unit])
     return target
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: to a temporary name beside it, then renamed.
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
-    """
-    with _whole(path) as file:
-        file.write(content)
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[BinaryIO]:
-    """Give a file under a temporary name to write into; on leaving it well, it becomes `path`."""
-    part = unfinished(path)
-    try:
-        with part.open("wb") as file:
-            yield file
-        part.replace(path)
-    except BaseException as error:
-        with suppress(OSError):  # what went wrong first is what the user has to hear
-            part.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
-        raise

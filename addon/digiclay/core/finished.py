@@ -17,7 +17,7 @@ from .recorder import Recorder, available_memory
 from .run_folder import MARK
 from .scene import Scene
 from .scene_file import load
-from .series_folder import read_json
+from .whole_files import read_json
 
 __all__ = ["SHAPES", "Run", "is_whole", "last_touch", "read", "row_at"]
 

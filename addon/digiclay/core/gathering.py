@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import Grid
+from .layout import Disc, Grid
 from .modes import Mode
-from .state import Disc, Gathered, State
+from .state import Gathered, State
 from .system import System
 from .touch import Approach, reached
 

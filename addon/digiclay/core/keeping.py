@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from .errors import StateError
 from .keeping_memory import rebuilt, written
+from .layout import Disc
 from .modes import Mode
 from .simulation import begin
-from .state import Disc, Gathered, Rows, State
+from .state import Gathered, Rows, State
 from .system import System
 
 __all__ = ["carried", "packed", "unpacked"]

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from .errors import ParameterError
 from .quantity import Parameters, quantity
 
-__all__ = ["ON_THE_SIDE", "Bounds", "Grid", "Layout", "grid"]
+__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "grid"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
 #: First row, last row, first column, last column.
 Bounds = tuple[int, int, int, int]
+#: Centre x, y and radius, m.
+Disc = tuple[float, float, float]
 
 #: Relative slack, so that cells exactly on a limit count the same on every side of the centre.
 ON_THE_SIDE = 1e-9

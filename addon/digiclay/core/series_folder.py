@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -11,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from .errors import OutputError
-from .export import write_whole
 from .file_lock import held
 from .run_folder import busy, inside, lock_beside
 from .unfinished import is_unfinished, remove_abandoned
+from .whole_files import as_json, read_json, write_whole
 
-__all__ = ["Kind", "as_json", "read_json", "series"]
+__all__ = ["Kind", "series"]
 
 #: The lock of whoever works in the folder.
 LOCK = ".lock"
@@ -106,17 +105,3 @@ def _is_bare(path: Path, kind: Kind) -> bool:
         if not frame and not (found.name in kind.folders and found.is_dir() and not any(found.iterdir())):
             return False
     return True
-
-
-def read_json(path: Path) -> dict[str, Any] | None:
-    """Return what a small file says; None where it cannot be read."""
-    try:
-        read = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError):
-        return None
-    return read if isinstance(read, dict) else None
-
-
-def as_json(value: object) -> bytes:
-    """Return a value as JSON with a line's end."""
-    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .layout import Disc
 from .modes import Mode
 
-__all__ = ["Disc", "Gathered", "Part", "Rows", "State", "at_rest"]
+__all__ = ["Gathered", "Part", "Rows", "State", "at_rest"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
-#: Centre x, y and radius, m.
-Disc = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import OutputError
-from .export import write_whole
 from .quantity import quantities
 from .scene import Scene
 from .scene_table import text
-from .series_folder import Kind, as_json, series
+from .series_folder import Kind, series
 from .sweep import FIGURES, Point, Record
 from .sweep_axis import Axis
+from .whole_files import as_json, write_whole
 
 __all__ = ["MARK", "Column", "Folder", "columns", "grid", "opened", "table"]
 

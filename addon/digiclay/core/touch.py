@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from .contact import Contact
 from .filled import filled
 from .fingertip import Fingertip, forms, reach, reaches, underside
+from .layout import Disc
 from .places import Pulp
-from .state import Disc
 
 __all__ = ["Approach", "Coming", "Touch", "Window", "approach", "force", "reached"]
 

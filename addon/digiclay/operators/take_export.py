@@ -6,9 +6,9 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.errors import DigiclayError
-from ..core.export import write_whole
 from ..core.scene_table import text
 from ..core.take import as_scene
+from ..core.whole_files import write_whole
 from ..device.view import bed_of
 from ..recorded import takes
 from .reasons import allowed, no_bed, no_take

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.export import write_whole
+from ..core.whole_files import write_whole
 from ..plots.figure import save
 from . import figures_blister, figures_limits, figures_session, figures_variants
 from .claims import claims

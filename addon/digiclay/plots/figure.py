@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import OutputError
-from ..core.export import write_whole
+from ..core.whole_files import write_whole
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
