@@ -1,0 +1,108 @@
+"""A file saved before the modules were moved and renamed opens, and its beds go on as they did then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.core.assembly import assemble
+from digiclay.core.keeping import unpacked
+from digiclay.core.scene_file import load
+from digiclay.device import view
+from digiclay.exchange import formed_bed
+from digiclay.live import bed_state, running, tick
+from digiclay.recorded import takes
+from digiclay.settings import properties
+
+from tests.blender.session.live import FLOAT32, Clock, exact, press, shown
+
+pytestmark = pytest.mark.usefixtures("extension")
+SAMPLES = Path(__file__).parents[1] / "samples" / "blend"
+#: A sum in another order, or another numpy, moves a pin by a few units of the last place of 40 mm; m.
+ROUNDING = 1e-12
+HEIGHTS = dict(np.load(SAMPLES / "heights.npz"))
+
+
+@pytest.fixture(autouse=True)
+def older_file(extension: None) -> None:
+    """Open the file that was saved by Blender 4.2 with the code of 22 November 2026."""
+    bpy.ops.wm.open_mainfile(filepath=str(SAMPLES / "beds.blend"))
+
+
+def bed(name: str) -> Any:
+    """Return a bed of the file, active."""
+    found = bpy.data.objects[name]
+    bpy.context.view_layer.objects.active = found
+    return found
+
+
+def go_on(name: str, x: float) -> None:
+    """Start a session of a bed, press once more at x, mm, and stop."""
+    found, clock = bed(name), Clock()
+    assert tick.start(bpy.context, found) == []
+    clock.tick()
+    press(found, clock, x)
+    tick.stop(found.session_uid)
+
+
+@pytest.mark.parametrize(("name", "stored"), [("Session", "session"), ("Settings", "settings")])
+def test_the_kept_state_has_the_stored_heights_and_is_what_is_drawn(name: str, stored: str) -> None:
+    np.testing.assert_array_equal(exact(bed(name)), HEIGHTS[stored])
+    np.testing.assert_allclose(shown(bed(name)), HEIGHTS[stored], rtol=0, atol=FLOAT32)
+
+
+@pytest.mark.parametrize(("name", "x"), [("Session", 4.0), ("Settings", 0.0)])
+def test_the_session_goes_on_to_the_stored_heights(name: str, x: float) -> None:
+    go_on(name, x)
+    stored = HEIGHTS[f"{name.lower()}_later"]
+    assert np.abs(stored - HEIGHTS[name.lower()]).max() > 1e-4  # the press forms something
+    # The finger's place comes from Blender's 32 bits, which its versions round differently.
+    np.testing.assert_allclose(exact(bed(name)), stored, rtol=0, atol=FLOAT32)
+
+
+def test_the_take_replays_to_the_stored_heights() -> None:
+    found = bed("Session")
+    first, second = takes.entries(found)
+    assert (first.name, second.name) == ("A press", "Take 2")  # the second was recorded when it was saved
+    take = takes.read(found, first.number)
+    system = assemble(take.scene)
+    np.testing.assert_array_equal(unpacked(system, take.start).row(0), HEIGHTS["take_start"])
+    np.testing.assert_array_equal(unpacked(system, take.end).row(0), HEIGHTS["take_end"])
+    assert bpy.ops.digiclay.take_replay(take=first.number) == {"FINISHED"}
+    np.testing.assert_allclose(exact(found), HEIGHTS["take_end"], rtol=0, atol=ROUNDING)
+
+
+def test_a_session_resets_and_goes_back_from_the_older_state() -> None:
+    found = bed("Session")
+    assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
+    assert bed_state.kept(found) is None
+    assert (exact(found) == 40e-3).all()
+    assert running.all() == ()
+
+
+def test_settings_of_the_user_s_own_are_those_of_the_scene_file() -> None:
+    found = bed("Settings")
+    assert properties.scene_of(found) == load(SAMPLES / "settings.toml")
+    display = found.digiclay_display
+    assert (display.colour, display.arrows) == ("force", True)
+    assert tuple(display.picked) == (40, 41, -1, -1, -1, -1)
+    assert view.coloured_by(found) == "force"
+
+
+def test_features_are_measured_from_the_surface_that_was_kept() -> None:
+    found = bed("Settings")
+    assert formed_bed.is_kept(found)
+    listed = found["digiclay_features"]
+    assert listed.startswith("0 bosses and 1 crease")
+    assert bpy.ops.digiclay.find_features() == {"FINISHED"}
+    assert found["digiclay_features"] == listed
+
+
+def test_the_fingertip_stands_where_the_session_was_left() -> None:
+    found = bed("Session")
+    pose = bridge.pose(view.fingertip_of(found))
+    np.testing.assert_allclose(pose, bed_state.pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
