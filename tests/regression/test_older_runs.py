@@ -1,7 +1,7 @@
 """Folders of runs written by an older version: they are read, and their scenes give the same runs again.
 
-How they were made is in tests/samples/README.md. Runs are compared with the tolerance of the golden run, for its
-reason: other processors and other versions of numpy take sums in another order.
+How they were made is in tests/samples/README.md. Runs are compared with the tolerance of the golden run, for
+its reason: other processors and other versions of numpy take sums in another order.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from digiclay.core.session import run, save
 RUNS = Path(__file__).parents[1] / "samples" / "runs"
 RECORDED = ("virtual_master", "cell_states_every_7")
 ALL = (*RECORDED, "without_recorder")
-#: Largest differences of what a run of the same scene records: N, m, and of a command, which a gain of 500 per
-#: metre makes of a height.
+#: Largest differences of what a run of the same scene records: N, m, and of a command, which a gain of 500
+#: per metre makes of a height.
 TOLERANCES = {"force": 1e-11, "total_force": 1e-10, "height": 1e-13, "command": 1e-9}
 #: What says when, where and how quickly a run was made.
 CIRCUMSTANCES = ("run_time", "real_time_factor", "versions")
