@@ -7,19 +7,22 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands import benchmark_peers as peers
-from digiclay.commands.benchmark_calls import Counted, Ledger, floor
+from digiclay.commands.benchmark_calls import Counted, Ledger, floor, methods_noted, period_calls
 from digiclay.commands.benchmark_loop import loop
 from digiclay.commands.benchmark_problems import PROBLEMS, problem, solved
 from digiclay.commands.benchmark_report import kept, made_with
 from digiclay.commands.benchmark_terms import LONGER, TERMS, without
 from digiclay.commands.benchmark_work import Work, best_ratio
 from digiclay.commands.tables import table
+from digiclay.core.assembly import assemble
 from digiclay.core.errors import OutputError
+from digiclay.core.simulation import begin, periods
 
 from tests.assemble import sample
 
@@ -44,6 +47,35 @@ def test_every_kind_of_call_is_counted_once(ledger: Ledger) -> None:
     b[1:]  # __getitem__
     b[0] = 1.0  # __setitem__
     assert ledger.calls.total() == 7
+
+
+def test_methods_of_plain_arrays_are_counted(ledger: Ledger) -> None:
+    a, bound = np.ones(3).view(Counted), np.eye(3).dot
+    with methods_noted():
+        product = bound(a)
+        np.zeros(2).copy()
+    assert {key[0]: times for key, times in ledger.calls.items()} == {"dot": 1, "zeros": 1, "copy": 1}
+    assert type(product) is Counted
+
+
+def test_the_products_of_a_period_are_all_counted() -> None:
+    # Python's own profiler says how often the core asks for a product.
+    scene, asked = sample("ridge_mound_valley"), 0
+    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+
+    def noted(frame: FrameType, event: str, called: object) -> None:
+        nonlocal asked
+        asked += event == "c_call" and getattr(called, "__name__", "") == "dot"
+
+    calls, counted = period_calls(system, trajectory, 300)
+    sys.setprofile(noted)
+    try:
+        for _ in periods(system, trajectory, begin(system), 300):
+            pass
+    finally:
+        sys.setprofile(None)
+    assert sum(times for key, times in counted.calls.items() if key[0] == "dot") == asked
+    assert len(calls) == 300
 
 
 def test_counting_does_not_change_a_result(ledger: Ledger) -> None:

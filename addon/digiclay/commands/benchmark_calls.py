@@ -13,23 +13,27 @@ import timeit
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import ModuleType
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
 from ..core import simulation
 from ..core.assembly import assemble
-from ..core.filled import filled
 from ..core.scene import Scene
 from ..core.system import System
 from ..core.trajectory import Trajectory
 from .benchmark_report import table
 
-__all__ = ["Counted", "Ledger", "floor", "period_calls", "report"]
+__all__ = ["Counted", "Ledger", "floor", "methods_noted", "period_calls", "report"]
 
 #: Methods of arrays that make an array or bytes; reductions reach `__array_ufunc__` by themselves.
 METHODS = ("take", "copy", "astype", "dot", "reshape", "tobytes", "__getitem__", "__setitem__")
+#: Methods that reach `__array_ufunc__` by themselves, or make no array.
+REDUCTIONS = ("any", "all", "sum", "min", "max", "item", "tolist", "view")
+#: Where calls are numpy's own, or this counter's.
+INSIDE = (str(Path(np.__file__).parent), __file__)
 
 
 class Ledger:
@@ -40,7 +44,7 @@ class Ledger:
     calls : Counter
         By name and shapes.
     examples : dict
-        For each of them a function without arguments that makes the same call.
+        For those noted with their arguments a function without arguments that makes the same call.
     """
 
     def __init__(self) -> None:
@@ -62,6 +66,8 @@ class Ledger:
 class Counted(np.ndarray[Any, Any]):
     """An array that notes every call with it in `ledger`; what comes of a call is one too."""
 
+    # So that the product of a plain array with one of these is one too.
+    __array_priority__ = 1.0
     ledger = Ledger()
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **known: Any) -> Any:
@@ -128,52 +134,53 @@ def _fields_counted(value: Any) -> Any:
 
 
 @contextmanager
-def _counting() -> Iterator[None]:
-    """Let the simulation work on `Counted` arrays for as long as the block lasts."""
-    gather = simulation.taking_part
+def methods_noted() -> Iterator[None]:
+    """Note methods of plain arrays and numpy's built-in functions too, for as long as the block lasts.
 
-    def gathered(*arguments: Any) -> Any:
-        state = gather(*arguments)
-        held = state.gathered
-        if isinstance(held.block, Counted):
-            return state
-        counted = {name: getattr(held, name).view(Counted) for name in ("block", "place", "mode")}
-        return state._replace(gathered=dataclasses.replace(held, **counted))
+    `Counted` sees a call only if one of its own is asked: ``np.array(rows).dot(counted)`` is none, nor
+    is a method that was bound to a plain array beforehand. What numpy's own modules call is not noted.
+    """
 
-    constants = [module for module in _core() if getattr(module, "filled", None) is filled]
+    def noted(frame: FrameType, event: str, called: Any) -> None:
+        if event != "c_call" or frame.f_code.co_filename.startswith(INSIDE):
+            return
+        owner = getattr(called, "__self__", None)
+        if type(owner) is np.ndarray:
+            if called.__name__ not in REDUCTIONS:
+                Counted.ledger.calls[called.__name__, owner.shape] += 1
+        elif not isinstance(owner, (np.ndarray, np.ufunc)) and str(called.__module__).startswith("numpy"):
+            Counted.ledger.calls[called.__name__,] += 1
 
-    def full(*arguments: Any) -> Any:
-        return _fields_counted(filled(*arguments))
-
+    former = sys.getprofile()
+    sys.setprofile(noted)
     try:
-        simulation.taking_part = gathered
-        for module in constants:
-            module.filled = full  # type: ignore[attr-defined]
         yield
     finally:
-        simulation.taking_part = gather
-        for module in constants:
-            module.filled = filled  # type: ignore[attr-defined]
-
-
-def _core() -> list[ModuleType]:
-    """Return the modules of the core that have been imported, but the one that makes constants."""
-    package = simulation.__name__.rpartition(".")[0]
-    own = f"{package}.filled"
-    return [module for name, module in sys.modules.items() if name.startswith(f"{package}.") and name != own]
+        sys.setprofile(former)
 
 
 def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[list[int], Ledger]:
     """Return how many numpy calls each of the first `count` control periods makes, and which.
 
-    What a change of the gathered cells and the finger's poses take is not counted: both
-    are done once for many periods.
+    The finger's poses are not counted: they are worked out for many periods at once.
+
+    Parameters
+    ----------
+    system : System
+    trajectory : Trajectory
+    count : int
     """
-    system = dataclasses.replace(system, plan=_fields_counted(system.plan))
+    system = dataclasses.replace(system, grid=_fields_counted(system.grid), plan=_fields_counted(system.plan))
+    state = simulation.begin(system)
+    several = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
+    starts = np.arange(count)[:, None] * system.period
+    poses = trajectory.poses((starts + system.instants).ravel()).reshape(count, -1, 7)
+    ways = simulation.approaches(system, poses)
     Counted.ledger = ledger = Ledger()
-    calls, before = [], 0
-    with _counting():
-        for _ in simulation.periods(system, trajectory, simulation.begin(system), count):
+    calls, before, state = [], 0, state._replace(**several)
+    with methods_noted():
+        for finger in ways:
+            state = simulation.advance(system, state, finger)
             total = ledger.calls.total()
             calls.append(total - before)
             before = total
@@ -181,7 +188,7 @@ def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[li
 
 
 def floor(ledger: Ledger) -> dict[tuple[Any, ...], float]:
-    """Return what one call of each kind takes by itself, s: the least of some repeats."""
+    """Return what one call of each kind with an example takes by itself, s: the least of some repeats."""
     with np.errstate(all="ignore"):
         return {
             key: min(timeit.repeat(call, number=50, repeat=5)) / 50 for key, call in ledger.examples.items()
@@ -197,7 +204,7 @@ def report(scene: Scene) -> Iterator[str]:
     spent: Counter[str] = Counter()
     for key, times in ledger.calls.items():
         number[key[0]] += times
-        spent[key[0]] += times * alone[key]
+        spent[key[0]] += times * alone.get(key, 0.0)
     yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"
     rows = [
         [name, f"{number[name] / count:.1f}", f"{spent[name] / count * 1e6:.1f}"]

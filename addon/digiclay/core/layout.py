@@ -146,7 +146,7 @@ class Grid:
     def place(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
         x, y = self.x.take(cells), self.y.take(cells)
-        return np.array([np.ones(cells.size), x, y, x * x, x * y, y * y])
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
 
 def grid(layout: Layout) -> Grid:
