@@ -1,0 +1,113 @@
+"""Files of older versions: scenes, kept states and takes are what they were; see tests/samples."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.assembly import assemble
+from digiclay.core.keeping import carried, unpacked
+from digiclay.core.scene import SECTIONS, Scene
+from digiclay.core.scene_file import load
+from digiclay.core.scene_table import ABSENT, text
+from digiclay.core.simulation import periods
+from digiclay.core.take import from_bytes, states
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+#: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
+#: all numbers are the same.
+ROUNDING = 1e-11
+WRITTEN = sorted(path for path in SAMPLES.glob("*/*.toml") if not path.name.startswith("by_hand"))
+BY_HAND = sorted(SAMPLES.glob("scenes/by_hand_*.toml"))
+STATES = sorted(SAMPLES.glob("states/*.state"))
+TAKES = sorted(SAMPLES.glob("takes/*.take"))
+
+
+def values(scene: Scene) -> dict[str, Any]:
+    """Return a scene's values as the tables of a TOML file that spells out all of them."""
+    table: dict[str, Any] = {name: getattr(scene, name) for name in ("name", "description", "preset")}
+    for section in SECTIONS:
+        part = getattr(scene, section)
+        if part is not None:
+            table[section] = {name: listed(value) for name, value in vars(part).items()}
+        elif section not in ("contact", "blister"):
+            table[section] = ABSENT
+    if scene.control is not None:
+        table["control"]["method"] = scene.method
+    path = scene.trajectory
+    points = [{name: listed(value) for name, value in vars(point).items()} for point in path.waypoints]
+    table["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
+    return table
+
+
+def listed(value: Any) -> Any:
+    """Return a tuple as TOML has it."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def without_notes(text: str) -> list[str]:
+    """Return the lines of a written scene without the notes that say what the values are."""
+    return [line.partition("  # ")[0] for line in text.splitlines()]
+
+
+def test_there_are_samples_of_each_format() -> None:
+    assert (len(WRITTEN), len(BY_HAND), len(STATES), len(TAKES)) == (30, 3, 8, 6)
+
+
+@pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_scene_of_an_older_version_is_what_it_was(path: Path) -> None:
+    spelled_out = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert values(load(path)) == spelled_out
+
+
+@pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_scene_of_one_finger_is_written_as_older_versions_read_it(path: Path) -> None:
+    assert without_notes(text(load(path))) == without_notes(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", BY_HAND, ids=lambda path: path.stem)
+def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path: Path) -> None:
+    written = load(path.with_name(path.name.replace("by_hand", "written")))
+    assert values(load(path)) == values(written)
+
+
+@pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
+def test_a_kept_state_of_an_older_version_is_what_it_was(path: Path) -> None:
+    system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
+    state = unpacked(system, path.read_bytes())
+    rows = np.array([state.row(index) for index in range(len(state.rows))])
+    assert state.period == known["period"]
+    np.testing.assert_array_equal(rows, known["rows"])
+    np.testing.assert_array_equal(state.mode(), known["mode"])
+    np.testing.assert_array_equal(state.aged, known["aged"])
+
+
+@pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
+def test_a_session_goes_on_from_a_kept_state_of_an_older_version_as_it_did(path: Path) -> None:
+    scene, known = load(path.with_suffix(".toml")), np.load(path.with_suffix(".npz"))
+    system = assemble(scene)
+    height, force, state = [], [], unpacked(system, path.read_bytes())
+    for now in periods(system, scene.trajectory.trajectory(), state, 50):
+        height.append(now.row(0))
+        force.append(now.row(system.rows.force))
+    np.testing.assert_allclose(height[::10], known["height"], rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(force[::10], known["force"], rtol=0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
+def test_the_heights_of_a_kept_state_of_an_older_version_are_taken_up_by_another_session(path: Path) -> None:
+    system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
+    state = carried(system, path.read_bytes())
+    np.testing.assert_array_equal(state.row(0), known["carried_height"])
+    np.testing.assert_array_equal(state.mode(), known["carried_mode"])
+
+
+@pytest.mark.parametrize("path", TAKES, ids=lambda path: path.stem)
+def test_a_take_of_an_older_version_is_played_as_it_was(path: Path) -> None:
+    take, known = from_bytes(path.read_bytes()), np.load(path.with_suffix(".npz"))
+    np.testing.assert_array_equal(take.poses, known["poses"])
+    height = [state.row(0) for state in states(take)]
+    np.testing.assert_allclose(height[::10], known["height"], rtol=0.0, atol=ROUNDING)
