@@ -1,0 +1,81 @@
+"""Folders of sweeps and batches that an older version made are shown, and gone on with."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+
+SAMPLES = Path(__file__).parents[1] / "samples" / "series"
+SWEEP = [
+    "sweep", "my.toml", "--vary", "control.force_gain=1:5:5", "--vary", "layout.rows=3,4",
+    "--metric", "rfd,lag,height_error", "--out", "sweep", "--quiet",
+]  # fmt: skip
+BATCH = ["batch", "jobs.toml", "--out", "batch", "--quiet"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work beside copies of the samples, as the version that made them."""
+    shutil.copytree(SAMPLES, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    for module in ("sweep", "batch_folder"):
+        monkeypatch.setattr(f"digiclay.commands.{module}.__version__", "0.1.0")
+    return tmp_path
+
+
+def times(pattern: str) -> dict[Path, int]:
+    """Return when each file of a pattern was written, ns."""
+    return {path: path.stat().st_mtime_ns for path in Path().glob(pattern)}
+
+
+def numbers(table: Path) -> list[list[float]]:
+    """Return the rows of a sweep's table, of which no point has failed."""
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))[1:]
+    assert [row[-1] for row in rows] == [""] * len(rows)
+    return [[float(value) for value in row[:-1]] for row in rows]
+
+
+def test_an_older_sweep_that_is_done_is_shown_as_it_was() -> None:
+    before, known = times("sweep/points/*"), Path("sweep/sweep.csv").read_bytes()
+    Path("sweep/sweep.csv").unlink()
+    assert main(SWEEP) == 0
+    assert (times("sweep/points/*"), Path("sweep/sweep.csv").read_bytes()) == (before, known)
+    assert sorted(path.stem for path in Path("sweep").glob("*.png")) == ["height_error", "lag_mean", "rfd"]
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table(workers: str) -> None:
+    known = numbers(Path("sweep/sweep.csv"))
+    for index in range(1, 10, 2):  # the beds of four rows, which make one stack
+        Path(f"sweep/points/{index:06d}.json").unlink()
+    Path("sweep/sweep.csv").unlink()
+    before = times("sweep/points/*")
+    assert main([*SWEEP, "--workers", workers]) == 0
+    assert before.items() <= times("sweep/points/*").items()
+    for row, expected in zip(numbers(Path("sweep/sweep.csv")), known, strict=True):
+        assert row == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_an_older_batch_that_is_done_is_shown_and_none_of_its_jobs_is_done_again() -> None:
+    before = times("batch/runs/*/*")
+    Path("batch/index.html").unlink()
+    assert main(BATCH) == 0
+    assert times("batch/runs/*/*") == before
+    page = Path("batch/index.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 2
+    assert 'href="runs/my-soft/surface.stl"' in page
+
+
+def test_an_older_batch_that_was_stopped_goes_on(here: Path) -> None:
+    shutil.rmtree(here / "batch" / "runs" / "my-firm")
+    before = times("batch/runs/my-soft/*")
+    assert main(BATCH) == 0
+    assert times("batch/runs/my-soft/*") == before
+    assert {path.name for path in Path("batch/runs/my-firm").iterdir()} == {
+        path.name for path in Path("batch/runs/my-soft").iterdir()
+    }
