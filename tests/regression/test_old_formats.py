@@ -20,7 +20,12 @@ SAMPLES = Path(__file__).parents[1] / "samples"
 #: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
 #: all numbers are the same.
 ROUNDING = 1e-11
-WRITTEN = sorted(path for path in SAMPLES.glob("*/*.toml") if not path.name.startswith("by_hand"))
+WRITTEN = sorted(
+    path
+    for folder in ("scenes", "states")
+    for path in (SAMPLES / folder).glob("*.toml")
+    if not path.name.startswith("by_hand")
+)
 BY_HAND = sorted(SAMPLES.glob("scenes/by_hand_*.toml"))
 STATES = sorted(SAMPLES.glob("states/*.state"))
 TAKES = sorted(SAMPLES.glob("takes/*.take"))
