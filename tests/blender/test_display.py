@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core.accuracy import Errors
 from digiclay.core.errors import DigiclayError
 from digiclay.core.modes import Mode
-from digiclay.core.shadow import LiveErrors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
@@ -135,9 +135,9 @@ def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Runnin
     assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
 
 
-@pytest.mark.parametrize("errors", [None, LiveErrors(2.1e-6, 4.6e-4), LiveErrors(9e-12, 0.0)])
+@pytest.mark.parametrize("errors", [None, Errors(2.1e-6, 4.6e-4, 9e-4), Errors(9e-12, 0.0, 0.0)])
 def test_panel_and_overlay_say_the_same_of_the_error(
-    bed: Any, session: running.Running, errors: LiveErrors | None
+    bed: Any, session: running.Running, errors: Errors | None
 ) -> None:
     known = replace(session, errors=errors)
     told = views.told(bed, known, palettes.PALETTES["okabe_ito"])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.accuracy import estimated
+from digiclay.core.accuracy import estimate_errors
 from digiclay.core.metrics import summary
 from digiclay.core.scene import Scene
 from digiclay.core.scene_file import load
@@ -84,7 +84,7 @@ def test_an_older_scene_gives_the_same_metrics_file(name: str, tmp_path: Path) -
     stored = metrics_of(RUNS / name)
     if "height_error" in stored:
         assert result.history is not None
-        errors = estimated(scene, result.history)
+        errors = estimate_errors(scene, result.history)
         assert errors is not None
         result = result.with_errors(errors)
     save(result, tmp_path)

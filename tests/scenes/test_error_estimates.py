@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from digiclay.core.accuracy import SHARE, Errors, can_be_estimated, estimated
+from digiclay.core.accuracy import SHARE, Errors, estimate_errors, has_every_command
 from digiclay.core.scene import Scene
 from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import History, run
@@ -47,7 +47,7 @@ def judged(name: str, stepper: str, step: float) -> tuple[Errors, Errors]:
     scene = scene_of(name, stepper, step)
     history = run(scene).history
     assert history is not None
-    estimate = estimated(scene, history)
+    estimate = estimate_errors(scene, history)
     assert estimate is not None
     return estimate, _true(scene, history)
 
@@ -59,11 +59,11 @@ def _true(scene: Scene, history: History) -> Errors:
     the cases has 4e-11 m.
     """
     step = 1e-3 if scene.simulation.physics_step > 1e-3 else 5e-4
-    errors = estimated(
+    errors = estimate_errors(
         replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=step)), history
     )
     assert errors is not None
-    # `estimated` makes an estimate of the difference; here the difference is wanted.
+    # `estimate_errors` makes an estimate of the difference; here the difference is wanted.
     return Errors(errors.height / SHARE, errors.force / SHARE, errors.total_force / SHARE)
 
 
@@ -88,14 +88,14 @@ def test_the_estimate_is_at_most_twenty_times_the_true_error(
 def test_a_run_that_was_thinned_cannot_be_estimated() -> None:
     scene = scene_of("tap", "bernoulli", 1e-3)
     assert scene.recorder is not None
-    assert not can_be_estimated(replace(scene, recorder=replace(scene.recorder, every=2)))
+    assert not has_every_command(replace(scene, recorder=replace(scene.recorder, every=2)))
 
 
 def test_no_estimate_is_made_once_it_is_stopped() -> None:
     scene = scene_of("tap", "bernoulli", 1e-3)
     history = run(scene).history
     assert history is not None
-    assert estimated(scene, history, stopped=lambda: True) is None
+    assert estimate_errors(scene, history, stopped=lambda: True) is None
 
 
 def test_the_summary_tells_the_errors() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import pytest
-from digiclay.core.accuracy import estimated
+from digiclay.core.accuracy import estimate_errors
 from digiclay.core.scene import Scene
 from digiclay.core.session import Result, run
 from digiclay.core.stack.assembly import STACKED, structure
@@ -32,7 +32,7 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
     for found, one in zip(judged(scenes), scenes, strict=True):
         history = run(one).history
         assert history is not None
-        alone = estimated(one, history)
+        alone = estimate_errors(one, history)
         assert alone is not None
         assert alone.height > 1e-12  # there is something to estimate
         for name, value in asdict(alone).items():

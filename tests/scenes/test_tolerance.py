@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.accuracy import estimated
+from digiclay.core.accuracy import estimate_errors
 from digiclay.core.fluid import Fluid
 from digiclay.core.scene import Scene
 from digiclay.core.scene_file import Setting, find, load
@@ -38,7 +38,7 @@ def test_the_heights_keep_within_the_tolerance(name: str, tolerance: float) -> N
     assert history is not None
     # The reference, Richardson's extrapolation at half of 0.5 ms, is some 1e-10 m from exact.
     exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=5e-4))
-    errors = estimated(exact, history)
+    errors = estimate_errors(exact, history)
     assert errors is not None
     assert errors.height <= tolerance
 

@@ -49,7 +49,7 @@ LEVELS = (
     "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
     "jobs accuracy keeping live stack.assembly",
-    "shadow session take",
+    "session take",
     "metrics_trial sweep budget stack.session",
     "metrics_speed sweep_folder sweep_bundles",
 )

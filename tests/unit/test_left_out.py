@@ -75,7 +75,7 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with monkeypatch.context() as patched:
-        stop_before(patched, run_command, "estimated")
+        stop_before(patched, run_command, "estimate_errors")
         assert main(["run", "my.toml", "--out", OUT]) == 130
     out, err = capsys.readouterr()
     assert f"written to {OUT}" in out

@@ -1,4 +1,4 @@
-"""The wall's clock, the finger's way, the trace and the shadow of a live session."""
+"""The wall's clock, the finger's way, the trace and the error monitor of a live session."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from digiclay.core import accuracy
+from digiclay.core.accuracy import PAUSE, STRETCH, Errors
 from digiclay.core.assembly import assemble
 from digiclay.core.fingertip import LEVEL
 from digiclay.core.keeping import packed
@@ -13,7 +15,6 @@ from digiclay.core.live import Clock, due, lived, reachable, spent, way
 from digiclay.core.modes import Mode
 from digiclay.core.scene_table import resolve
 from digiclay.core.set_point import SetPoint
-from digiclay.core.shadow import PAUSE, STRETCH, LiveErrors, cast, cast_from, compared
 from digiclay.core.simulation import begin, periods
 from digiclay.core.trace import ROWS, begun, extended, felt, picked, row
 from digiclay.core.trajectory import along, between
@@ -195,32 +196,31 @@ def test_time_that_goes_back_takes_the_trace_along() -> None:
     assert extended(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
-def shadowed(count: int, finger: Floats, step: str = "1 ms") -> list[LiveErrors]:
-    """Return the errors a session's shadow finds."""
+def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
+    """Return the errors a session's monitor finds."""
     table = {"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}}
     scene = resolve(table)
-    system, shadow, found = assemble(scene), cast(scene), []
-    assert shadow is not None
+    system, monitor, found = assemble(scene), accuracy.start(scene), []
+    assert monitor is not None
     start = begin(system)
-    shadow = cast_from(shadow, start)
+    monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(lived(system, start, finger)):
-        shadow, errors = compared(shadow, state, finger[index : index + 2])
-        shadow = cast_from(shadow, state)
+        monitor, errors = accuracy.follow(monitor, state, finger[index : index + 2])
         found += [errors] if errors else []
     assert index == count - 1
     return found
 
 
-def test_a_shadow_comes_along_for_a_stretch_now_and_then() -> None:
+def test_a_monitor_follows_for_a_stretch_now_and_then() -> None:
     count = 2 * (STRETCH + PAUSE) + STRETCH
-    assert len(shadowed(count, way(pose(), pose(z=0.05), count))) == 3
+    assert len(monitored(count, way(pose(), pose(z=0.05), count))) == 3
 
 
-def test_the_shadow_finds_the_error_of_a_stretch() -> None:
+def test_the_monitor_finds_the_error_of_a_stretch() -> None:
     # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
     # before them changed, so it is no more than the right size that is asked for.
     finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    (found,) = shadowed(STRETCH, finger)
+    (found,) = monitored(STRETCH, finger)
     fine = assemble(
         resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "0.05 ms"}})
     )
@@ -236,24 +236,24 @@ def test_the_shadow_finds_the_error_of_a_stretch() -> None:
 
 def test_a_finer_step_has_smaller_errors() -> None:
     finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    coarse, fine = shadowed(STRETCH, finger)[0], shadowed(STRETCH, finger, "0.25 ms")[0]
+    coarse, fine = monitored(STRETCH, finger)[0], monitored(STRETCH, finger, "0.25 ms")[0]
     # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
     assert fine.height < coarse.height / 8
     assert fine.force < coarse.force / 8
 
 
-def test_a_shadow_leaves_the_session_alone() -> None:
+def test_a_monitor_leaves_the_session_alone() -> None:
     finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
     *_, alone = lived(SYSTEM, begin(SYSTEM), finger)
-    shadow, start = cast(SCENE), begin(SYSTEM)
-    assert shadow is not None
-    shadow = cast_from(shadow, start)
+    monitor, start = accuracy.start(SCENE), begin(SYSTEM)
+    assert monitor is not None
+    monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(lived(SYSTEM, start, finger)):
-        shadow, _ = compared(shadow, state, finger[index : index + 2])
+        monitor, _ = accuracy.follow(monitor, state, finger[index : index + 2])
     assert packed(SYSTEM, state) == packed(SYSTEM, alone)
     assert felt(SYSTEM, state) > 0.0
 
 
-def test_a_step_that_cannot_be_halved_casts_no_shadow() -> None:
+def test_a_step_that_cannot_be_halved_has_no_monitor() -> None:
     table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
-    assert cast(resolve(table)) is None
+    assert accuracy.start(resolve(table)) is None

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
-from digiclay.core.accuracy import estimated
+from digiclay.core.accuracy import estimate_errors
 from digiclay.core.errors import ParameterError
 from digiclay.core.metrics import METRICS
 from digiclay.core.scene_file import Setting, find, load
@@ -256,7 +256,7 @@ def test_errors_are_estimated_where_they_are_asked_for() -> None:
     scene = load(find("my.toml"), [Setting("control.force_gain", "5")])
     history = run(scene).history
     assert history is not None
-    expected = estimated(scene, history)
+    expected = estimate_errors(scene, history)
     assert expected is not None
     assert rows("out")[1]["height_error (m)"] == repr(expected.height)
     assert rows("out")[1]["total_force_error (N)"] == repr(expected.total_force)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.accuracy import SHARE, judging
+from ..core.accuracy import SHARE, reference_settings
 from ..core.assembly import assemble
 from ..core.control.replay import Replay
 from ..core.errors import DivergenceError
@@ -192,7 +192,7 @@ def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: flo
     error = float(np.abs(found - exact[every - 1 :: every]).max())
     if error <= WRONG:
         return Outcome(error)
-    judge = judging(scene(case, stepper, step, period).simulation)
+    judge = reference_settings(scene(case, stepper, step, period).simulation)
     with strict():
         finer = replayed(case, commands, judge.stepper, judge.physics_step, period)
     return Outcome(error, SHARE * float(np.abs(found - finer).max()))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.accuracy import can_be_estimated, estimated
+from ..core.accuracy import estimate_errors, has_every_command
 from ..core.errors import DigiclayError, OutputError, one_line
 from ..core.job_outputs import Outputs
 from ..core.jobs import JOB, SCENE, job_outputs
@@ -156,8 +156,8 @@ def _steps(
 
     def judge() -> bool:
         result = results[-1]
-        if result.history is not None and can_be_estimated(scene):
-            errors = estimated(scene, result.history, progress=telling("errors"), stopped=stopped)
+        if result.history is not None and has_every_command(scene):
+            errors = estimate_errors(scene, result.history, progress=telling("errors"), stopped=stopped)
             if errors is None:
                 return False
             results.append(result.with_errors(errors))

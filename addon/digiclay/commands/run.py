@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.accuracy import can_be_estimated, estimated
+from ..core.accuracy import estimate_errors, has_every_command
 from ..core.errors import OutputError, ParameterError, SceneError
 from ..core.run_folder import claimed
 from ..core.safe_names import name_of
@@ -131,10 +131,10 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
 
 def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
     """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
-    if result.history is None or result.incomplete or not can_be_estimated(result.scene):
+    if result.history is None or result.incomplete or not has_every_command(result.scene):
         return result, False
     with Bar(sys.stderr, "errors", result.scene.simulation.control_period) as bar:
-        errors = estimated(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
+        errors = estimate_errors(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
     return (result.with_errors(errors), False) if errors else (result, True)
 
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .accuracy import estimated
+from .accuracy import estimate_errors
 from .assembly import assemble
 from .errors import ParameterError
 from .recorder import Recorder
@@ -234,6 +234,6 @@ def _own_error(scene: Scene) -> float:
     recorded = replace(scene, recorder=Recorder())
     history = run(recorded).history
     assert history is not None
-    errors = estimated(recorded, history)
+    errors = estimate_errors(recorded, history)
     assert errors is not None
     return errors.height

@@ -14,7 +14,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from .accuracy import can_be_estimated, estimated
+from .accuracy import estimate_errors, has_every_command
 from .errors import DigiclayError, OutputError, ParameterError, SceneError, one_line
 from .metrics import METRICS
 from .quantity import nearest
@@ -134,8 +134,8 @@ def evaluate(
     """
     try:
         result = run(scene, stopped=stopped)
-        if errors and result.history is not None and not result.incomplete and can_be_estimated(scene):
-            found = estimated(scene, result.history, stopped=stopped)
+        if errors and result.history is not None and not result.incomplete and has_every_command(scene):
+            found = estimate_errors(scene, result.history, stopped=stopped)
             if found is None:
                 return None
             result = result.with_errors(found)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.accuracy import ErrorMonitor, Errors
 from ..core.live import Clock
 from ..core.scene import Scene
-from ..core.shadow import LiveErrors, Shadow
 from ..core.state import State
 from ..core.system import System
 from ..core.trace import Trace
@@ -128,9 +128,9 @@ class Running:
     clock : Clock
     trace : Trace
         Total force, set point and heights of picked pins in the last seconds.
-    shadow : Shadow or None
-    errors : LiveErrors or None
-        Latest estimate: height, m, and force, N.
+    monitor : ErrorMonitor or None
+    errors : Errors or None
+        Latest estimate.
     gestures : tuple of Gesture
         The last ones, oldest first.
     coming : Gesture or None
@@ -157,8 +157,8 @@ class Running:
     moment: int
     clock: Clock
     trace: Trace
-    shadow: Shadow | None
-    errors: LiveErrors | None = None
+    monitor: ErrorMonitor | None
+    errors: Errors | None = None
     paused: bool = False
     waits: str = ""
     stale: int = 0

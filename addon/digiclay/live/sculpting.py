@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import accuracy
 from ..core.assembly import assemble
-from ..core.errors import DigiclayError, StateError
+from ..core.errors import StateError
 from ..core.keeping import carried, packed, unpacked
 from ..core.live import Clock, due, lived, reachable, spent, way
 from ..core.scene import Scene
-from ..core.shadow import LiveErrors, Shadow, cast, cast_from, compared, lifted
 from ..core.simulation import begin
 from ..core.state import State
 from ..core.system import System
@@ -64,7 +64,7 @@ def begun(
     now = packed(system, state)
     running = Running(
         uid, name, scene, system, state, now, pose, moment + 1, Clock(),
-        trace_begun(system.period), cast(scene), coming=Gesture(state.period, now, pose),
+        trace_begun(system.period), accuracy.start(scene), coming=Gesture(state.period, now, pose),
     )  # fmt: skip
     return running, said
 
@@ -123,7 +123,7 @@ def stepped(running: Running) -> Running:
 
 def followed(running: Running, pose: Floats, count: int) -> Running:
     """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advanced`."""
-    system, state, shadow = running.system, running.state, running.shadow
+    system, state, monitor = running.system, running.state, running.monitor
     if running.strokes:
         running, path = take_path(running, count)
     else:
@@ -134,28 +134,20 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
     started = time.perf_counter()
     # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
     with np.errstate(over="ignore", invalid="ignore"):
-        shadow = shadow and cast_from(shadow, state)
+        monitor = monitor and accuracy.begin_stretch(monitor, state)
         for index, state in enumerate(lived(system, running.state, path)):
-            if shadow:
-                shadow, found = _compared(shadow, state, path[index : index + 2])
-                errors, shadow = found or errors, cast_from(shadow, state)
+            if monitor:
+                monitor, found = accuracy.follow(monitor, state, path[index : index + 2])
+                errors = found or errors
             if state.period % running.trace.every == 0:
                 rows.append(row(system, state, running.scene.set_point, running.trace.pins))
     clock = spent(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
-        running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, shadow=shadow,
+        running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, monitor=monitor,
         errors=errors, trace=extended(running.trace, rows),
         recording=running.recording and running.recording.extended(path[1:], running.moment),
     )  # fmt: skip
     return _touched(gone)
-
-
-def _compared(shadow: Shadow, state: State, part: Floats) -> tuple[Shadow, LiveErrors | None]:
-    """Compare with the shadow; one that diverges tells nothing and begins anew."""
-    try:
-        return compared(shadow, state, part)
-    except DigiclayError:
-        return lifted(shadow), None
 
 
 def _about_to_touch(running: Running, pose: Floats, count: int) -> Running:
@@ -199,7 +191,7 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
     free = felt(running.system, state) == 0.0
     return replace(
         running, state=state, kept=now, pose=reachable(pose, running.system.cell.actuator.stroke),
-        clock=running.clock.stopped(), shadow=running.shadow and lifted(running.shadow), stale=0,
+        clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
         recording=keep, gestures=gestures, moment=running.moment + 1, rested=0.0,
         coming=Gesture(state.period, now, pose) if free else None,
     )  # fmt: skip

@@ -162,7 +162,7 @@ def _growth(bed: Any, first: int, ticks: int) -> int:
     """Return by how much the least memory Python holds has risen from some ticks to as many later, bytes.
 
     The least, because what a session works with comes and goes: arrays for the cells it moves, the
-    shadow that estimates its error. What a leak holds never goes. The first of three rounds gives
+    monitor that estimates its error. What a leak holds never goes. The first of three rounds gives
     way to what was held before the counting began.
     """
     tracemalloc.start()

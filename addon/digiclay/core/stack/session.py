@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accuracy import SHARE, Errors, can_be_estimated, judging
+from ..accuracy import Errors, compare, has_every_command, reference_settings
 from ..assembly import assemble
 from ..errors import DigiclayError
 from ..metrics import METRICS
@@ -19,9 +19,10 @@ from ..session import Result, fits, judged
 from ..system import System
 from .assembly import put_together
 from .beds import Beds
+from .columns import Floats
 from .fingers import Fingers, Way, still_coming, way_over
 from .recording import StackRecording
-from .simulation import Stack, advance, begin, blow_up, broken, differences, follow, kept
+from .simulation import Stack, advance, begin, blow_up, broken, follow, kept
 from .traces import StackTraces, summary
 
 __all__ = ["judge_of", "judge_together", "run_together"]
@@ -158,7 +159,7 @@ def run_together(
 
 def judge_of(scene: Scene) -> Scene:
     """Return the scene that judges a run of another, see `accuracy`: its commands are the other's."""
-    return replace(scene, control=None, shape=None, simulation=judging(scene.simulation))
+    return replace(scene, control=None, shape=None, simulation=reference_settings(scene.simulation))
 
 
 class _Judges:
@@ -189,12 +190,17 @@ class _Judges:
         ways = [self._ways[run] for run in runs]
         self._coming = still_coming(self._coming, self._stack.systems, ways, self._state.period)
         self._state = follow(self._stack, self._state, self._coming, state)
-        np.maximum(self._largest, differences(self._state, state, self._stack.rows), out=self._largest)
+        np.maximum(self._largest, self._apart(state), out=self._largest)
+
+    def _apart(self, state: Beds) -> Floats:
+        """Return how far the beds are from those of the sessions, shape (3, b)."""
+        row, (own, other) = self._stack.rows.force, (self._state.gathered, state.gathered)
+        near = slice(own.near)
+        return compare(own.block[0], own.block[row, near], other.block[0], other.block[row, near])
 
     def of(self, place: int) -> Errors:
         """Return the estimated errors so far of the run at a place on the last axis."""
-        height, force, total = (SHARE * self._largest[:, place]).tolist()
-        return Errors(height, force, total)
+        return Errors.estimate(self._largest[:, place])
 
 
 def judge_together(
@@ -207,7 +213,7 @@ def judge_together(
     scenes : sequence of Scene
         Of one `assembly.structure`, with a recorder.
     errors : bool, optional
-        Estimate their errors too, where `accuracy.can_be_estimated`; those that judge them, see
+        Estimate their errors too, where `accuracy.has_every_command`; those that judge them, see
         `judge_of`, must be of one structure as well.
     stopped : callable, optional
         See `run_together`.
@@ -227,7 +233,7 @@ def judge_together(
     start, longest = next(playing), max(scenes[run].periods for run in systems)
     traces = StackTraces(recorder, start.stack.rows, start.state, start.runs, longest)
     judges = (
-        _Judges({run: scenes[run] for run in systems}) if errors and can_be_estimated(scenes[0]) else None
+        _Judges({run: scenes[run] for run in systems}) if errors and has_every_command(scenes[0]) else None
     )
     ways: dict[Any, Way] = {}
     for now in playing:

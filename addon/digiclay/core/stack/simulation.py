@@ -23,7 +23,7 @@ from .fingers import Fingers, undersides
 from .gathering import Gathering, taken_along, taking_part
 from .physics import Movement, Touches
 
-__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "differences", "follow", "kept"]
+__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "follow", "kept"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,19 +117,6 @@ def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> B
         _queue(held.block[rows.commands], leader.gathered.block[rows.command])
         _move(stack, held, coming, state.period)
     return Beds(state.period + 1, state.rows, state.modes, state.aged, held, None)
-
-
-def differences(state: Beds, leader: Beds, rows: Rows) -> Floats:
-    """Return how far beds are from those they follow, shape (3, b).
-
-    Largest differences over the cells of height, m, and force, N; and that of the total force, N.
-    """
-    held = state.gathered
-    away = np.abs(held.block[0] - leader.gathered.block[0])
-    force = held.block[rows.force, : held.near] - leader.gathered.block[rows.force, : held.near]
-    total = np.abs(np.add.reduce(force))
-    largest = (np.maximum.reduce(part, initial=0.0) for part in (away, np.abs(force)))
-    return np.stack([*largest, total])
 
 
 def _attend(stack: Stack, state: Beds) -> tuple[Any, Disc]:
