@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.accuracy import estimate_errors
-from digiclay.core.metrics import summary
+from digiclay.core.metrics import compute_metrics
 from digiclay.core.scene import Scene
 from digiclay.core.scene_file import load
 from digiclay.core.session import run, save
@@ -60,7 +60,7 @@ def others(metrics: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("name", RECORDED)
 def test_an_older_history_has_the_metrics_that_were_stored(name: str) -> None:
     stored = metrics_of(RUNS / name)
-    computed = summary(history_of(name), scene_of(name).set_point)
+    computed = compute_metrics(history_of(name), scene_of(name).set_point)
     stored = {key: stored[key] for key in computed}
     assert others(computed) == others(stored)
     assert numbers(computed) == pytest.approx(numbers(stored), rel=1e-10)

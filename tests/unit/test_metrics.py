@@ -11,14 +11,14 @@ from digiclay.core.layout import Layout, grid
 from digiclay.core.metrics import (
     METRICS,
     cell_area,
+    compute_metrics,
     contact_loss_share,
     first_touch,
     lag,
     rfd,
-    summary,
     weights,
 )
-from digiclay.core.metrics_trace import trace_of
+from digiclay.core.metrics_path import sum_cells
 from digiclay.core.modes import Mode
 from digiclay.core.set_point import SetPoint
 
@@ -66,7 +66,7 @@ def test_the_rfd_leaves_out_the_time_without_contact():
 def test_the_rfd_of_the_whole_session_counts_the_time_without_contact():
     # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
     total = np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)
-    found = summary(history(total), WHOLE)
+    found = compute_metrics(history(total), WHOLE)
     assert found["rfd_session"] == pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3)
     assert found["rfd"] == 0.0
 
@@ -82,8 +82,8 @@ def test_the_rfd_weighs_rows_by_their_time():
 def test_the_rfd_while_shaping_leaves_out_touching_down():
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
     case["mode"][TIME < 5.0] = Mode.SPRING
-    assert summary(case, WHOLE)["rfd_shaping"] == 0.0
-    assert summary(case, WHOLE)["rfd"] > 0.1
+    assert compute_metrics(case, WHOLE)["rfd_shaping"] == 0.0
+    assert compute_metrics(case, WHOLE)["rfd"] > 0.1
 
 
 def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
@@ -91,21 +91,21 @@ def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
     early = TIME < 5.0
     case = history(np.where(early, 0.36, 0.16))
     case["mode"][~early, :5] = Mode.SPRING
-    found = summary(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["rfd"] == found["rfd_shaping"] == pytest.approx(0.0, abs=ROUNDING)
     # The middle row, 1 of 2000 intervals, belongs to the second half.
     assert found["set_point"] == pytest.approx(0.5 * (0.36 + 0.16), abs=1e-4)
     case["total_force"] = case["total_force"] + 0.05
-    assert summary(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
+    assert compute_metrics(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
 
 
 def test_rows_in_which_no_cell_follows_ask_for_nothing_of_a_method_that_asks_each_cell():
     case = history(np.where(TIME < 5.0, 0.2, 0.36))
     case["mode"][TIME < 5.0] = Mode.SPRING
-    found = summary(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["rfd"] == found["rfd_session"] == pytest.approx(0.0, abs=ROUNDING)
     case["mode"][:] = Mode.SPRING
-    found = summary(case, EACH)
+    found = compute_metrics(case, EACH)
     names = ("set_point", "rfd", "rfd_session", "force_overshoot", "settling_time")
     assert [found[name] for name in names] == [None] * 5
 
@@ -115,14 +115,14 @@ def test_the_first_touch_of_a_method_that_asks_each_cell_is_judged_by_what_it_as
     total = np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0))))
     case = history(total)
     case["mode"][TIME < 2.0] = Mode.SPRING
-    found = summary(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
     assert found["settling_time"] == pytest.approx(1.0 + np.log(2.5), abs=0.011)
 
 
 def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
     case = history(np.full(2001, 0.4))
-    with_one, without = summary(case, WHOLE), summary(case, None)
+    with_one, without = compute_metrics(case, WHOLE), compute_metrics(case, None)
     assert {name for name in METRICS if with_one[name] is not None and without[name] is None} == {
         "set_point", "rfd", "rfd_shaping", "rfd_session", "force_overshoot", "settling_time"
     }  # fmt: skip
@@ -132,7 +132,7 @@ def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
     case = history(np.array([0.4, 0.4, 0.0]), np.arange(3.0))
     case["mode"][:] = Mode.REST
     case["mode"][:, 4] = Mode.FORCE_FOLLOW, Mode.SPRING, Mode.FORCE_FOLLOW
-    np.testing.assert_array_equal(trace_of(case).shaping, [True, False, False])
+    np.testing.assert_array_equal(sum_cells(case).shaping, [True, False, False])
 
 
 def test_the_weights_add_up_to_the_duration():
@@ -151,7 +151,7 @@ def test_lifting_at_the_end_is_no_contact_loss():
 
 
 def test_the_contact_share_is_the_time_in_contact():
-    found = summary(history(np.where(TIME < 2.5, 0.4, 0.0)), WHOLE)
+    found = compute_metrics(history(np.where(TIME < 2.5, 0.4, 0.0)), WHOLE)
     assert found["contact_share"] == pytest.approx(0.25, abs=5e-4)  # one row of 2001
 
 
@@ -160,17 +160,19 @@ def test_the_lag_is_the_distance_from_finger_to_force_centroid():
     fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
     force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
     # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
-    np.testing.assert_allclose(lag(place, force, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
+    case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
+    sums = sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
+    np.testing.assert_allclose(lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
 
 
 def test_the_summary_finds_the_lag_of_a_finger_beside_the_force():
-    found = summary(history(np.full(2001, 0.4)), WHOLE)
+    found = compute_metrics(history(np.full(2001, 0.4)), WHOLE)
     assert found["lag_mean"] == pytest.approx(0.002, rel=ROUNDING)
     assert found["lag_max"] == pytest.approx(0.002, rel=ROUNDING)
 
 
 def test_the_summary_tells_extremes_of_forces_and_heights():
-    found = summary(history(np.linspace(0.0, 0.5, 2001)), WHOLE)
+    found = compute_metrics(history(np.linspace(0.0, 0.5, 2001)), WHOLE)
     assert found["max_cell_force"] == found["max_total_force"] == 0.5
     assert (found["lowest"], found["highest"]) == (0.039, 0.043)
     assert found["height_range"] == pytest.approx(0.004, rel=ROUNDING)
@@ -178,7 +180,7 @@ def test_the_summary_tells_extremes_of_forces_and_heights():
 
 def test_volumes_above_and_below_the_initial_surface_are_told_apart():
     # Pins raised by 3 and 1 mm and sunk by 1 mm, 9 mm² each.
-    found = summary(history(np.full(2001, 0.4)), WHOLE)
+    found = compute_metrics(history(np.full(2001, 0.4)), WHOLE)
     assert found["raised_volume"] == pytest.approx(4e-3 * 9e-6, rel=1e-9)  # 0.043 - 0.04 loses three digits
     assert found["sunk_volume"] == pytest.approx(1e-3 * 9e-6, rel=1e-9)
 
@@ -198,7 +200,7 @@ def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimetres):
 
 
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():
-    found = summary(history(np.zeros(2001)), WHOLE)
+    found = compute_metrics(history(np.zeros(2001)), WHOLE)
     nothing = {name for name, value in found.items() if value is None}
     assert nothing == {
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
@@ -215,18 +217,20 @@ def test_the_first_touch_ends_where_contact_does_and_begins_a_row_before_it():
 
 def test_the_overshoot_of_the_first_touch_is_its_peak_over_the_set_point():
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
-    assert summary(history(total), WHOLE)["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
+    assert compute_metrics(history(total), WHOLE)["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
 
 
 def test_the_first_touch_settles_when_its_force_comes_within_a_tenth_of_the_set_point():
     # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
-    assert summary(history(total), WHOLE)["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
+    assert compute_metrics(history(total), WHOLE)["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
 
 
 def test_the_force_deviation_leaves_out_a_constant_offset():
     total = 0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)
-    assert summary(history(total), WHOLE)["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
+    assert compute_metrics(history(total), WHOLE)["force_deviation"] == pytest.approx(
+        0.1 / np.sqrt(2.0), rel=1e-6
+    )
 
 
 def test_a_single_pin_has_no_area_to_form_a_volume_over():
@@ -235,11 +239,11 @@ def test_a_single_pin_has_no_area_to_form_a_volume_over():
         for name, value in history(np.full(2001, 0.4)).items()
     }
     case["position"] = np.zeros((1, 2))
-    assert summary(case, WHOLE)["raised_volume"] is None
+    assert compute_metrics(case, WHOLE)["raised_volume"] is None
 
 
 def test_a_history_of_one_row_is_summed_up():
-    found = summary(history(np.array([0.5]), np.array([0.0])), WHOLE)
+    found = compute_metrics(history(np.array([0.5]), np.array([0.0])), WHOLE)
     assert found["rfd"] == pytest.approx(0.1, rel=1e-10)
     assert found["duration"] == 0.0
 
@@ -247,7 +251,7 @@ def test_a_history_of_one_row_is_summed_up():
 def test_numbers_that_are_not_finite_become_none():
     case = history(np.full(2001, 0.4))
     case["height"][-1, 0] = np.nan
-    assert summary(case, WHOLE)["height_range"] is None
+    assert compute_metrics(case, WHOLE)["height_range"] is None
 
 
 def test_a_history_without_rows_is_refused():
@@ -255,11 +259,11 @@ def test_a_history_without_rows_is_refused():
         name: value if name == "position" else value[:0] for name, value in history(np.zeros(2001)).items()
     }
     with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
-        summary(case, WHOLE)
+        compute_metrics(case, WHOLE)
 
 
 def test_the_summary_is_json_and_every_key_has_a_unit_and_a_meaning():
-    found = summary(history(np.full(2001, 0.4)), WHOLE)
+    found = compute_metrics(history(np.full(2001, 0.4)), WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert list(found) == list(METRICS)
     assert all(unit and meaning for unit, meaning in METRICS.values())

@@ -1,10 +1,11 @@
-"""What the finger leaves behind over its path, on surfaces made by hand."""
+"""Sums over the cells of two, and what the finger leaves behind over its path on surfaces made by hand."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.metrics_path import ridge_errors, surface_under
+from digiclay.core.metrics_path import ridge_errors, sum_cells, surface_under
+from digiclay.core.modes import Mode
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -68,10 +69,43 @@ def test_many_rows_are_looked_at_in_parts_alike() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
+#: Two rows of two cells, at (1, 2) and (4, 6) mm.
+HISTORY = {
+    "height": np.array([[50e-3, 52e-3], [51e-3, 53e-3]]),
+    "force": np.array([[0.0, 0.0], [0.3, 0.1]]),
+    "mode": np.array([[Mode.REST, Mode.SPRING], [Mode.FORCE_FOLLOW, Mode.REST]]),
+    "total_force": np.array([0.0, 0.4]),
+    "position": np.array([[1e-3, 2e-3], [4e-3, 6e-3]]),
+}
+SUMS = sum_cells(HISTORY)
+
+
+def test_the_sums_have_the_moments_of_the_forces_about_both_axes() -> None:
+    # 0.3 N at 1 mm and 0.1 N at 4 mm; 0.3 N at 2 mm and 0.1 N at 6 mm.
+    assert [SUMS.x[1], SUMS.y[1]] == pytest.approx([0.7e-3, 1.2e-3], rel=1e-12)  # rounding
+
+
+def test_the_sums_have_the_sum_of_force_times_height() -> None:
+    assert SUMS.height == pytest.approx([0.0, 0.3 * 51e-3 + 0.1 * 53e-3], rel=1e-12)  # rounding
+
+
+def test_the_sums_have_the_strongest_force_of_each_row() -> None:
+    np.testing.assert_array_equal(SUMS.strongest, [0.0, 0.3])
+
+
+def test_the_sums_count_the_cells_that_follow_the_force() -> None:
+    np.testing.assert_array_equal(SUMS.following, [0, 1])
+
+
+def test_the_sums_have_the_first_and_the_last_heights() -> None:
+    np.testing.assert_array_equal([SUMS.first, SUMS.last], [[50e-3, 52e-3], [51e-3, 53e-3]])
+
+
 def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
-    total, height = np.array([0.3 + 0.1]), np.array([0.3 * 52e-3 + 0.1 * 56e-3])
-    assert surface_under(total, height, TIP[:1]) * 1e3 == pytest.approx([3.0], rel=1e-9)
+    # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
+    assert surface_under(SUMS, TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
 
 
 def test_rows_without_contact_have_no_surface_under_the_finger() -> None:
-    assert surface_under(np.zeros(2), np.zeros(2), TIP[:2]).size == 0
+    nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
+    assert surface_under(sum_cells(nothing), TIP[:2]).size == 0

@@ -12,8 +12,8 @@ from typing import Any
 from ..core.errors import ParameterError, SceneError
 from ..core.finger_range import beyond_words, largest_indentation
 from ..core.methods import METHODS
+from ..core.metrics_path import sum_cells
 from ..core.metrics_speed import Criterion, Drag, Lift, largest_speed
-from ..core.metrics_trace import trace_of
 from ..core.metrics_trial import TRIAL_METRICS, Trial, trial
 from ..core.quantity import nearest
 from ..core.run_folder import may_be_written, written
@@ -94,7 +94,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         for method, scene in scenes.items():
             done = _run(scene, method, quiet=arguments.quiet)
             found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
-            wanted = asked(scene.set_point, trace_of(done.history).following)
+            wanted = asked(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
             beyond[method] = _beyond(done)
         units = {name: unit for name, (unit, _) in {**TRIAL_METRICS, **SPEEDS}.items()}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.finished import last_touch, read, row_at
-from ..core.metrics import summary
+from ..core.metrics import compute_metrics
 from ..core.run_folder import claimed_files
 from ..core.scene import Scene
 from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
@@ -192,7 +192,7 @@ def draw_film(
     from ..pictures.film import film
 
     told = {"progress": progress, "stopped": stopped}
-    wanted = summary(history, scene.set_point)["set_point"]
+    wanted = compute_metrics(history, scene.set_point)["set_point"]
     return film(history, out, looks, set_point=wanted, **told, **sizes(scene))
 
 

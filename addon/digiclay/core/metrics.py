@@ -15,22 +15,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import ParameterError
 from .metrics_force import contact_loss_share, first_touch, rfd, touchdown
-from .metrics_path import in_contact, lag, lag_of_sums, ridge_errors, surface_under
+from .metrics_path import CellSums, in_contact, lag, ridge_errors, sum_cells, surface_under
 from .metrics_signal import deviation, mean, weights
-from .metrics_trace import Trace, trace_of
 from .set_point import SetPoint, asked
 from .surface import grid_shape
 
 __all__ = [
     "METRICS",
     "cell_area",
-    "composed",
+    "compute_metrics",
+    "compute_metrics_from_sums",
     "contact_loss_share",
     "first_touch",
     "in_contact",
     "lag",
     "rfd",
-    "summary",
     "weights",
 ]
 
@@ -39,7 +38,7 @@ Floats = NDArray[np.float64]
 #: All cells.
 ALL = slice(None)
 
-#: Every key of `summary`: its unit and its meaning.
+#: Every key of `compute_metrics`: its unit and its meaning.
 METRICS: dict[str, tuple[str, str]] = {
     "duration": ("s", "simulated time from the first row to the last"),
     "set_point": ("N", "total force asked for; one that changes from row to row: its mean while shaping"),
@@ -94,7 +93,7 @@ def cell_area(position: ArrayLike) -> float | None:
     return area or None
 
 
-def summary(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
+def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
     """Return every metric of a session.
 
     Parameters
@@ -119,22 +118,22 @@ def summary(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dic
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")
     fingertip, position = (np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position"))
-    return composed(trace_of(history), time, fingertip, position, set_point)
+    return compute_metrics_from_sums(sum_cells(history), time, fingertip, position, set_point)
 
 
-def composed(
-    trace: Trace,
+def compute_metrics_from_sums(
+    sums: CellSums,
     time: Floats,
     fingertip: Floats,
     position: Floats,
     set_point: SetPoint | None,
     near: NDArray[np.intp] | slice = ALL,
 ) -> dict[str, float | None]:
-    """Return every metric of the session a trace is of.
+    """Return every metric of the session the sums are of.
 
     Parameters
     ----------
-    trace : Trace
+    sums : CellSums
         Of t rows of n cells.
     time : ndarray, shape (t,)
         s.
@@ -151,17 +150,17 @@ def composed(
     Returns
     -------
     dict
-        See `summary`.
+        See `compute_metrics`.
     """
-    total, weight, felt, rows = trace.total, weights(time), trace.touching, trace.shaping
+    total, weight, felt, rows = sums.total, weights(time), sums.touching, sums.shaping
     # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
-    behind = np.round(lag_of_sums(total, trace.x, trace.y, fingertip), 12)
-    above = surface_under(total, trace.height, fingertip)
-    ridge = ridge_errors(position[near], trace.last[near], fingertip, rows)
+    behind = np.round(lag(sums, fingertip), 12)
+    above = surface_under(sums, fingertip)
+    ridge = ridge_errors(position[near], sums.last[near], fingertip, rows)
     each = np.ones(len(ridge))
-    wanted = asked(set_point, trace.following)
+    wanted = asked(set_point, sums.following)
     beyond, settled = touchdown(time, total, wanted)
-    formed, area = trace.last - trace.first, cell_area(position)
+    formed, area = sums.last - sums.first, cell_area(position)
     found: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
         "set_point": _typical(set_point, wanted[rows], weight[rows]),
@@ -179,11 +178,11 @@ def composed(
         "ridge_offset": mean(ridge, each),
         "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
         "ridge_unevenness": deviation(ridge, each),
-        "max_cell_force": float(trace.strongest.max()),
+        "max_cell_force": float(sums.strongest.max()),
         "max_total_force": float(total.max()),
-        "lowest": float(trace.last.min()),
-        "highest": float(trace.last.max()),
-        "height_range": float(np.ptp(trace.last)),
+        "lowest": float(sums.last.min()),
+        "highest": float(sums.last.max()),
+        "height_range": float(np.ptp(sums.last)),
         "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
         "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
     }

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AWAY", "in_contact", "lag", "lag_of_sums", "ridge_errors", "surface_under"]
+from .modes import Mode
+
+__all__ = ["AWAY", "CellSums", "in_contact", "lag", "ridge_errors", "sum_cells", "surface_under"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -23,7 +28,64 @@ def in_contact(total_force: ArrayLike) -> Rows:
     return touching
 
 
-def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
+@dataclass(frozen=True, eq=False)
+class CellSums:
+    """What the metrics take of t rows of n cells: sums over the cells, and the first and last heights.
+
+    Attributes
+    ----------
+    total : ndarray (t,)
+        Total force, N.
+    x, y, height : ndarray (t,)
+        Sums over the cells of the force times place, and times height, N m.
+    strongest : ndarray (t,)
+        Largest force on a cell, N.
+    following : ndarray of int (t,)
+        How many cells follow the force.
+    first, last : ndarray (n,)
+        Heights in the first and in the last row, m.
+    """
+
+    total: Floats
+    x: Floats
+    y: Floats
+    height: Floats
+    strongest: Floats
+    following: NDArray[np.intp]
+    first: Floats
+    last: Floats
+
+    @property
+    def touching(self) -> Rows:
+        """Which rows have contact, shape (t,)."""
+        return in_contact(self.total)
+
+    @property
+    def shaping(self) -> Rows:
+        """Which rows shape the clay, shape (t,): in contact, and a cell follows the force."""
+        rows: Rows = self.touching & (self.following > 0)
+        return rows
+
+
+def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
+    """Return the sums over the cells of a history.
+
+    Parameters
+    ----------
+    history : mapping
+        The arrays of ``history.npz``, of at least one row: height, force, mode, total_force and
+        position.
+    """
+    total, height, force, position = (
+        np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
+    )
+    x, y = (force @ position).T
+    lifted = np.einsum("tn,tn->t", force, height)
+    following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
+    return CellSums(total, x, y, lifted, force.max(axis=1), following, height[0], height[-1])
+
+
+def lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return how far the blister is behind the finger, in the rows in contact.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
@@ -31,10 +93,8 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    position : array_like, shape (n, 2)
-        m.
-    force : array_like, shape (t, n)
-        N.
+    sums : CellSums
+        Of t rows.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
 
@@ -43,28 +103,21 @@ def lag(position: ArrayLike, force: ArrayLike, fingertip: ArrayLike) -> Floats:
     ndarray, shape (rows in contact,)
         m.
     """
-    pressed = np.asarray(force, dtype=np.float64)
-    x, y = (pressed @ np.asarray(position, dtype=np.float64)).T
-    return lag_of_sums(pressed.sum(axis=1), x, y, fingertip)
-
-
-def lag_of_sums(total: Floats, x: Floats, y: Floats, fingertip: ArrayLike) -> Floats:
-    """Return the `lag` from sums over the cells (t,): of the force, N, and of the force times place, N m."""
-    rows = in_contact(total)
-    centroid = np.column_stack([x, y])[rows] / total[rows, None]
+    rows = sums.touching
+    centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
     distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
     return distance
 
 
-def surface_under(total: Floats, height: Floats, fingertip: ArrayLike) -> Floats:
+def surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
 
     Parameters
     ----------
-    total, height : ndarray, shape (t,)
-        Sums over the cells of the force, N, and of the force times height, N m.
+    sums : CellSums
+        Of t rows.
     fingertip : array_like, shape (t, 7)
         Lowest point, m, and quaternion.
 
@@ -73,8 +126,8 @@ def surface_under(total: Floats, height: Floats, fingertip: ArrayLike) -> Floats
     ndarray, shape (rows in contact,)
         m.
     """
-    rows = in_contact(total)
-    above: Floats = height[rows] / total[rows] - np.asarray(fingertip, dtype=np.float64)[rows, 2]
+    rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
+    above: Floats = sums.height[rows] / sums.total[rows] - tip[rows, 2]
     return above
 
 

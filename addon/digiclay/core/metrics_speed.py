@@ -9,8 +9,7 @@ import numpy as np
 
 from .errors import ParameterError
 from .metrics_force import rfd
-from .metrics_path import lag
-from .metrics_trace import trace_of
+from .metrics_path import lag, sum_cells
 from .metrics_trial import Trial, trial
 from .quantity import Parameters, quantity
 from .scene import Path, Scene, Waypoint
@@ -133,9 +132,8 @@ def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Tri
     shorter = replace(scene.simulation, duration=0.0)
     done = trial(replace(scene, trajectory=path, simulation=shorter))
     part = done.between(start, end)
-    total, lost = part["total_force"], done.loss_times
-    behind = lag(part["position"], part["force"], part["fingertip"])
-    wanted = asked(scene.set_point, trace_of(part).following)
+    sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
+    behind, wanted = lag(sums, part["fingertip"]), asked(scene.set_point, sums.following)
     deviates = rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
     losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
     judged = Follows(

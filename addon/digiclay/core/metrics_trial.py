@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .metrics import METRICS, summary
+from .metrics import METRICS, compute_metrics
 from .recorder import Recorder
 from .scene import Scene
 from .session import run
@@ -56,7 +56,7 @@ class Trial:
         """The keys of `TRIAL_METRICS`; SI. None where there is nothing to compute from."""
         simulated = float(self.history["time"][-1])
         return {
-            **summary(self.history, self.scene.set_point),
+            **compute_metrics(self.history, self.scene.set_point),
             "losses": self.losses,
             "run_time": self.run_time,
             "real_time_factor": simulated / self.run_time,

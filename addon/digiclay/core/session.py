@@ -17,7 +17,7 @@ from .accuracy import Errors
 from .assembly import assemble
 from .errors import OutputError
 from .finger_range import beyond_words, largest_indentation
-from .metrics import METRICS, summary
+from .metrics import METRICS, compute_metrics
 from .recorder import Recording, available_memory, refuse_what_cannot_fit, write
 from .scene import Scene
 from .scene_table import ABSENT, text
@@ -221,7 +221,7 @@ def _metrics(
     }
     units = {"simulated": "s", "run_time": "s", "real_time_factor": "1"}
     if history is not None:
-        judged = summary(history, scene.set_point)
+        judged = compute_metrics(history, scene.set_point)
         known |= judged
         units |= {name: METRICS[name][0] for name in judged}
         if scene.fingertip is not None:

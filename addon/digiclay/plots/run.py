@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.metrics import in_contact, summary
-from ..core.metrics_trace import trace_of
+from ..core.metrics import compute_metrics, in_contact
+from ..core.metrics_path import sum_cells
 from ..core.set_point import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
@@ -104,7 +104,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         for axes in (heights, force):
             legend_above(axes)
             axes.yaxis.set_label_coords(-0.075, 0.5)
-        _write_figures(figures, summary(history, set_point))
+        _write_figures(figures, compute_metrics(history, set_point))
     return figure
 
 
@@ -112,7 +112,7 @@ def _draw_set_point(axes: Axes, history: History, set_point: SetPoint | None) ->
     """Draw the total force asked for over time, dashed; one per cell is none while no cell follows."""
     if set_point is None:
         return
-    wanted = set_point.total(trace_of(history).following)
+    wanted = set_point.total(sum_cells(history).following)
     per_cell = " a cell" if set_point.per_cell else ""
     axes.plot(
         array(history, "time"), wanted, color=LINES[1], linewidth=1.3, linestyle=(0, (5, 3)),

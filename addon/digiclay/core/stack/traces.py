@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..layout import Grid
-from ..metrics import composed
-from ..metrics_trace import Trace
+from ..metrics import compute_metrics_from_sums
+from ..metrics_path import CellSums
 from ..modes import Mode
 from ..recorder import Recorder
 from ..set_point import SetPoint
@@ -25,7 +25,7 @@ FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
 
 
 @dataclass(frozen=True, eq=False)
-class StackTrace(Trace):
+class StackTrace(CellSums):
     """The trace of a run of a stack, and when its rows are.
 
     Attributes
@@ -95,7 +95,7 @@ class StackTraces:
 
 
 def _felt(held: Gathered, rows: Rows) -> Floats:
-    """Return the numbers of a row of a `Trace`, total to strongest, shape (5, b)."""
+    """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
     force = held.block[rows.force, : held.near]
     felt = np.empty((5, force.shape[1]))
     np.add.reduce(force, out=felt[0])
@@ -105,16 +105,16 @@ def _felt(held: Gathered, rows: Rows) -> Floats:
     return felt
 
 
-def summary(trace: Trace, way: Way, grid: Grid, set_point: SetPoint | None) -> dict[str, float | None]:
-    """Return what `metrics.summary` makes of the history that a trace is of.
+def summary(trace: CellSums, way: Way, grid: Grid, set_point: SetPoint | None) -> dict[str, float | None]:
+    """Return what `metrics.compute_metrics` makes of the history that a trace is of.
 
     Parameters
     ----------
-    trace : Trace
+    trace : CellSums
     way : Way
         The finger's, at the times of the trace's rows.
     grid : Grid
     set_point : SetPoint or None
         Force asked for.
     """
-    return composed(trace, way.time, way.fingertip, grid.positions, set_point, way.cells)
+    return compute_metrics_from_sums(trace, way.time, way.fingertip, grid.positions, set_point, way.cells)
