@@ -29,7 +29,7 @@ LEVELS = (
     "metrics_path sweep_axis",
     "mesh_in_placed mesh_in_checks mesh_in_obj whole_files "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods run_folder metrics_force control.servo control.blister "
+    "formed methods run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
     "export mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane metrics "
     "series_folder "
@@ -49,7 +49,7 @@ LEVELS = (
     "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
     "assembly form job_outputs",
     "jobs accuracy keeping live stack.assembly",
-    "session take",
+    "shadow session take",
     "metrics_trial sweep budget stack.session",
     "metrics_speed sweep_folder sweep_bundles",
 )
