@@ -55,7 +55,7 @@ TERMS = (
     ("loss", "instant at which a control method ends the tracking of the fingertip"),
     (
         "mode",
-        "label of a cell's control: rest, hold, edge, blister, virtual spring, force follow, critical, frozen",
+        "a cell's control: rest, hold, edge, blister, virtual spring, force follow, critical, frozen",
     ),
     ("state", "all quantities that vary in time, at one instant"),
     ("control period", "time between two commands"),
