@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from .commands.exit_codes import STOPPED, WRONG
 from .commands.stop import undisturbed
 from .core.errors import DigiclayError, one_line
 
-__all__ = ["console", "main"]
+__all__ = ["carry_out", "console", "main", "run_as_program"]
 
 #: What tells the libraries behind numpy's products on how many cores to work.
 CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -28,8 +28,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv : sequence of str, optional
         The arguments; by default those of the process.
     """
+    return carry_out(lambda: _parsed(argv))
+
+
+def carry_out(parse: Callable[[], Any]) -> int:
+    """Read arguments and carry out the command they name; return its exit code, as `main` does."""
     try:
-        arguments = _parsed(argv)
+        arguments = parse()
         code: int = arguments.carry_out(arguments)
     except SystemExit as done:  # --help, --version, or arguments that make no sense
         return done.code if isinstance(done.code, int) else 0
@@ -62,7 +67,12 @@ def _wrong(said: object) -> int:
 
 
 def console() -> NoReturn:
-    """Run as a program.
+    """Run `main` as a program."""
+    run_as_program(main)
+
+
+def run_as_program(command: Callable[[], int]) -> NoReturn:
+    """Run a command and leave with its exit code.
 
     On one core, unless the environment says otherwise: a session's products are small, and a second
     thread would spend its time waiting for the next, which counts as well.
@@ -72,7 +82,7 @@ def console() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may not know µ
     try:
-        code = main()
+        code = command()
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.commands.benchmark_stiff_runs import strict
 from digiclay.core.actuator import Actuator
 from digiclay.core.assembly import assemble
 from digiclay.core.contact import Contact
@@ -22,6 +21,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from benchmarks.stiff_runs import strict
 from tests.assemble import Record, make_system, one_cell, path, record, sample, scripted, under
 
 Floats = NDArray[np.float64]

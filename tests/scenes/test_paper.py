@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.paper.results import WAYS
+
+from digiclay_paper.results import WAYS
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from digiclay.commands.benchmark_calls import period_calls
-from digiclay.commands.benchmark_scale import bytes_of, gathered_cells, scene
 from digiclay.core.assembly import assemble
 from digiclay.core.simulation import begin
+
+from benchmarks.bed_size import bytes_of, gathered_cells, scene
+from benchmarks.numpy_calls import period_calls
 
 #: Sides of the beds: 625 and 40,401 pins; both have a pin in the middle.
 SMALL, LARGE = 25, 201

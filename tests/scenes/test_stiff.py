@@ -7,10 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.commands import benchmark_stiff_runs as stiff
-from digiclay.commands.benchmark_cases import CASES, EASY, HOLD
 from digiclay.core.errors import DivergenceError
 from numpy.typing import NDArray
+
+from benchmarks import stiff_runs as stiff
+from benchmarks.stiff_cases import CASES, EASY, HOLD
 
 #: Numpy calls a period may cost more than the easy case.
 MOST = 10.0

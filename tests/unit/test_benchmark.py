@@ -11,19 +11,19 @@ from types import FrameType
 
 import numpy as np
 import pytest
-from digiclay.cli import main
-from digiclay.commands import benchmark_peers as peers
-from digiclay.commands.benchmark_calls import Counted, Ledger, floor, methods_noted, period_calls
-from digiclay.commands.benchmark_loop import loop
-from digiclay.commands.benchmark_problems import PROBLEMS, problem, solved
-from digiclay.commands.benchmark_report import kept, made_with
-from digiclay.commands.benchmark_terms import LONGER, TERMS, without
-from digiclay.commands.benchmark_work import Work, best_ratio
 from digiclay.commands.tables import table
 from digiclay.core.assembly import assemble
 from digiclay.core.errors import OutputError
 from digiclay.core.simulation import begin, periods
 
+from benchmarks import peers as peers
+from benchmarks.__main__ import main
+from benchmarks.numpy_calls import Counted, Ledger, floor, methods_noted, period_calls
+from benchmarks.problems import PROBLEMS, problem, solved
+from benchmarks.python_loop import loop
+from benchmarks.report import kept, made_with
+from benchmarks.terms import LONGER, TERMS, without
+from benchmarks.work_precision import Work, best_ratio
 from tests.assemble import sample
 
 ONE = "one cell, load step"
@@ -183,13 +183,13 @@ def test_the_longer_step_is_the_control_period() -> None:
 
 
 def test_terms_gives_a_line_for_every_term(capsys: pytest.CaptureFixture[str]) -> None:
-    code = main(["benchmark", "terms", "tap", "--quick", "--quiet"])
+    code = main(["terms", "tap", "--quick", "--quiet"])
     out = capsys.readouterr().out
     named = ("the full scene", "without conduit", "without relaxation", "all of these")
     assert (code, [name for name in named if name not in out]) == (0, [])
 
 
-@pytest.mark.parametrize("kind", ["stiff", "precision", "scale", "terms"])
+@pytest.mark.parametrize("kind", ["session", "stiff", "precision", "scale", "terms"])
 def test_every_benchmark_shows_an_example(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out = main(["benchmark", kind, "--help"]), capsys.readouterr().out
-    assert (code, f"  digiclay benchmark {kind}" in out.partition("examples:")[2]) == (0, True)
+    code, out = main([kind, "--help"]), capsys.readouterr().out
+    assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.cli import main
-from digiclay.commands import benchmark_stack
-from digiclay.commands.benchmark_stack import STUDIES, Size, study
 from digiclay.core.scene_file import find, load
 from digiclay.core.stack.assembly import structure
 from digiclay.core.sweep import Point
 from digiclay.core.sweep_bundles import LEAST, bundles
+
+from benchmarks import runs_together
+from benchmarks.__main__ import main
+from benchmarks.runs_together import STUDIES, Size, study
 
 
 @pytest.mark.parametrize("name", list(STUDIES))
@@ -30,10 +31,10 @@ def test_the_runs_of_a_study_differ_and_stand_together(name: str) -> None:
 def test_the_benchmark_prints_and_keeps_a_table_and_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(benchmark_stack, "COUNTS", (1, 4))
-    monkeypatch.setattr(benchmark_stack, "REST", 0.0)
+    monkeypatch.setattr(runs_together, "COUNTS", (1, 4))
+    monkeypatch.setattr(runs_together, "REST", 0.0)
     out = ["--out", str(tmp_path)]
-    assert main(["benchmark", "stack", "--scene", "tap", "--quick", "--quiet", *out]) == 0
+    assert main(["stack", "--scene", "tap", "--quick", "--quiet", *out]) == 0
     said = capsys.readouterr().out
     assert "control.force_gain varies" in said
     assert "valve.stroke varies" in said
@@ -44,5 +45,5 @@ def test_the_benchmark_prints_and_keeps_a_table_and_a_picture(
 
 
 def test_the_table_gives_runs_a_second_and_their_ratio() -> None:
-    row = benchmark_stack._row(Size("control", 64, 0.1, 0.01, 0.2, 0.05, 0.5, 0.1))
+    row = runs_together._row(Size("control", 64, 0.1, 0.01, 0.2, 0.05, 0.5, 0.1))
     assert row == ["64", "10", "100", "10.0", "5", "20", "4.0", "2", "10", "5.0"]

@@ -7,9 +7,10 @@ import warnings
 
 import numpy as np
 import pytest
-from digiclay.commands import benchmark_stiff_runs as stiff
-from digiclay.commands.benchmark_cases import CASES, EASY
 from digiclay.core.errors import DivergenceError
+
+from benchmarks import stiff_runs as stiff
+from benchmarks.stiff_cases import CASES, EASY
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.commands.benchmark_loop import loop
-from digiclay.commands.benchmark_peers import SOLVERS, peer
-from digiclay.commands.benchmark_problems import Measured, Problem, problem, solved
-from digiclay.commands.benchmark_whole_bed import Beside, beside, everywhere, report
-from digiclay.commands.benchmark_work import LEVELS, LOOP, Work
 from numpy.typing import NDArray
+
+from benchmarks.peers import SOLVERS, peer
+from benchmarks.problems import Measured, Problem, problem, solved
+from benchmarks.python_loop import loop
+from benchmarks.whole_bed import Beside, beside, everywhere, report
+from benchmarks.work_precision import LEVELS, LOOP, Work
 
 PERIODS = 16
 

@@ -38,11 +38,6 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
         "my.toml cannot be a folder: my.toml is a file.",
     ),
     "width": (["render", "my", "--size", "1x1"], "--size must be at least 16 (got 1)."),
-    "benchmark": (
-        ["benchmark", "scale", "--out", "my.toml/new"],
-        "digiclay benchmark scale: argument --out: my.toml/new cannot be a folder: my.toml is a file. "
-        "See 'digiclay benchmark scale --help'.",
-    ),
     "budget": (["run", "my.toml", "--budget", "0"], "--budget must be above 0 m (got 0 m)."),
     "option": (
         ["run", "my.toml", "--fast"],
@@ -71,7 +66,6 @@ MEANT = {
     "run my.toml --over": "Did you mean --overwrite (not --over)?",
     "sweep tap --varry layout.rows=3 --out o": "Did you mean --vary (not --varry)?",
     "export my --kind soild": "Did you mean solid?",
-    "benchmark sesion": "Did you mean session?",
     "--verson": "Did you mean --version (not --verson)?",
 }
 

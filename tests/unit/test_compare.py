@@ -10,7 +10,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.compare import table
 from digiclay.core.metrics_trial import TRIAL_METRICS
-from digiclay.paper.figures_compare import PANELS, comparison
+from digiclay.plots.comparison import PANELS, comparison
 
 from tests.scene_files import folder_with, scene_text
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.cli import main
-from digiclay.commands.benchmark_export import Export, formed, measured
 from digiclay.core.body import PIECE
 from digiclay.core.export_model import Model, bodies
+
+from benchmarks.__main__ import main
+from benchmarks.mesh_export import Export, formed, measured
 
 
 @pytest.mark.parametrize(("file", "bytes_a_pin"), [("stl", 250), ("ply", 250)])
@@ -34,8 +35,8 @@ def test_the_benchmarks_bed_has_bosses_and_creases_to_be_found():
 
 
 def test_the_benchmark_prints_a_line_a_case_and_keeps_its_figures(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("digiclay.commands.benchmark_export.SIDES", (5, 9))
-    assert main(["benchmark", "export", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr("benchmarks.mesh_export.SIDES", (5, 9))
+    assert main(["export", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert sum(line[:1] in (["solid"], ["surface"], ["pins"], ["features"]) for line in lines) >= 10
     assert (tmp_path / "export.csv").read_text().splitlines()[0].split(",") == list(

@@ -12,15 +12,16 @@ from digiclay.core.metrics_trial import Trial
 from digiclay.core.modes import MEANINGS
 from digiclay.core.scene_file import find, load
 from digiclay.core.scene_table import resolve
-from digiclay.paper import scenes
-from digiclay.paper.claim import Claim, verdict
-from digiclay.paper.claims import carried_out
-from digiclay.paper.claims_following import tracking
-from digiclay.paper.claims_force import onset, trade
-from digiclay.paper.figures_session import details, heights_and_force
-from digiclay.paper.page import page
-from digiclay.paper.results import SESSION, WAYS, Results, Session, Swing
-from digiclay.paper.trials import sessions
+
+from digiclay_paper import scenes
+from digiclay_paper.claim import Claim, verdict
+from digiclay_paper.claims import carried_out
+from digiclay_paper.claims_following import tracking
+from digiclay_paper.claims_force import onset, trade
+from digiclay_paper.figures_session import details, heights_and_force
+from digiclay_paper.page import page
+from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
+from digiclay_paper.trials import sessions
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 

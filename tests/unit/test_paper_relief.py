@@ -9,11 +9,12 @@ from digiclay.core.metrics_trial import Trial
 from digiclay.core.modes import Mode
 from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.scene_table import resolve
-from digiclay.paper.claims_relief import relief
-from digiclay.paper.relief import LIMITS, asked_for, blister_section, sections
-from digiclay.paper.results import SESSION, Results, Session
-from digiclay.paper.scenes import METHODS
 from numpy.typing import NDArray
+
+from digiclay_paper.claims_relief import relief
+from digiclay_paper.relief import LIMITS, asked_for, blister_section, sections
+from digiclay_paper.results import SESSION, Results, Session
+from digiclay_paper.scenes import METHODS
 
 Floats = NDArray[np.float64]
 REST, RIDGE, MOUND, VALLEY = 40e-3, 13.5e-3, 23e-3, -10e-3

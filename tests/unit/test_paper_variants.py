@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from digiclay.core.metrics_speed import Follows
 from digiclay.core.scene_table import resolve
-from digiclay.paper.claims_variants import ahead, escape, gaussian, radius, rise, staggered
-from digiclay.paper.panel import COLUMNS, NAMED, curves, letter, table
-from digiclay.paper.results import AS_IT_IS, Dragged, Located, Results, Session, Swing
-from digiclay.paper.scenes import METHODS
-from digiclay.paper.variants import GAUSSIAN, NO_RISE, STAGGERED, located
 from digiclay.plots.figure import canvas, save
+
+from digiclay_paper.claims_variants import ahead, escape, gaussian, radius, rise, staggered
+from digiclay_paper.panel import COLUMNS, NAMED, curves, letter, table
+from digiclay_paper.results import AS_IT_IS, Dragged, Located, Results, Session, Swing
+from digiclay_paper.scenes import METHODS
+from digiclay_paper.variants import GAUSSIAN, NO_RISE, STAGGERED, located
 
 SURFACE = "in the surface"
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)

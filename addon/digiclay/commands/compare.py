@@ -83,7 +83,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out or Path(f"{name_of(path)}_compare")
     may_be_written(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
-    from ..paper.figures_compare import comparison
+    from ..plots.comparison import comparison
     from ..plots.figure import save
 
     scenes = {method: _scene(arguments, path, method) for method in arguments.methods}

@@ -13,14 +13,13 @@ from ..core.errors import one_line
 from ..core.quantity import nearest
 from . import (
     batch,
-    benchmark,
     compare,
     describe,
     export,
     features,
     form,
     job,
-    paper,
+    outside,
     plot,
     render,
     run,
@@ -29,7 +28,7 @@ from . import (
 from .arguments import Help
 from .exit_codes import WRONG
 
-__all__ = ["parser"]
+__all__ = ["Parser", "parser"]
 
 EXAMPLES = """\
 examples:
@@ -101,7 +100,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
     every = (
-        run, batch, job, form, describe, export, features, plot, render, benchmark, sweep, compare, paper,
+        run, batch, job, form, describe, export, features, plot, render, sweep, compare, outside,
     )  # fmt: skip
     for command in every:
         command.add(commands)

@@ -1,0 +1,165 @@
+"""``python -m benchmarks scale``: the same finger on beds from 625 pins to a million."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from digiclay.commands.tables import table
+from digiclay.core.assembly import assemble
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import begin, periods
+from digiclay.core.state import State
+from digiclay.core.system import System
+
+from . import plots
+from .report import add_kind, kept, made_with, progress
+
+__all__ = ["SIDES", "Size", "add", "bytes_of", "gathered_cells", "measured", "scene"]
+
+#: Pins along a side of the beds.
+SIDES = (25, 101, 317, 1001)
+#: The finger presses in the middle, rises and is dragged, over one and the same pins of every bed.
+PATH = ((0.0, 0.0, 42.0), (0.3, 0.0, 36.5), (0.8, 6.0, 40.0), (1.3, 12.0, 44.0), (1.6, 12.0, 60.0))
+DURATION = 1.6
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a bed of one size costs.
+
+    Attributes
+    ----------
+    pins : int
+    built : float
+        Time to put it together, s.
+    period : float
+        A control period, the median, s.
+    mean : float
+        CPU time of a control period, the mean, s: the finger's poses are worked out for 128 at once.
+    gathered : float
+        Cells that take part, on average.
+    bytes_a_pin : float
+    """
+
+    pins: int
+    built: float
+    period: float
+    mean: float
+    gathered: float
+    bytes_a_pin: float
+
+
+def scene(side: int) -> Scene:
+    """Return a bed of side x side pins; an odd side has a pin in the middle."""
+    return resolve(
+        {
+            "layout": {"rows": side, "columns": side},
+            "recorder": "absent",
+            "simulation": {"duration": DURATION},
+            "trajectory": {
+                "waypoints": [{"time": t, "position": [x * 1e-3, 0.0, z * 1e-3]} for t, x, z in PATH]
+            },
+        },
+        f"{side * side} pins",
+    )
+
+
+def bytes_of(*values: Any) -> int:
+    """Return the bytes of all different arrays in some dataclasses, and in what these hold."""
+    arrays: dict[int, int] = {}
+    waiting, seen = list(values), set()
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, np.ndarray):
+            owner = value if value.base is None or not isinstance(value.base, np.ndarray) else value.base
+            arrays[id(owner)] = owner.nbytes
+        elif hasattr(value, "__dataclass_fields__") and id(value) not in seen:
+            seen.add(id(value))
+            waiting += [getattr(value, field.name) for field in fields(value)]
+            waiting += list(getattr(value, "__dict__", {}).values())  # cached properties
+        elif isinstance(value, (tuple, list)):
+            waiting += value
+    return sum(arrays.values())
+
+
+def gathered_cells(side: int) -> list[int]:
+    """Return how many cells take part in each control period."""
+    known = scene(side)
+    system = assemble(known)
+    run = periods(system, known.trajectory.trajectory(), begin(system), known.periods)
+    return [state.gathered.cells.size for state in run]
+
+
+def measured(side: int, repeats: int) -> Size:
+    """Build a bed and run the session on it; the median of the repeats counts."""
+    built, spent, cells, means = [], [], [], []
+    known = scene(side)
+    bytes_a_pin = 0.0
+    for _ in range(repeats):
+        started = time.perf_counter()
+        system: System = assemble(known)
+        start: State = begin(system)
+        built.append(time.perf_counter() - started)
+        used, moments = time.process_time(), [time.perf_counter()]
+        for state in periods(system, known.trajectory.trajectory(), start, known.periods):
+            moments.append(time.perf_counter())
+            cells.append(state.gathered.cells.size)
+        means.append((time.process_time() - used) / known.periods)
+        spent += [b - a for a, b in pairwise(moments)]
+        bytes_a_pin = bytes_of(system, state) / (side * side)
+    return Size(
+        side * side,
+        statistics.median(built),
+        statistics.median(spent),
+        statistics.median(means),
+        statistics.fmean(cells),
+        bytes_a_pin,
+    )
+
+
+def add(kinds: Any) -> None:
+    """Add the benchmark."""
+    examples = "  python -m benchmarks scale\n  python -m benchmarks scale --quick --out results\n"
+    parser = add_kind(kinds, "scale", "a control period from 625 pins to a million", examples)
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Measure every size, and print the table."""
+    sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
+    with progress(arguments, "scale", len(sides)) as bar:
+        sizes = []
+        for side in sides:
+            sizes.append(measured(side, repeats))
+            bar(f"{side * side} pins")
+    text = "\n".join(_text(sizes))
+    print(text)
+    head = [field.name for field in fields(Size)]
+    kept(arguments.out, "scale", text, head, [[getattr(one, name) for name in head] for one in sizes])
+    if arguments.out:
+        plots.scale(sizes, arguments.out / "scale.png")
+    return 0
+
+
+def _text(sizes: list[Size]) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield made_with()
+    yield "\nThe same finger, pressing and dragging, 1.6 s; default parts; control period and step 5 ms\n"
+    head = ("pins", "taking part", "period, µs", "to smallest", "CPU mean, µs", "built in, ms", "bytes a pin")
+    rows = [
+        [
+            str(one.pins), f"{one.gathered:.1f}", f"{one.period * 1e6:.0f}",
+            f"{one.period / sizes[0].period:.2f}",
+            f"{one.mean * 1e6:.0f}", f"{one.built * 1e3:.3g}", f"{one.bytes_a_pin:.1f}",
+        ]
+        for one in sizes
+    ]  # fmt: skip
+    yield from table(head, rows, left=0)

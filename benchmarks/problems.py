@@ -1,0 +1,186 @@
+"""The problems whose integration is judged: a scene, the commands recorded for it, and the exact solution."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from digiclay.core.assembly import assemble
+from digiclay.core.control.replay import Replay
+from digiclay.core.scene import Scene
+from digiclay.core.scene_table import resolve
+from digiclay.core.simulation import begin, periods
+from digiclay.core.system import System
+from numpy.typing import NDArray
+
+from .work_precision import Work
+
+__all__ = [
+    "PERIOD",
+    "PROBLEMS",
+    "Measured",
+    "Problem",
+    "live",
+    "ours",
+    "problem",
+    "replaying",
+    "timed",
+]
+
+Floats = NDArray[np.float64]
+
+#: Control period of all problems, s.
+PERIOD = 5e-3
+#: Rows and columns; waypoints (s; x, y, z in mm) and how they are joined; a command that is held all along,
+#: or None: what Method I commands is recorded.
+PROBLEMS: dict[str, tuple[int, tuple[tuple[float, float, float, float], ...], str, float | None]] = {
+    "one cell, load step": (
+        1, ((0.0, 0.0, 0.0, 40.3), (0.101, 0.0, 0.0, 40.3), (0.103, 0.0, 0.0, 39.0), (0.5, 0.0, 0.0, 39.0)),
+        "linear", 0.6,
+    ),
+    "pressed and held": (
+        11, ((0.0, 0.0, 0.0, 40.5), (0.3, 0.0, 0.0, 37.5), (0.8, 0.0, 0.0, 37.5)), "smooth", None,
+    ),
+    "session, lift and drag": (
+        25, (
+            (0.0, -21.0, -21.0, 40.2), (0.6, -21.0, -21.0, 36.5), (1.6, -21.0, -21.0, 42.5),
+            (2.3, -15.0, -21.0, 42.5), (2.5, -15.0, -21.0, 42.5),
+        ), "smooth", None,
+    ),
+    "fast drag": (
+        15, (
+            (0.0, -12.0, 0.0, 40.5), (0.15, -12.0, 0.0, 37.5), (0.65, 13.0, 0.0, 37.5),
+            (0.7, 13.0, 0.0, 45.0),
+        ), "smooth", None,
+    ),
+    "deep press": (
+        11, ((0.0, 0.0, 0.0, 40.5), (0.15, 0.0, 0.0, 34.0), (0.5, 0.0, 0.0, 33.0)), "smooth", None,
+    ),
+}  # fmt: skip
+#: Evaluations of the rates a step takes; the closed-form step evaluates conductance and load once.
+STAGES = {"bernoulli": 1, "richardson": 3, "euler": 1, "heun": 2, "runge_kutta_4": 4}
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A problem.
+
+    Attributes
+    ----------
+    name : str
+    scene : Scene
+    commands : ndarray (t, n)
+        Held for a control period each.
+    sets : list of (ndarray of int (m,), int)
+        Which cells take part in each period; how many of them, the first, the finger may touch.
+    """
+
+    name: str
+    scene: Scene
+    commands: Floats
+    sets: list[tuple[NDArray[np.intp], int]]
+
+    @property
+    def taking_part(self) -> float:
+        """Cells that take part in a period, the mean."""
+        return float(np.mean([cells.size for cells, _ in self.sets]))
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Heights, (t, n), m, and total force, (t,), N, at the end of each control period."""
+
+    heights: Floats
+    forces: Floats
+
+    def against(self, exact: Measured) -> tuple[float, float]:
+        """Return the largest errors of a height, m, and of the total force, N."""
+        height, force = self.heights - exact.heights, self.forces - exact.forces
+        return float(np.abs(height).max()), float(np.abs(force).max())
+
+
+def live(
+    name: str,
+    period: float = PERIOD,
+    step: float = 1e-3,
+    stepper: str = "bernoulli",
+    *,
+    side: int | None = None,
+) -> Scene:
+    """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns."""
+    own, waypoints, joined, held = PROBLEMS[name]
+    table: dict[str, Any] = {
+        "layout": {"rows": side or own, "columns": side or own},
+        "recorder": "absent",
+        "control": {} if held is None else "absent",
+        "simulation": {"control_period": period, "physics_step": step, "stepper": stepper},
+        "trajectory": {
+            "interpolation": joined,
+            "waypoints": [{"time": t, "position": [v * 1e-3 for v in place]} for t, *place in waypoints],
+        },
+    }
+    return resolve(table, name)
+
+
+def problem(name: str, *, side: int | None = None) -> Problem:
+    """Record a problem's commands, on its own bed or another, and work out which cells take part."""
+    scene, held = live(name, side=side), PROBLEMS[name][3]
+    system = assemble(scene)
+    if held is None:
+        run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+        commands = np.array([state.row(system.rows.command) for state in run])
+    else:
+        commands = np.full((scene.periods, scene.cells), held)
+    system = replaying(scene, commands)
+    run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+    return Problem(name, scene, commands, [(one.gathered.cells, one.gathered.near) for one in run])
+
+
+def replaying(scene: Scene, commands: Floats) -> System:
+    """Return a scene's system that plays commands."""
+    system = assemble(scene)
+    return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
+
+
+def _at(known: Problem, stepper: str, step: float) -> Scene:
+    """Return the problem's scene with a stepper and step."""
+    simulation = replace(known.scene.simulation, stepper=stepper, physics_step=step)
+    return replace(known.scene, simulation=simulation)
+
+
+def solved(scene: Scene, commands: Floats) -> Measured:
+    """Integrate under recorded commands."""
+    system = replaying(scene, commands)
+    run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+    rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
+    return Measured(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+
+
+def timed(scene: Scene, commands: Floats, repeats: int) -> float:
+    """Return the CPU time of a run of which nothing is kept, s: the median."""
+    spent = []
+    for _ in range(repeats):
+        system, trajectory = replaying(scene, commands), scene.trajectory.trajectory()
+        start = begin(system)
+        started = time.process_time()
+        for _ in periods(system, trajectory, start, scene.periods):
+            pass
+        spent.append(time.process_time() - started)
+    return float(np.median(spent))
+
+
+def ours(
+    known: Problem, exact: Measured, stepper: str, steps: tuple[float, ...], repeats: int
+) -> Iterator[Work]:
+    """Give the points of one of our steppers, one a step."""
+    for step in steps:
+        scene = _at(known, stepper, step)
+        with np.errstate(all="ignore"):
+            found = solved(scene, known.commands)
+            took = timed(scene, known.commands, repeats)
+        height, force = found.against(exact)
+        count = scene.periods * round(PERIOD / step) * STAGES[stepper]
+        yield Work(known.name, stepper, step, height, force, took, count, False)

@@ -1,0 +1,96 @@
+"""What the benchmarks share: options, progress, and results kept in a folder."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay import __version__
+from digiclay.commands.arguments import add_command
+from digiclay.commands.progress import Steps
+from digiclay.commands.refusals import refuse_unwritable
+from digiclay.commands.tables import table
+from digiclay.core.errors import OutputError
+
+__all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
+
+
+def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:
+    """Add a benchmark with the options all of them take."""
+    parser = add_command(kinds, name, help, f"examples:\n{examples}")
+    parser.add_argument("--quick", action="store_true", help="fewer and shorter runs")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    if out:
+        parser.add_argument(
+            "--out", metavar="DIR", type=_folder, help="also write the results into this folder"
+        )
+    return parser
+
+
+def _folder(text: str) -> Path:
+    """Read the name of a folder to write into; it is refused now what is bound to fail after the work."""
+    try:
+        refuse_unwritable(Path(text))
+    except OutputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
+    return Path(text)
+
+
+def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
+    """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet."""
+    return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
+
+
+def number(value: float, unit: str = "") -> str:
+    """Write a number with three digits."""
+    return f"{value:.3g} {unit}".rstrip()
+
+
+def made_with(*packages: str) -> str:
+    """Return one line: versions, and the kind of machine."""
+    import importlib.metadata
+
+    versions = [f"digiclay {__version__}", f"Python {platform.python_version()}", f"numpy {np.__version__}"]
+    versions += [f"{name} {importlib.metadata.version(name)}" for name in packages]
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return ", ".join(versions) + f"; {platform.system()}, {platform.machine()}, {_processor()}, {cores} cores"
+
+
+def _processor() -> str:
+    """Return the processor's name where the system tells it."""
+    told = Path("/proc/cpuinfo")
+    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown processor"
+
+
+def kept(out: Path | None, name: str, text: str, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Write a benchmark's text as ``name.md`` and its figures as ``name.csv``, if there is a folder for them.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written.
+    """
+    if out is None:
+        return
+    figures = io.StringIO(newline="")
+    writer = csv.writer(figures, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / f"{name}.md").write_text(
+            f"# python -m benchmarks {name}\n\n```\n{text}\n```\n", encoding="utf-8"
+        )
+        (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"Cannot write into {out}: {error.strerror or error}.") from None

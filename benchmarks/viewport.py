@@ -1,0 +1,71 @@
+"""``python -m benchmarks viewport``: what a tick of a live session costs in Blender."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from digiclay.commands.refusals import refuse_without_blender
+from digiclay.commands.tables import table
+
+from .report import add_kind, kept, made_with, progress
+
+if TYPE_CHECKING:  # Blender is imported when it is needed
+    from .viewport_cost import Cost
+
+__all__ = ["BEDS", "add"]
+
+#: Rows and columns of the beds, and the time a tick of them may take, s.
+BEDS = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
+#: Ticks that are timed, with --quick and without.
+QUICK, FULL = 40, 200
+
+
+def add(kinds: Any) -> None:
+    """Add the benchmark."""
+    examples = "  python -m benchmarks viewport\n  python -m benchmarks viewport --quick --out results\n"
+    parser = add_kind(
+        kinds, "viewport", "a tick of a live session in Blender, part by part (needs bpy)", examples
+    )
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Measure every bed, and print the table."""
+    refuse_without_blender()
+    from digiclay.compat import bpy
+
+    from .viewport_cost import PARTS, measured
+
+    ticks = QUICK if arguments.quick else FULL
+    costs = []
+    with progress(arguments, "viewport", len(BEDS)) as bar:
+        for rows, columns, _ in BEDS:
+            costs.append(measured(rows, columns, ticks))
+            bar(f"{rows * columns} pins")
+    text = "\n".join(_text(costs, PARTS, bpy.app.version_string))
+    print(text)
+    head = ("pins", *(f"{name}_s" for name in PARTS), "tick_s", "tick_95_s", "growth_bytes")
+    rows = [
+        [one.pins, *(one.parts[name] for name in PARTS), one.whole, one.worst, one.growth] for one in costs
+    ]
+    kept(arguments.out, "viewport", text, head, rows)
+    return 0
+
+
+def _text(costs: list[Cost], parts: tuple[str, ...], version: str) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield f"{made_with()}, Blender {version}"
+    yield "\nA tick of a live session: 33 ms of simulated time while a finger presses and drags; medians."
+    yield "read: where the finger is; keep: the state into the bed, for undo and files; write: pins;"
+    yield "evaluate: Blender's geometry nodes, without drawing. Times in ms.\n"
+    head = ("pins", *parts, "tick", "goal", "95 % within", "memory grown, kB")
+    rows = [
+        [
+            f"{one.pins}", *(f"{1e3 * one.parts[name]:.2f}" for name in parts), f"{1e3 * one.whole:.2f}",
+            f"{1e3 * goal:g}", f"{1e3 * one.worst:.2f}", f"{one.growth / 1e3:.1f}",
+        ]
+        for one, (_, _, goal) in zip(costs, BEDS, strict=True)
+    ]  # fmt: skip
+    yield from table(head, rows, left=0)

@@ -1,0 +1,180 @@
+"""What a tick of a live session costs in Blender, part by part: the very functions a session calls."""
+
+from __future__ import annotations
+
+import gc
+import statistics
+import time
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from digiclay import bridge
+from digiclay.compat import bpy, scratch
+from digiclay.core.layout import Layout
+from digiclay.device import display, view
+from digiclay.live import bed_state, running, sculpting, tick
+from digiclay.live.waiting import obstacle
+from digiclay.operators.add_bed import add, select_only
+from digiclay.settings import properties
+from digiclay.settings.devices import device
+
+__all__ = ["PARTS", "TICK", "Cost", "measured"]
+
+#: Time of the wall between two ticks, s.
+TICK = 33e-3
+#: What a tick does, in this order.
+PARTS = ("read", "simulate", "keep", "write", "evaluate")
+#: Ticks that are not counted: the finger comes down, and everything is used for the first time.
+WARM_UP = 30
+#: Size of the circle the pressed finger draws, m, and how many ticks it takes to go round.
+CIRCLE, ROUND = 8e-3, 120
+#: How deep below the pins at rest, m.
+DEPTH = 5e-3
+#: About how often memory is looked at while as many ticks go by as are timed: each look collects garbage.
+LOOKS = 6
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What ticks of one bed take.
+
+    Attributes
+    ----------
+    pins : int
+    parts : dict
+        Median time of each of `PARTS`, s.
+    whole : float
+        Median time of a whole tick with its evaluation, s.
+    worst : float
+        Time that 95 % of the ticks keep to, s.
+    growth : float
+        By how much the least memory Python holds rises from as many ticks to as many later, bytes.
+    """
+
+    pins: int
+    parts: dict[str, float]
+    whole: float
+    worst: float
+    growth: int
+
+
+def measured(rows: int, columns: int, ticks: int) -> Cost:
+    """Add a bed, press and drag its fingertip, and time the ticks of its session.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Pins of the bed.
+    ticks : int
+        How many are timed.
+    """
+    with _session(rows, columns) as bed:
+        clock = _ticks(bed, WARM_UP)
+        whole = [_timed(bed, count) for count in range(clock, clock + ticks)]
+        parts = [_timed_parts(bed, count) for count in range(clock + ticks, clock + 2 * ticks)]
+        growth = _growth(bed, clock + 2 * ticks, ticks)
+    spent = {name: statistics.median(part[name] for part in parts) for name in PARTS}
+    worst = float(np.quantile(whole, 0.95))
+    return Cost(rows * columns, spent, statistics.median(whole), worst, growth)
+
+
+@contextmanager
+def _session(rows: int, columns: int) -> Iterator[Any]:
+    """Give a bed with a session in the open file, and take both away again."""
+    with _settings(), scratch():
+        bed = add(bpy.context, device("paper", Layout(rows=rows, columns=columns), "virtual_master"))
+        select_only(bpy.context, bed)
+        tick.start(bpy.context, bed)
+        try:
+            yield bed
+        finally:
+            tick.stop(bed.session_uid)
+
+
+@contextmanager
+def _settings() -> Iterator[None]:
+    """Let beds have settings: for the while, where the extension is not enabled anyway."""
+    if hasattr(bpy.types.Object, "digiclay"):
+        yield
+        return
+    properties.register()
+    display.register()
+    try:
+        yield
+    finally:
+        display.unregister()
+        properties.unregister()
+
+
+def _move(bed: Any, count: int) -> None:
+    """Put the fingertip where it is at a tick: down, and round and round."""
+    tip = view.fingertip_of(bed)
+    turn = 2.0 * np.pi * count / ROUND
+    rest = running.of(bed).scene.actuator.rest_height
+    down = min(count / (0.8 * WARM_UP), 1.0) * (DEPTH + 2e-3)
+    pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), rest + 2e-3 - down, 1.0, 0.0, 0.0, 0.0])
+    bridge.place_fingertip(tip, pose, running.of(bed).scene.fingertip)
+    bpy.context.view_layer.update()
+
+
+def _ticks(bed: Any, count: int) -> int:
+    """Let the session live for some ticks; return how many."""
+    for one in range(count):
+        _timed(bed, one)
+    return count
+
+
+def _timed(bed: Any, count: int) -> float:
+    """Return what a whole tick takes, s."""
+    _move(bed, count)
+    started = time.perf_counter()
+    tick.tick(bpy.context, TICK * count)
+    bpy.context.evaluated_depsgraph_get()
+    return time.perf_counter() - started
+
+
+def _timed_parts(bed: Any, count: int) -> dict[str, float]:
+    """Return what the parts of a tick take, s."""
+    _move(bed, count)
+    session = running.of(bed)
+    moments = [time.perf_counter()]
+    obstacle(bpy.context, bed)
+    pose = bridge.pose(view.fingertip_of(bed))
+    moments.append(time.perf_counter())
+    later = sculpting.advanced(session, pose, TICK * count, 1000)
+    moments.append(time.perf_counter())
+    running.put(later)
+    bed_state.write(bed, later, session)
+    moments.append(time.perf_counter())
+    view.show_state(bed, later.system, later.state)
+    moments.append(time.perf_counter())
+    bpy.context.evaluated_depsgraph_get()
+    moments.append(time.perf_counter())
+    return dict(zip(PARTS, np.diff(moments).tolist(), strict=True))
+
+
+def _growth(bed: Any, first: int, ticks: int) -> int:
+    """Return by how much the least memory Python holds has risen from some ticks to as many later, bytes.
+
+    The least, because what a session works with comes and goes: arrays for the cells it moves, the
+    monitor that estimates its error. What a leak holds never goes. The first of three rounds gives
+    way to what was held before the counting began.
+    """
+    tracemalloc.start()
+    try:
+        floors = []
+        for part in range(3):
+            held = []
+            for count in range(ticks):
+                _timed(bed, first + part * ticks + count)
+                if count % max(ticks // LOOKS, 1) == 0:
+                    gc.collect()
+                    held.append(tracemalloc.get_traced_memory()[0])
+            floors.append(min(held))
+    finally:
+        tracemalloc.stop()
+    return floors[2] - floors[1]

@@ -1,0 +1,63 @@
+"""Claims on how fast a finger is followed."""
+
+from __future__ import annotations
+
+from digiclay.core.metrics_speed import Criterion, Follows
+
+from . import scenes
+from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict
+from .results import PAPER_SPEED, WAYS, Results
+from .scenes import METHODS
+
+__all__ = ["largest_speed", "tracking"]
+
+
+def tracking(results: Results) -> Claim:
+    """Both methods on the simple trajectories."""
+    told = [
+        f"{SHORT[method]}, {name}: {_followed(results.simple[method, name])}"
+        for method in METHODS
+        for name in WAYS
+    ]
+    found = results.simple
+    missed = _missed(found, results.criterion)
+    return Claim(
+        f"Both methods track to {PAPER_SPEED * MM:g} mm/s on simple trajectories",
+        "; ".join(told),
+        verdict([one.meets(results.criterion) for one in found.values()]),
+        f"Not followed: {missed}." if missed else "",
+    )
+
+
+def _followed(one: Follows) -> str:
+    lost = "never lost" if one.losses == 0 and one.loss_share == 0.0 else _lost(one)
+    return f"{lost}, lag ≤ {one.lag * MM:.1f} mm, RFD {one.rfd:.3f} N"
+
+
+def _lost(one: Follows) -> str:
+    return f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
+
+
+def _missed(found: dict[tuple[str, str], Follows], criterion: Criterion) -> str:
+    missed = [f"{SHORT[method]}, {name}" for (method, name), one in found.items() if not one.meets(criterion)]
+    return "; ".join(missed)
+
+
+def largest_speed(results: Results) -> Claim:
+    fast, lift = results.fastest, results.lifting
+    drag = ", ".join(f"{SHORT[method]} {speed(fast[method])}" for method in METHODS)
+    up = ", ".join(f"{SHORT[method]} {speed(lift[method])}" for method in METHODS)
+    free = scenes.free_speed(results.printed[ONE].scene)
+    control = results.printed[TWO].scene.control
+    gain = getattr(control, "force_gain", 0.0) * getattr(control, "force_setpoint", 0.0)
+    why = (
+        f"A pin without load rises at {free * MM:.1f} mm/s. A cell of {SHORT[TWO]} that feels nothing opens "
+        f"its valve to K_FF F_ref = {gain:.2g}, and rises at {free * min(gain, 1.0) ** 2 * MM:.1f} mm/s "
+        f"at the most."
+    )
+    return Claim(
+        f"Up to {PAPER_SPEED * MM:g} mm/s, and how far beyond",
+        f"Largest speed of a straight level drag of a ridge: {drag}; of a lift straight up: {up}",
+        verdict([(one or 0.0) >= PAPER_SPEED for one in fast.values()]),
+        why,
+    )

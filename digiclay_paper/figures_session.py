@@ -1,0 +1,167 @@
+"""The paper's session: heights and force (Fig. 8), a detail (Fig. 9), the final surfaces (Fig. 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from digiclay.core.metrics import in_contact
+from digiclay.plots.bed import draw_map, draw_path, draw_relief
+from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
+from digiclay.plots.run import LETTERS, session_cells
+
+from .relief import sections
+from .results import Results, Session
+from .scenes import METHODS, NAMES
+
+__all__ = ["details", "heights_and_force", "profiles", "surface_rows", "surfaces"]
+
+#: What is looked at closely: the first press and its end, and a part of the even lift, s.
+PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
+
+
+def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
+    """Draw the heights of the same cells, and the total force, side by side for both methods."""
+    cells = session_cells(sessions[METHODS[0]].history)
+    spots = sessions[METHODS[0]].history["position"][cells] * MM
+    names = [f"{name} ({x:.0f}, {y:.0f})" for name, (x, y) in zip(LETTERS, spots, strict=False)]
+    lowest = min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
+    highest = max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
+    strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
+    with canvas(13.5, 7.4, title) as (figure, place):
+        for column, method in enumerate(METHODS):
+            history = sessions[method].history
+            left = 0.85 + 6.5 * column
+            heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
+            force = place(f"{method} force", left, 0.7, 5.75, 2.0)
+            touching = in_contact(history["total_force"])
+            for axes in (heights, force):
+                over = axes.get_xaxis_transform()
+                axes.fill_between(
+                    history["time"], 0, 1, where=touching, transform=over, color=SHADE, linewidth=0
+                )
+                axes.set_xlim(history["time"][0], history["time"][-1])
+            for name, colour, cell in zip(names, LINES, cells, strict=False):
+                heights.plot(history["time"], history["height"][:, cell] * MM, color=colour, label=name)
+            heights.set(ylim=(lowest, highest), title=NAMES[method])
+            heights.tick_params(labelbottom=False)
+            force.plot(history["time"], history["total_force"], color=INK, linewidth=1.2, label="total force")
+            asked = {"color": LINES[1], "linewidth": 1.2, "linestyle": (0, (5, 3)), "label": "set point"}
+            force.plot(history["time"], history["set_point"], **asked)
+            force.fill_between([], [], color=SHADE, label="in contact")
+            force.set(ylim=(0.0, strongest), xlabel="time (s)", title="Total force")
+            legend_above(force)
+            if column == 0:
+                heights.set_ylabel("height (mm)")
+                force.set_ylabel("force (N)")
+                handles, _ = heights.get_legend_handles_labels()
+        figure.text(0.85 / 13.5, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
+        figure.legend(handles, names, loc="upper left", ncols=6, bbox_to_anchor=(0.205, 1.0 - 0.5 / 7.4))
+    return figure
+
+
+def details(results: Results, title: str) -> Any:
+    """Draw a detail of the heights in the session: the first press, and what swings during the lift."""
+    shown = _detailed(results)
+    with canvas(13.5, 7.6, title) as (figure, place):
+        wide = 13.5 / len(shown)
+        for column, (name, session) in enumerate(shown):
+            left, across = 0.95 + (wide - 0.08) * column, wide - 1.05
+            cells = _under(session)
+            time, height = session.detail["time"], session.detail["height"][:, cells] * MM
+            heights = place(f"{column} heights", left, 4.25, across, 2.35)
+            swing = place(f"{column} swing", left, 0.7, across, 2.35)
+            press, lift = (_within(time, ends) for ends in (PRESSING, LIFTING))
+            for number, cell in enumerate(cells):
+                away = f"{session.history['position'][cell, 0] * MM:.0f} mm"
+                style: dict[str, Any] = {"color": LINES[number], "linewidth": 1.5, "label": f"x = {away}"}
+                heights.plot(time[press], height[press, number], **style)
+                swing.plot(time[lift], _swinging(time[lift], height[lift, number]) * 1e3, **style)
+            heights.set(title=name, xlabel="time (s)", xlim=PRESSING, ylim=(36.5, 40.5))
+            swing.set(title="the same cells, lifted", xlabel="time (s)", xlim=LIFTING, ylim=(-20, 20))
+            if column == 0:
+                heights.set_ylabel("height (mm)")
+                swing.set_ylabel("height less its course (µm)")
+                handles, names = heights.get_legend_handles_labels()
+        figure.legend(handles, names, loc="upper right", ncols=len(names), bbox_to_anchor=(0.99, 0.955))
+    return figure
+
+
+def _detailed(results: Results) -> list[tuple[str, Session]]:
+    """Return the sessions of which details are shown, by name."""
+    one, two = (results.printed[method] for method in METHODS)
+    gain = getattr(one.scene.control, "force_gain", 0.0)
+    shown = [(f"Method I, $K_f$ = {gain:g} 1/N", one)]
+    if results.wild is not None:
+        gain = getattr(results.wild.scene.control, "force_gain", 0.0)
+        shown.append((f"Method I, $K_f$ = {gain:g} 1/N", results.wild))
+    return [*shown, ("Method II", two)]
+
+
+def _under(session: Session) -> list[int]:
+    """Return the cell the finger first presses, and some beside it in its row, outwards."""
+    place, first = session.history["position"], session.history["fingertip"][0, :2]
+    pitch = session.scene.layout.pitch
+    return [int(np.argmin(np.hypot(*(place - first - (step * pitch, 0.0)).T))) for step in range(0, 5)]
+
+
+def _within(time: Any, ends: tuple[float, float]) -> Any:
+    return (time >= ends[0] - 1e-9) & (time <= ends[1] + 1e-9)
+
+
+def _swinging(time: Any, height: Any) -> Any:
+    """Return a signal less its course, a cubic."""
+    middle = 0.5 * (time[0] + time[-1])
+    return height - np.polyval(np.polyfit(time - middle, height, 3), time - middle)
+
+
+def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
+    """Draw the final surfaces in relief and from above, side by side for both methods."""
+    with canvas(13.5, 9.6, title) as (figure, place):
+        for column, method in enumerate(METHODS):
+            history, left = sessions[method].history, 6.6 * column
+            relief = place(
+                f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
+            )
+            draw_relief(relief, history)
+            # Its own title would lie far above the picture.
+            figure.text((left + 0.3) / 13.5, 8.85 / 9.6, f"({'ac'[column]}) {NAMES[method]}")
+            plan = place(f"{method} map", left + 1.1, 0.7, 4.2, 3.6)
+            draw_map(plan, history, f"({'bd'[column]})")
+            draw_path(plan, history)
+            for axes in (relief, plan):
+                for artist in (*axes.collections, *axes.images):
+                    artist.set_rasterized(True)
+    return figure
+
+
+def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, float, float]]:
+    """Give the final surfaces as rows of method, x, y and height in mm."""
+    for method in METHODS:
+        history = sessions[method].history
+        for (x, y), height in zip(history["position"], history["height"][-1], strict=True):
+            yield method, float(x) * MM, float(y) * MM, float(height) * MM
+
+
+def profiles(sessions: Mapping[str, Session], title: str) -> Any:
+    """Draw sections through the final surfaces, formed and asked for."""
+    found = {method: list(sections(sessions[method])) for method in METHODS}
+    count = len(found[METHODS[0]])
+    with canvas(13.5, 8.6, title) as (figure, place):
+        for number in range(count):
+            row, column = divmod(number, 3)
+            axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
+            for method, colour, marker in zip(METHODS, LINES, "os", strict=False):
+                one = found[method][number]
+                name = NAMES[method].split(",")[0]
+                asked: dict[str, Any] = {"color": colour, "linewidth": 1.1, "linestyle": (0, (4, 2))}
+                axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
+                axes.plot(
+                    one.along * MM, one.found * MM, color=colour, marker=marker, markersize=4.5, label=name
+                )
+            axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
+            axes.set_ylabel("height over rest (mm)")
+        handles, names = axes.get_legend_handles_labels()
+        figure.legend(handles, names, loc="upper right", ncols=4, bbox_to_anchor=(0.99, 0.955))
+    return figure

@@ -1,0 +1,196 @@
+"""The relief the session asks for, and how far the one that was formed is from it, section by section.
+
+Asked for is what the method's own blister, carried along the finger's path, leaves behind:
+``H_j = H_rest + max_t p(d_j(t)) (z(t) - H_rest)`` for a boss, with the least instead of the
+greatest for a crease; p is the blister's profile, d_j the distance from cell j to the finger, and
+z the height of the fingertip's lowest point. Method II counts its blister from the nearest cell
+under the finger: there d_j is less by how far the middles of the cells of a disc reach that has as
+many cells as follow, the disc's radius less half a pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from digiclay.core.control.blister import Blister
+from digiclay.core.metrics import cell_area, in_contact
+from digiclay.core.metrics_trial import Trial
+from digiclay.core.modes import Mode
+from digiclay.core.scene import Scene
+from numpy.typing import NDArray
+
+from .results import Session
+from .scenes import METHODS
+
+__all__ = ["LIMITS", "Limits", "Section", "asked_for", "blister_section", "sections"]
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: The session's lines: y of ridge and valley, x at which both end and the mound is, m.
+RIDGE, VALLEY, END = -21e-3, 21e-3, 21e-3
+#: How far from its middle a section along ridge or valley is level, m.
+LEVEL = 10e-3
+#: What rounding makes of a length, m.
+TINY = 1e-12
+#: Cells on a section are within this of its line, m.
+ON = 1e-6
+
+
+class Limits(NamedTuple):
+    """How far a section may be from what is asked for, and still be that shape.
+
+    Attributes
+    ----------
+    rms, largest : float
+        Of the deviation, as shares of the height of the relief asked for in the section.
+    rim : float
+        How much higher (in a crease: lower) than in the middle its top may be anywhere, as such a share.
+    level : float
+        How far its middle may be from the height asked for there, as a share of that.
+    """
+
+    rms: float = 0.10
+    largest: float = 0.25
+    rim: float = 0.05
+    level: float = 0.25
+
+    def __str__(self) -> str:
+        return (
+            f"within {self.rms:.0%} (rms) and {self.largest:.0%} (largest) of the relief asked for, and "
+            f"its rim over its middle by no more than {self.rim:.0%}, and its middle within {self.level:.0%} "
+            "of the height asked for"
+        )
+
+
+LIMITS = Limits()
+
+
+class Section(NamedTuple):
+    """A section through the final surface.
+
+    Attributes
+    ----------
+    name : str
+    part : str
+        Boss or crease it belongs to: ridge, mound or valley.
+    along : ndarray (k,)
+        Where its cells are on its line, m.
+    found, asked : ndarray (k,)
+        Heights over the bed at rest, m: formed, and asked for. `asked` is scaled so that in the middle
+        it is as high as `found`: how deep the pins press into the finger is no matter of shape.
+    level : float
+        By how much it was higher there than it had been asked for, m; in a crease: lower.
+    middle : float
+        The height asked for in the middle, m; in a crease: the depth.
+    rim : float
+        How much higher (in a crease: lower) than in the middle the section is anywhere, m.
+    """
+
+    name: str
+    part: str
+    along: Floats
+    found: Floats
+    asked: Floats
+    level: float
+    middle: float
+    rim: float
+
+    @property
+    def relief(self) -> float:
+        """Height of the relief asked for, m."""
+        return float(np.abs(self.asked).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square deviation, m."""
+        return float(np.sqrt(np.mean((self.found - self.asked) ** 2)))
+
+    @property
+    def largest(self) -> float:
+        """Largest deviation, m."""
+        return float(np.abs(self.found - self.asked).max())
+
+    def meets(self, limits: Limits) -> bool:
+        """Tell whether the section has the shape asked for."""
+        allowed = limits.rms, limits.largest, limits.rim
+        shape = np.array([self.rms, self.largest, self.rim]) <= np.array(allowed) * self.relief + TINY
+        return bool(np.all(shape)) and abs(self.level) <= limits.level * self.middle
+
+
+def asked_for(session: Session) -> Floats:
+    """Return the heights over the bed at rest that the session asks for, shape (n,), m."""
+    history, blister = session.history, session.scene.blister
+    assert blister is not None  # both methods have one
+    rest = session.scene.actuator.rest_height
+    touching = in_contact(history["total_force"]) & ~np.isnan(history["set_point"])
+    tip = history["fingertip"][touching]
+    patch = _reach(session.scene, history["position"], history["following"][touching])
+    boss, crease = np.zeros(len(history["position"])), np.zeros(len(history["position"]))
+    for place, over, wide in zip(tip[:, :2], tip[:, 2] - rest, patch, strict=True):
+        swept = _share(blister, np.hypot(*(history["position"] - place).T) - wide) * over
+        np.maximum(boss, swept, out=boss)
+        np.minimum(crease, swept, out=crease)
+    # What was pressed in first and raised afterwards is a boss.
+    return np.where(boss > 0.0, boss, crease)
+
+
+def _reach(scene: Scene, position: Floats, following: Floats) -> Floats:
+    """Return how far the middles of the cells under the finger reach, m; 0 for Method I."""
+    if scene.method != METHODS[1]:
+        return np.zeros(len(following))
+    side = np.sqrt(cell_area(position) or 0.0)
+    return np.asarray(np.maximum(side * (np.sqrt(following / np.pi) - 0.5), 0.0))
+
+
+def _share(blister: Blister, distance: Floats) -> Floats:
+    """Return the profile p(d), 0 outside the blister."""
+    inside = np.maximum(distance, 0.0)
+    share: Floats = np.where(inside < blister.radius, np.maximum(blister.shape(inside), 0.0), 0.0)
+    return share
+
+
+def sections(session: Session) -> Iterator[Section]:
+    """Give the sections along and across ridge, mound and valley."""
+    place, scene = session.history["position"], session.scene
+    found, asked = session.history["height"][-1] - scene.actuator.rest_height, asked_for(session)
+    x, y = place.T
+    near, far = y < 0.0, y > 0.0
+    slant = (x - END) - (y - RIDGE)
+    ridge, valley = (np.abs(y - line) < ON for line in (RIDGE, VALLEY))
+    straight, end = np.abs(x) < LEVEL, np.abs(x - END) < ON
+    # Name, part, cells, where they are on their line, and the cells in its middle.
+    lines = (
+        ("along ridge and mound", "mound", ridge, x, ridge & end),
+        ("across the ridge", "ridge", (np.abs(x) < ON) & near, y, ridge & straight),
+        ("across the mound", "mound", end & near, y, ridge & end),
+        ("slantwise across the mound", "mound", (np.abs(slant) < ON) & near, x, ridge & end),
+        ("along the valley", "valley", valley, x, valley & straight),
+        ("across the valley", "valley", (np.abs(x) < ON) & far, y, valley & straight),
+    )
+    for name, part, cells, where, middle in lines:
+        if np.any(cells) and np.any(middle):
+            sign = -1.0 if part == "valley" else 1.0
+            high, wanted = (float(np.median(sign * heights[middle])) for heights in (found, asked))
+            scale, rim = high / wanted if wanted else 1.0, float((sign * found)[cells].max()) - high
+            drawn = scale * asked[cells]
+            yield Section(name, part, where[cells], found[cells], drawn, high - wanted, wanted, rim)
+
+
+def blister_section(done: Trial) -> Section:
+    """Return the section along x through a blister under a finger in the middle of the bed."""
+    history, scene = done.history, done.scene
+    assert scene.blister is not None  # both methods have one
+    place, rest = history["position"], scene.actuator.rest_height
+    tip, row = history["fingertip"][-1], np.abs(history["position"][:, 1]) < ON
+    following = np.count_nonzero(history["mode"][-1:] == Mode.FORCE_FOLLOW, axis=1)
+    distance = np.hypot(*(place - tip[:2]).T) - _reach(scene, place, following)
+    wanted, sign = float(tip[2]) - rest, 1.0 if tip[2] > rest else -1.0
+    found, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
+    asked = _share(scene.blister, distance)[row] * found[middle]
+    high = sign * float(found[middle])
+    rim = float((sign * found[row]).max()) - high
+    along = place[row, 0]
+    return Section("blister", "blister", along, found[row], asked, high - sign * wanted, sign * wanted, rim)

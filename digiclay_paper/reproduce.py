@@ -1,0 +1,79 @@
+"""``digiclay paper``: the counterparts of the paper's figures, and its claims beside what is measured."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any, TextIO
+
+from digiclay.commands.arguments import add_command
+from digiclay.commands.progress import Line
+from digiclay.commands.refusals import refuse_without
+from digiclay.commands.stop import Stop
+from digiclay.core.run_folder import may_be_written, written
+
+__all__ = ["add"]
+
+EXAMPLES = """\
+examples:
+  digiclay paper                           into ./paper, in one to three minutes
+  digiclay paper --out results --overwrite
+
+The folder holds paper.md (start there), the figures as SVG with their data as CSV beside them, and
+metrics.json with every number.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    said = "Reproduce the paper's figures, and set its claims beside what is measured."
+    parser = add_command(commands, "paper", "reproduce the paper's results", EXAMPLES, said)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("paper"), help="default ./paper")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
+    parser.add_argument("--quick", action="store_true", help="coarse: few speeds and gains, for a first look")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Simulate, draw, write, and tell how the claims came out."""
+    may_be_written(arguments.out, overwrite=arguments.overwrite)
+    refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
+    from .results import FULL, QUICK
+    from .work import produce
+
+    with (
+        Stop() as stop,
+        Stages(sys.stderr, stop, quiet=arguments.quiet) as told,
+        written(arguments.out, overwrite=arguments.overwrite) as folder,
+    ):
+        verdicts = produce(folder, QUICK if arguments.quick else FULL, told)
+    if not arguments.quiet:
+        print("\n".join(verdicts))
+        print(f"written to {arguments.out}: start with {arguments.out / 'paper.md'}")
+    return 0
+
+
+class Stages(Line):
+    """Tells on a terminal what is being done, on one line; elsewhere nothing. Stops when asked to.
+
+    Parameters
+    ----------
+    stream : TextIO
+    stop : Stop
+        Asked before each stage.
+    quiet : bool
+    """
+
+    def __init__(self, stream: TextIO, stop: Stop, *, quiet: bool) -> None:
+        super().__init__(stream)
+        self._stop, self._quiet = stop, quiet
+
+    def __call__(self, stage: str) -> None:
+        """Tell the next stage."""
+        if self._stop():
+            raise KeyboardInterrupt
+        if not self._quiet:
+            self.draw(f"{time.monotonic() - self._started:4.0f} s  {stage}")

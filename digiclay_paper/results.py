@@ -1,0 +1,239 @@
+"""What `digiclay paper` measures, as one value that the figures and the claims are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from digiclay.core.metrics_speed import Criterion, Drag, Follows
+from digiclay.core.metrics_trial import Trial
+from digiclay.core.scene import Scene
+from numpy.typing import NDArray
+
+from .scenes import SINK, TALL
+
+__all__ = [
+    "AHEAD", "AS_IT_IS", "FULL", "PAPER_SPEED", "QUICK", "SESSION", "WAYS", "Dragged", "Extent", "Located",
+    "Results", "Session", "Swing", "onset_among",
+]  # fmt: skip
+
+#: The speed up to which the paper says both methods track, m/s, and its session.
+PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
+#: The simple trajectories: straight and level drags over the finger's height, m.
+WAYS = {
+    "in the surface": Drag(height=-4.5e-3),
+    "a ridge 15 mm high": Drag(height=TALL),
+    "a valley": Drag(height=SINK),
+}
+#: How far ahead of the finger cells are looked at that do not feel it yet, m.
+AHEAD = (9e-3, 12e-3)
+#: The scene without a change, among its variants.
+AS_IT_IS = "as it is"
+#: Smallest amplitude of an oscillation that goes on, a fortieth of the set point, N.
+SUSTAINED = 0.01
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is simulated.
+
+    Attributes
+    ----------
+    resolution : float
+        Of the largest speeds, m/s.
+    drags, lifts : tuple of float
+        Between which speeds the largest of a drag and of a lift are looked for, m/s.
+    speeds : tuple of float
+        Of the drags that are drawn, m/s.
+    gains, position_gains : tuple of float
+        Of the sweep, 1/N and 1/m.
+    cell_gains : tuple of float
+        K_FF of Method II's sweep, 1/N.
+    ways : tuple of str
+        Which of the simple trajectories the variants of the scene are tried on.
+    noises : tuple of float
+        Standard deviations of the force sensors with which the finger is located, N.
+    """
+
+    resolution: float
+    drags: tuple[float, float]
+    lifts: tuple[float, float]
+    speeds: tuple[float, ...]
+    gains: tuple[float, ...]
+    position_gains: tuple[float, ...]
+    cell_gains: tuple[float, ...]
+    ways: tuple[str, ...]
+    noises: tuple[float, ...]
+
+
+FULL = Extent(
+    0.5e-3,
+    (5e-3, 32e-3),
+    (2e-3, 40e-3),
+    (10e-3, 15e-3, 20e-3, 25e-3),
+    (2.0, 2.5, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 57.0, 80.0, 113.0, 160.0),
+    (500.0, 1000.0, 2000.0),
+    (15.0, 25.0, 50.0, 70.0, 100.0, 200.0, 400.0),
+    tuple(WAYS),
+    (0.5e-3, 1e-3, 2e-3),
+)
+QUICK = Extent(
+    15e-3, (15e-3, 30e-3), (15e-3, 30e-3), (), (5.0, 80.0), (500.0, 1000.0), (15.0, 100.0),
+    ("in the surface",), (2e-3,),
+)  # fmt: skip
+
+
+class Swing(NamedTuple):
+    """What a hold after a quick press came to, at one pair of gains.
+
+    Attributes
+    ----------
+    gain, position_gain : float
+        K_f, 1/N, and K_p, 1/m.
+    amplitude : float
+        Of the force in the last second, N.
+    frequency : float or None
+        Hz.
+    settling : float or None
+        From the press until the force stays within 10 % of its set point, s; None: it goes on swinging.
+    """
+
+    gain: float
+    position_gain: float
+    amplitude: float
+    frequency: float | None
+    settling: float | None
+
+    @property
+    def sustained(self) -> bool:
+        """Whether the force still swings, and does not only drift, in the last second."""
+        return self.frequency is not None and self.amplitude > SUSTAINED
+
+
+class Dragged(NamedTuple):
+    """What a straight level drag came to.
+
+    Attributes
+    ----------
+    follows : Follows
+    force, deviation : float
+        Mean and standard deviation over time of the total force, N.
+    followers : float
+        Mean number of cells that follow the force.
+    unevenness : float or None
+        See the metric ``ridge_unevenness``, m.
+    ahead : float or None
+        Mean height over the bed at rest of cells that do not feel the finger and lie `AHEAD` of it, m.
+    """
+
+    follows: Follows
+    force: float
+    deviation: float
+    followers: float
+    unevenness: float | None
+    ahead: float | None
+
+
+class Located(NamedTuple):
+    """How well Method I locates a finger that is held still, with noisy force sensors.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation of a cell's force sensor, N.
+    radius : float
+        r_VM, m.
+    thresholds : bool
+        Whether the controller takes readings below the threshold of the noise for none.
+    scatter : float or None
+        Root mean square distance of the virtual master from its mean place, m; None: it never shapes.
+    losses : int
+        How often the finger was lost.
+    """
+
+    noise: float
+    radius: float
+    thresholds: bool
+    scatter: float | None
+    losses: int
+
+
+class Session(NamedTuple):
+    """A session boiled down to what is drawn and judged.
+
+    Attributes
+    ----------
+    scene : Scene
+    history : dict of ndarray
+        Every fourth row of time, height, total force, total force asked for (``set_point``), number of
+        cells that follow and fingertip; and the positions.
+    detail : dict of ndarray
+        Every row of time and height in the first seconds.
+    metrics : dict
+        As `Trial.metrics`.
+    lost : list of float
+        When the finger was lost though it rose no faster than a pin can, s.
+    followers : float
+        Mean number of cells that follow the force while there are any.
+    """
+
+    scene: Scene
+    history: dict[str, NDArray[Any]]
+    detail: dict[str, NDArray[Any]]
+    metrics: dict[str, float | None]
+    lost: list[float]
+    followers: float
+
+
+@dataclass
+class Results:
+    """What was simulated, by method where methods are set beside each other.
+
+    Attributes
+    ----------
+    blisters : by method, shape ("convex", "concave"), profile
+    drags : a drag of a ridge, and when it starts and ends, s
+    printed, session : the paper's session at its own times; at times both methods can follow
+    slow : how many times as long the latter takes
+    simple : the simple trajectories at 15 mm/s, by method and name
+    tracks : ridge drags at several speeds
+    fastest, lifting : largest speed of a ridge drag, and of a lift, m/s
+    swings, details : the sweep of the gains; its sessions, by gains
+    quicker : the same sweep with a quicker device, and how fast its pins are without load, m/s
+    wild : the session's first seconds with Method I at the first gain that oscillates, if one does
+    cell_swings : Method II pressed quickly and held, by K_FF
+    dragged : drags by variant of the scene, method and name of the trajectory
+    located : a finger held still under noise, with the search radius and without
+    """
+
+    criterion: Criterion = field(default_factory=Criterion)
+    blisters: dict[tuple[str, str, str], Trial] = field(default_factory=dict)
+    drags: dict[str, tuple[Trial, float, float]] = field(default_factory=dict)
+    printed: dict[str, Session] = field(default_factory=dict)
+    session: dict[str, Session] = field(default_factory=dict)
+    slow: float = 1.0
+    simple: dict[tuple[str, str], Follows] = field(default_factory=dict)
+    tracks: dict[str, list[Follows]] = field(default_factory=dict)
+    fastest: dict[str, float | None] = field(default_factory=dict)
+    lifting: dict[str, float | None] = field(default_factory=dict)
+    swings: list[Swing] = field(default_factory=list)
+    details: dict[tuple[float, float], tuple[Trial, float]] = field(default_factory=dict)
+    quicker: list[Swing] = field(default_factory=list)
+    quicker_speed: float = 0.0
+    wild: Session | None = None
+    cell_swings: list[Swing] = field(default_factory=list)
+    dragged: dict[tuple[str, str, str], Dragged] = field(default_factory=dict)
+    located: list[Located] = field(default_factory=list)
+
+    def onset(self, position_gain: float) -> tuple[float | None, float | None]:
+        """Return the `onset_among` those at one K_p, 1/m."""
+        return onset_among([one for one in self.swings if one.position_gain == position_gain])
+
+
+def onset_among(swings: list[Swing]) -> tuple[float | None, float | None]:
+    """Return the largest K_f below the first sustained oscillation, and the one that has it, 1/N."""
+    row = sorted(swings, key=lambda one: one.gain)
+    first = next((i for i, one in enumerate(row) if one.sustained), None)
+    if first is None:
+        return (row[-1].gain if row else None), None
+    return (row[first - 1].gain if first else None), row[first].gain
