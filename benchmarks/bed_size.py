@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from digiclay.core.scene_table import resolve
 from digiclay.core.simulation import begin, periods
 from digiclay.core.state import State
 from digiclay.core.system import System
+from digiclay.plots.figure import empty
 
-from . import plots
+from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress
 
 __all__ = ["SIDES", "Size", "add", "bytes_of", "gathered_cells", "measured", "scene"]
@@ -145,8 +147,26 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Size)]
     kept(arguments.out, "scale", text, head, [[getattr(one, name) for name in head] for one in sizes])
     if arguments.out:
-        plots.scale(sizes, arguments.out / "scale.png")
+        _draw(sizes, arguments.out / "scale.png")
     return 0
+
+
+def _draw(sizes: Sequence[Size], out: Path) -> Path:
+    """Draw a control period's cost over the number of pins, and return the path."""
+    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
+        panel = figure.subplots()
+        pins = [one.pins for one in sizes]
+        for values, label, colour, marker in (
+            ([one.period * 1e6 for one in sizes], "median", "#0072B2", "o"),
+            ([one.mean * 1e6 for one in sizes], "mean, with the finger's poses", "#D55E00", "s"),
+        ):
+            panel.semilogx(pins, values, "-", color=colour, marker=marker, label=label)
+        panel.set_ylim(0.0, 1.2e6 * max(one.mean for one in sizes))
+        panel.set_xlabel("pins of the bed")
+        panel.set_ylabel("a control period, µs")
+        panel.set_title("The same finger on larger beds")
+        panel.legend(loc="lower right")
+        return write(figure, out)
 
 
 def _text(sizes: list[Size]) -> Iterator[str]:

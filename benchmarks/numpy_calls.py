@@ -10,7 +10,7 @@ import dataclasses
 import statistics
 import sys
 import timeit
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -201,15 +201,15 @@ def report(scene: Scene) -> Iterator[str]:
     calls, ledger = period_calls(assemble(scene), scene.trajectory.trajectory(), count)
     alone = floor(ledger)
     number: Counter[str] = Counter()
-    spent: Counter[str] = Counter()
+    spent: defaultdict[str, float] = defaultdict(float)
     for key, times in ledger.calls.items():
         number[key[0]] += times
         spent[key[0]] += times * alone.get(key, 0.0)
     yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"
     rows = [
         [name, f"{number[name] / count:.1f}", f"{spent[name] / count * 1e6:.1f}"]
-        for name, _ in spent.most_common()
+        for name in sorted(spent, key=lambda one: -spent[one])
         if number[name] >= 0.05 * count
     ]
-    rows.append(["all", f"{number.total() / count:.1f}", f"{spent.total() / count * 1e6:.1f}"])
+    rows.append(["all", f"{number.total() / count:.1f}", f"{sum(spent.values()) / count * 1e6:.1f}"])
     yield from table(("call", "a period", "alone, µs"), rows)

@@ -113,7 +113,8 @@ class Finger:
         i = min(max(bisect_right(self.times, t) - 1, 0), len(self.pieces) - 1)
         s = min(max((t - self.times[i]) / (self.times[i + 1] - self.times[i]), 0.0), 1.0)
         a, b, c, d = self.pieces[i]
-        return tuple(a[j] + s * (b[j] + s * (c[j] + s * d[j])) for j in range(3))  # type: ignore[return-value]
+        x, y, z = (a[j] + s * (b[j] + s * (c[j] + s * d[j])) for j in range(3))
+        return x, y, z
 
 
 class Line:
@@ -136,7 +137,8 @@ class Line:
         at_x, at_y, at_z = self.finger(t)
         inward = 1.0 - ((x - at_x) / self.tip.length) ** 2 - ((y - at_y) / self.tip.width) ** 2
         kept = np.maximum(inward, 1.0 - JOIN)
-        return at_z + self.tip.height * (1.0 - np.sqrt(kept) - (inward - kept) * (0.5 / ROOT))
+        under: Floats = at_z + self.tip.height * (1.0 - np.sqrt(kept) - (inward - kept) * (0.5 / ROOT))
+        return under
 
     def rates(self, x: Floats, y: Floats, command: Floats) -> Callable[[float, Floats], Floats]:
         """Return the right-hand side for some cells, the first of which the finger may touch."""

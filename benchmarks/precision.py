@@ -87,7 +87,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     print(text)
     kept(arguments.out, "precision", text, COLUMNS, [astuple(one) for one in work])
     if arguments.out:
-        plots.precision(work, arguments.out / "precision.png")
+        plots.draw_precision(work, arguments.out / "precision.png")
     if arguments.whole_bed:
         whole_bed.carry_out(arguments, [name for name in names if PROBLEMS[name][0] > 1])
     return 0

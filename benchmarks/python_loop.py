@@ -97,7 +97,7 @@ class Scalar:
     def force(self, y: list[float], under: float) -> float:
         """Return the force, N."""
         relaxed = sum(w * z for w, z in zip(self.weights, y[1:4], strict=True))
-        return self.share * max(self.unit * self.tension(y[0], under) - relaxed, 0.0)
+        return float(self.share * max(self.unit * self.tension(y[0], under) - relaxed, 0.0))
 
     def step(self, y: list[float], openings: list[float], unders: list[float]) -> None:
         """Move a cell on by a step, in place."""

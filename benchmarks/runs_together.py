@@ -7,6 +7,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 from digiclay.commands.arguments import add_scene, scene_of
@@ -14,8 +15,9 @@ from digiclay.core.scene import Scene
 from digiclay.core.session import run
 from digiclay.core.stack.session import judge_together, run_together
 from digiclay.core.sweep import evaluate
+from digiclay.plots.figure import empty
 
-from . import plots
+from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress, table
 
 __all__ = ["COUNTS", "STUDIES", "Size", "add", "measured", "study"]
@@ -121,8 +123,35 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Size)]
     kept(arguments.out, "stack", text, head, [[getattr(one, name) for name in head] for one in sizes])
     if arguments.out:
-        plots.stack(sizes, arguments.out / "stack.png")
+        _draw(sizes, arguments.out / "stack.png")
     return 0
+
+
+def _draw(sizes: Sequence[Size], out: Path) -> Path:
+    """Draw how many times the runs a second a stack comes to, over its runs, and return the path."""
+    with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
+        panel = figure.subplots()
+        for study, colour, marker in (("control", "#0072B2", "o"), ("device", "#D55E00", "s")):
+            own = [one for one in sizes if one.study == study]
+            runs = [one.runs for one in own]
+            for gains, line, label in (
+                ([one.alone / one.stacked for one in own], "-", "simulated"),
+                ([one.judged_alone / one.judged_stacked for one in own], "--", "recorded and judged"),
+                ([one.errors_alone / one.errors_stacked for one in own], ":", "errors estimated too"),
+            ):
+                panel.loglog(
+                    runs, gains, line, color=colour, marker=marker,
+                    markerfacecolor=colour if line == "-" else "white", label=f"{study} varies, {label}",
+                )  # fmt: skip
+        panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
+        panel.set_xticks(runs, [str(count) for count in runs])
+        panel.set_yticks([1, 2, 4, 6, 10, 20], ["1", "2", "4", "6", "10", "20"])
+        panel.minorticks_off()
+        panel.set_xlabel("runs in one call")
+        panel.set_ylabel("runs a second, to one at a time")
+        panel.set_title("Many sessions in one call")
+        panel.legend(loc="lower right", fontsize=8.5)
+        return write(figure, out)
 
 
 def _text(scene: Scene, sizes: Sequence[Size]) -> Iterator[str]:

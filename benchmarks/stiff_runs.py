@@ -116,6 +116,7 @@ def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats,
 
 def _within_reach(system: System, trajectory: Trajectory, period: int, before: Floats, after: Floats) -> bool:
     """Tell whether heights, (n,), are within `Speeds.reach` of those a control period before."""
+    assert system.cell.touch is not None
     poses = trajectory.poses(period * system.period + system.instants)
     places = system.grid.place(np.arange(system.grid.count))
     under = underside(*forms(system.cell.touch.fingertip.outline(poses)), places)

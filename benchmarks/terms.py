@@ -73,8 +73,8 @@ def without(scene: Scene, term: str) -> Scene | None:
     if term == LONGER:
         simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
         return None if simulation == scene.simulation else replace(scene, simulation=simulation)
-    section = TERMS[term]
-    return None if getattr(scene, section) is None else replace(scene, **{section: None})
+    left_out: dict[str, Any] = {TERMS[term]: None}
+    return None if getattr(scene, TERMS[term]) is None else replace(scene, **left_out)
 
 
 def _run(scene: Scene, commands: Floats | None, repeats: int) -> Run:

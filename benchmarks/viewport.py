@@ -47,10 +47,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
     text = "\n".join(_text(costs, PARTS, bpy.app.version_string))
     print(text)
     head = ("pins", *(f"{name}_s" for name in PARTS), "tick_s", "tick_95_s", "growth_bytes")
-    rows = [
+    figures = [
         [one.pins, *(one.parts[name] for name in PARTS), one.whole, one.worst, one.growth] for one in costs
     ]
-    kept(arguments.out, "viewport", text, head, rows)
+    kept(arguments.out, "viewport", text, head, figures)
     return 0
 
 

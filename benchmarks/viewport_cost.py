@@ -114,10 +114,13 @@ def _move(bed: Any, count: int) -> None:
     """Put the fingertip where it is at a tick: down, and round and round."""
     tip = view.fingertip_of(bed)
     turn = 2.0 * np.pi * count / ROUND
-    rest = running.of(bed).scene.actuator.rest_height
+    session = running.of(bed)
+    assert session is not None
+    assert session.scene.fingertip is not None
+    rest = session.scene.actuator.rest_height
     down = min(count / (0.8 * WARM_UP), 1.0) * (DEPTH + 2e-3)
     pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), rest + 2e-3 - down, 1.0, 0.0, 0.0, 0.0])
-    bridge.place_fingertip(tip, pose, running.of(bed).scene.fingertip)
+    bridge.place_fingertip(tip, pose, session.scene.fingertip)
     bpy.context.view_layer.update()
 
 
@@ -141,6 +144,7 @@ def _timed_parts(bed: Any, count: int) -> dict[str, float]:
     """Return what the parts of a tick take, s."""
     _move(bed, count)
     session = running.of(bed)
+    assert session is not None
     moments = [time.perf_counter()]
     obstacle(bpy.context, bed)
     pose = bridge.pose(view.fingertip_of(bed))

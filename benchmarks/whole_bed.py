@@ -93,7 +93,7 @@ def carry_out(arguments: argparse.Namespace, names: Sequence[str]) -> None:
     made = made_with() if peers.missing() else made_with("scipy")
     kept(arguments.out, "precision_whole_bed", f"{made}\n\n{text}", COLUMNS, [astuple(one) for one in work])
     if arguments.out:
-        plots.precision(work, arguments.out / "precision_whole_bed.png", LINES)
+        plots.draw_precision(work, arguments.out / "precision_whole_bed.png", LINES)
 
 
 def everywhere(known: Problem) -> Problem:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from digiclay.core.metrics_signal import amplitude, frequency, settling_time
-from digiclay.core.metrics_speed import Drag, Lift, followed, largest_speed
+from digiclay.core.metrics_speed import Drag, Follows, Lift, followed, largest_speed
 from digiclay.core.metrics_trial import Trial, trial
 from digiclay.core.modes import Mode
 from digiclay.core.scene_file import Setting, find, load
@@ -89,10 +89,14 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
         results.tracks[method].append(followed(found, Drag(height=TALL), speed)[0])
     told(f"fastest drag, {method}")
     tracks = results.tracks[method]
+
+    def tried(one: Follows) -> None:
+        told(f"drag at {one.speed * 1e3:.1f} mm/s, {method}")
+        tracks.append(one)
+
     results.fastest[method] = largest_speed(
         found, Drag(height=TALL), results.criterion,
-        low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution,
-        told=lambda one: (told(f"drag at {one.speed * 1e3:.1f} mm/s, {method}"), tracks.append(one)),
+        low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
     )  # fmt: skip
     tracks.sort(key=lambda one: one.speed)
     results.lifting[method] = largest_speed(

@@ -19,6 +19,8 @@ from tests.patience import HANGS
 
 HERE = Path(__file__).parent
 TOOL = HERE.parents[1] / "tools" / "extension.py"
+#: Packages that stand beside the extension.
+BESIDE = ("benchmarks", "digiclay_paper")
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +65,14 @@ def test_the_zip_has_the_package_and_nothing_that_was_left_lying_about(archive: 
     assert archive.stat().st_size < 5e6
 
 
+def test_no_benchmark_and_no_module_of_the_paper_is_in_the_zip(archive: Path) -> None:
+    files = [path for folder in BESIDE for path in (TOOL.parents[1] / folder).glob("*.py")]
+    contents = {path.read_bytes() for path in files}
+    assert len(contents) > 30
+    with zipfile.ZipFile(archive) as zipped:
+        assert [name for name in zipped.namelist() if zipped.read(name) in contents] == []
+
+
 def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path: Path) -> None:
     """The tags are looked at: they go unchecked unless the tool is told where they stand."""
     copy = tmp_path / "checkout"
@@ -104,6 +114,17 @@ def test_the_preferences_are_those_blender_shows(seen: dict[str, Any]) -> None:
 
 def test_a_users_presets_stand_in_the_extensions_own_folder(seen: dict[str, Any]) -> None:
     assert seen["own presets"] == [str(Path("presets", "Mine.toml"))]
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [("paper", "run 'pip install digiclay[plots]' first."), ("benchmark", "'python -m benchmarks --help'")],
+)
+def test_the_installed_command_says_in_a_line_what_is_not_part_of_it(
+    command: str, said: str, seen: dict[str, Any]
+) -> None:
+    code, told = seen[command]
+    assert (code, told.count("\n"), said in told) == (2, 1, True)
 
 
 @pytest.mark.parametrize("command", ["describe", "run", "export", "render"])

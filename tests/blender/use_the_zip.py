@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 import json
 import sys
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import bpy
@@ -55,6 +57,9 @@ def main() -> None:
     seen["export"] = command(["export", str(run), "--out", str(FOLDER), "--format", "stl"])
     still = ["--out", str(FOLDER / "still.png"), "--size", "160x100", "--engine", "workbench"]
     seen["render"] = command(["render", str(run), *still])
+    for outside in ("paper", "benchmark"):
+        with redirect_stderr(StringIO()) as told:
+            seen[outside] = [command([outside]), told.getvalue()]
     addon_utils.disable(EXTENSION, default_set=True)
     names = [name for name in dir(bpy.types) if "digi" in name.lower()]
     seen["left behind"] = names + ["Object.digiclay"] * hasattr(bpy.types.Object, "digiclay")
