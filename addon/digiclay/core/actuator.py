@@ -26,9 +26,7 @@ class Actuator(Parameters):
     stroke: float = quantity(
         100e-3, "height of the upper end stop", unit="m", symbol="H_max", source="P", above=0.0
     )
-    rest_height: float = quantity(
-        40e-3, "height of every pin at the start", unit="m", symbol="H_0", at_least=0.0
-    )
+    rest_height: float = quantity(40e-3, "initial height of all pins", unit="m", symbol="H_0", at_least=0.0)
 
     def check(self) -> None:
         """The rest height lies between the end stops."""

@@ -34,10 +34,10 @@ class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
 
     length: float = quantity(
-        10e-3, "semi-axis along the finger", unit="m", symbol="a_x", source="C, Microsoft", above=0.0
+        10e-3, "semi-axis along the fingertip", unit="m", symbol="a_x", source="C, Microsoft", above=0.0
     )
     width: float = quantity(
-        8e-3, "semi-axis across the finger", unit="m", symbol="a_y", source="C, Microsoft", above=0.0
+        8e-3, "semi-axis across the fingertip", unit="m", symbol="a_y", source="C, Microsoft", above=0.0
     )
     height: float = quantity(
         8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="C, Microsoft", above=0.0

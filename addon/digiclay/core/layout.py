@@ -40,11 +40,11 @@ class Layout(Parameters):
         25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
     )
     pitch: float = quantity(
-        3e-3, "distance between neighbours in a row", unit="m", symbol="p", source="P", above=0.0
+        3e-3, "distance of neighbouring cells in a row", unit="m", symbol="p", source="P", above=0.0
     )
     arrangement: str = quantity(
         "aligned",
-        "how neighbouring rows stand to each other",
+        "offset of neighbouring rows",
         source="P",
         choices=("aligned", "staggered", "hexagonal"),
     )

@@ -39,7 +39,7 @@ CHUNK = 64
 class Recorder(Parameters):
     """Keeps the state of every cell, one row every so many control periods, and the last."""
 
-    every: int = quantity(1, "control periods a row", at_least=1)
+    every: int = quantity(1, "control periods per row of the history", at_least=1)
 
     def rows(self, periods: int) -> int:
         """Return the number of rows of a session of so many control periods."""

@@ -29,7 +29,7 @@ class Relaxation(Parameters):
     )
     weights: tuple[float, ...] = quantity(
         (0.08, 0.62, 0.20, 0.10),
-        "weights c0 (what stays) to c_k",
+        "weights c0 (permanent share) to c_k",
         symbol="c_i",
         source="C, Jindrich 2003",
         at_least=0.0,

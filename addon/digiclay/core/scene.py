@@ -114,13 +114,13 @@ class Simulation(Parameters):
     """How time is cut up, and how much of it there is."""
 
     control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
-    physics_step: float = quantity(5e-3, "longest step of the physics", unit="s", symbol="h", above=0.0)
-    stepper: str = quantity("bernoulli", "how a step is integrated", choices=tuple(STEPPERS))
+    physics_step: float = quantity(5e-3, "longest physics step", unit="s", symbol="h", above=0.0)
+    stepper: str = quantity("bernoulli", "method of integration", choices=tuple(STEPPERS))
     tolerance: float = quantity(
-        1e-6, "error of the heights that the adaptive stepper keeps to", unit="m", symbol="ε", at_least=1e-7
+        1e-6, "error of the heights allowed to the adaptive stepper", unit="m", symbol="ε", at_least=1e-7
     )
     duration: float = quantity(
-        0.0, "simulated time; 0: as long as the trajectory lasts", unit="s", at_least=0.0, at_most=1e6
+        0.0, "simulated time; 0: duration of the trajectory", unit="s", at_least=0.0, at_most=1e6
     )
 
     def check(self) -> None:

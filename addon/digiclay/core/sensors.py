@@ -42,20 +42,18 @@ class Sensing(Parameters):
         0.0, "standard deviation of the height sensors", unit="m", symbol="σ_H", at_least=0.0, at_most=1.0
     )
     force_step: float = quantity(
-        0.0, "smallest step of a force reading", unit="N", symbol="q_F", at_least=0.0, at_most=100.0
+        0.0, "resolution of a force reading", unit="N", symbol="q_F", at_least=0.0, at_most=100.0
     )
     height_step: float = quantity(
-        0.0, "smallest step of a height reading", unit="m", symbol="q_H", at_least=0.0, at_most=1.0
+        0.0, "resolution of a height reading", unit="m", symbol="q_H", at_least=0.0, at_most=1.0
     )
-    delay: int = quantity(
-        0, "control periods by which readings are late", symbol="d", at_least=0, at_most=100
-    )
+    delay: int = quantity(0, "delay of readings in control periods", symbol="d", at_least=0, at_most=100)
     observer: str = quantity(
         "none",
-        "what stands for the force sensors: nothing, or an estimate from heights and commands",
+        "replacement of the force sensors: none, or an estimate from heights and commands",
         choices=("none", "valve"),
     )
-    seed: int = quantity(0, "which noise", at_least=0, at_most=2**63 - 1)
+    seed: int = quantity(0, "seed of the noise", at_least=0, at_most=2**63 - 1)
 
     @property
     def force_floor(self) -> float:

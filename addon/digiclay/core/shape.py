@@ -27,46 +27,55 @@ AUTO = "auto"
 class Shape(Parameters):
     """A shape from outside: where it comes from, how it is laid onto the bed, how the bed gets there."""
 
-    file: str = quantity("dome", "a sample shape's name, or a mesh, a picture or a file .npy")
-    heights: str = quantity("", "if given, in place of the file: the heights of all cells, packed as text")
+    file: str = quantity("dome", "name of a sample shape, or a mesh, a picture or a file .npy")
+    heights: str = quantity("", "heights of all cells, packed as text, in place of the file")
     fit: str = quantity(
         "contain",
-        "how it is laid onto the bed: whole, filling the bed, stretched, in its own size, or where its own "
-        "coordinates put it",
+        "placement on the bed: whole, filling the bed, stretched, in its own size, or at its own coordinates",
         choices=("contain", "cover", "stretch", "actual", "placed"),
     )
-    scale: float = quantity(1.0, "how much larger than that in plan", above=0.0, at_most=1e6)
+    scale: float = quantity(1.0, "scale of the plan", above=0.0, at_most=1e6)
     x: float = quantity(
-        0.0, "shift of its middle from the bed's", unit="m", symbol="x_s", at_least=-100.0, at_most=100.0
+        0.0,
+        "shift of the middle from that of the bed",
+        unit="m",
+        symbol="x_s",
+        at_least=-100.0,
+        at_most=100.0,
     )
     y: float = quantity(
-        0.0, "shift of its middle from the bed's", unit="m", symbol="y_s", at_least=-100.0, at_most=100.0
+        0.0,
+        "shift of the middle from that of the bed",
+        unit="m",
+        symbol="y_s",
+        at_least=-100.0,
+        at_most=100.0,
     )
     relief: str = quantity(
         "rise",
-        "how high it is: `rise` high, up to the end of the stroke, or as high as it is wide",
+        "height: `rise`, up to the end of the stroke, or in proportion to the plan",
         choices=("rise", "stroke", "true"),
     )
     rise: float = quantity(
-        15e-3, "from its lowest to its highest point; negative turns it over", unit="m", symbol="h_r",
+        15e-3, "lowest to highest point; a negative value inverts the shape", unit="m", symbol="h_r",
         at_least=-100.0, at_most=100.0,
     )  # fmt: skip
     foot: float = quantity(
-        0.0, "where its lowest point lies above the bed at rest", unit="m", symbol="h_f",
+        0.0, "lowest point above the bed at rest", unit="m", symbol="h_f",
         at_least=-100.0, at_most=100.0,
     )  # fmt: skip
-    up: str = quantity(AUTO, "which direction of a mesh is up", choices=(AUTO, *UPWARDS))
-    unit: str = quantity(AUTO, "length a mesh is in", choices=(AUTO, *LENGTHS))
+    up: str = quantity(AUTO, "upward direction of a mesh", choices=(AUTO, *UPWARDS))
+    unit: str = quantity(AUTO, "unit of length of a mesh", choices=(AUTO, *LENGTHS))
     refresh: str = quantity(
         "approximate_gradual",
-        "how the surface gets there",
+        "method of refresh",
         choices=("one_time", "gradual", "approximate_gradual"),
     )
     surfaces: int = quantity(
-        5, "intermediate surfaces of a gradual refresh, the last one counted", symbol="n_s",
+        5, "number of intermediate surfaces of a gradual refresh, including the last", symbol="n_s",
         at_least=1, at_most=1000,
     )  # fmt: skip
-    patience: float = quantity(2.0, "longest time a move is waited for", unit="s", symbol="t_p", above=0.0)
+    patience: float = quantity(2.0, "time limit of a move", unit="s", symbol="t_p", above=0.0)
 
     def check(self) -> None:
         """A shape comes from somewhere."""

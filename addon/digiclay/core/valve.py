@@ -33,7 +33,9 @@ class Valve(Parameters):
     discharge_slope: float = quantity(
         0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0
     )
-    knee_reynolds: float = quantity(200.0, "where the branches meet", symbol="Re_k", source="P", above=0.0)
+    knee_reynolds: float = quantity(
+        200.0, "Reynolds number Re* at which the branches meet", symbol="Re_k", source="P", above=0.0
+    )
     gap: str = quantity(
         "stroke",
         "length in Re*: the full stroke (eq. 4), or the actual opening",

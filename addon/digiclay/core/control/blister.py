@@ -28,7 +28,7 @@ class Blister(Parameters):
         18.5e-3, "outer radius of the ring of edge cells", unit="m", symbol="r_edge", above=0.0
     )
     flat_radius: float = quantity(6e-3, "radius of the flat top", unit="m", symbol="r_flat", at_least=0.0)
-    profile: str = quantity("cone", "how the blister falls off", source="P", choices=("cone", "gaussian"))
+    profile: str = quantity("cone", "radial profile of the blister", source="P", choices=("cone", "gaussian"))
     sigma: float = quantity(7e-3, "standard deviation of the Gaussian", unit="m", symbol="σ", above=0.0)
 
     def check(self) -> None:

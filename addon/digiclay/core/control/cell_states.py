@@ -65,13 +65,15 @@ class Patch(NamedTuple):
 class CellStates(Tracking):
     """Gains and thresholds of Method II, all of them per cell."""
 
-    force_setpoint: float = quantity(0.04, "force held under the finger", unit="N", symbol="F_ref", above=0.0)
+    force_setpoint: float = quantity(
+        0.04, "force of a cell held under the fingertip", unit="N", symbol="F_ref", above=0.0
+    )
     spring_trigger: float = quantity(
-        0.06, "force at which a cell at rest starts to follow", unit="N", symbol="F_trig^VS", above=0.0
+        0.06, "force at which a cell at rest begins to follow", unit="N", symbol="F_trig^VS", above=0.0
     )
     blister_trigger: float = quantity(
         0.015,
-        "force at which a cell of the blister starts to follow",
+        "force at which a cell of the blister begins to follow",
         unit="N",
         symbol="F_trig^blister",
         above=0.0,
@@ -80,20 +82,20 @@ class CellStates(Tracking):
         0.005, "force below which a following cell is critical", unit="N", symbol="F_trig^crit", above=0.0
     )
     critical_time: float = quantity(
-        50e-3, "time after which a critical cell is given up", unit="s", symbol="t_crit", at_least=0.0
+        50e-3, "time until a critical cell ends following", unit="s", symbol="t_crit", at_least=0.0
     )
     spring_stiffness: float = quantity(20.0, "virtual spring", unit="N/m", symbol="k_VS", above=0.0)
     force_gain: float = quantity(15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0)
     rise: float = quantity(
         1e-3,
-        "how much higher the blister stands, so as to feel the finger",
+        "rise of the blister for the detection of contact",
         unit="m",
         symbol="h_rise",
         at_least=0.0,
     )
     jump: float = quantity(
         8e-3,
-        "way in a control period beyond which the finger was lost",
+        "motion in a control period beyond which there is a loss",
         unit="m",
         symbol="r_VM",
         source="P",

@@ -31,9 +31,9 @@ class DriveParameters(ControlParameters):
     """What every behaviour's height control needs."""
 
     settling_time: float = quantity(
-        20e-3, "time constant with which a free pin comes to its height", unit="s", symbol="τ_s", above=0.0
+        20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
     )
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class TouchParameters(DriveParameters):
 
     felt_force: float = quantity(
         5e-3,
-        "force from which on a cell counts as touched; never below five times the sensors' noise",
+        "least force of a touched cell; at least five times the sensors' noise",
         unit="N",
         symbol="F_0",
         above=0.0,

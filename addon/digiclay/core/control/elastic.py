@@ -27,10 +27,8 @@ STILL = 0.2
 class Elastic(TouchParameters):
     """A spring under every pin, and what damps it."""
 
-    stiffness: float = quantity(20.0, "spring of a cell", unit="N/m", symbol="k", above=0.0)
-    damping: float = quantity(
-        5.0, "force for the speed at which a pressed pin moves", unit="N s/m", symbol="c", above=0.0
-    )
+    stiffness: float = quantity(20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0)
+    damping: float = quantity(5.0, "force over speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,16 +32,16 @@ class ForceDisplay(TouchParameters):
     field: str = quantity("wave", "shape of the field: its name, or a file .npy of forces, N")
     force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_m", above=0.0)
     contrast: float = quantity(
-        0.5, "share of the mean by which a named field varies", symbol="κ", at_least=0.0, at_most=1.0
+        0.5, "variation of a named field, as a share of the mean", symbol="κ", at_least=0.0, at_most=1.0
     )
     damping: float = quantity(
-        5.0, "force amiss for the speed at which a cell corrects it", unit="N s/m", symbol="c", above=0.0
+        5.0, "force deviation over speed of its correction", unit="N s/m", symbol="c", above=0.0
     )
     rise: float = quantity(
-        5e-3, "how far above rest a pin follows the finger", unit="m", symbol="h_rise", at_least=0.0
+        5e-3, "largest height above rest of a following pin", unit="m", symbol="h_rise", at_least=0.0
     )
     release_time: float = quantity(
-        50e-3, "time without force after which a cell is let go", unit="s", symbol="t_r", at_least=0.0
+        50e-3, "time without force until a cell is released", unit="s", symbol="t_r", at_least=0.0
     )
 
     def check(self) -> None:

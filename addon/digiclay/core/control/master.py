@@ -89,25 +89,25 @@ class VirtualMaster(Tracking):
         above=0.0,
     )
     spring_stiffness: float = quantity(
-        200.0, "virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
+        200.0, "stiffness of the virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
     )
     force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
     radius: float = quantity(
         8e-3,
-        "how far from the master the finger is looked for",
+        "radius of the search for the fingertip around the master",
         unit="m",
         symbol="r_VM",
         source="P",
         above=0.0,
     )
     release_force: float = quantity(
-        0.02, "force that frees a frozen cell", unit="N", symbol="F_free", above=0.0
+        0.02, "force that releases a frozen cell", unit="N", symbol="F_free", above=0.0
     )
     felt_force: float = quantity(
-        1e-3, "total force below which there is no finger", unit="N", symbol="F_0", above=0.0
+        1e-3, "total force below which there is no contact", unit="N", symbol="F_0", above=0.0
     )
     loss_time: float = quantity(
-        50e-3, "time without force after which the finger is lost", unit="s", symbol="t_l", at_least=0.0
+        50e-3, "time without force until a loss", unit="s", symbol="t_l", at_least=0.0
     )
 
     @property

@@ -26,11 +26,9 @@ Floats = NDArray[np.float64]
 class Plastic(TouchParameters):
     """A Bingham body under every pin: rigid up to a yield force, viscous above."""
 
-    yield_force: float = quantity(
-        0.03, "force above which a cell gives way", unit="N", symbol="F_y", above=0.0
-    )
+    yield_force: float = quantity(0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0)
     damping: float = quantity(
-        5.0, "force above yield for the speed at which a pin sinks", unit="N s/m", symbol="c", above=0.0
+        5.0, "force above yield over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
     )
 
     def check(self) -> None:

@@ -45,22 +45,22 @@ class PushPull(DriveParameters):
     """How pins listen, and how they give way."""
 
     listening_speed: float = quantity(
-        8e-3, "speed of a free pin up and down while it listens", unit="m/s", symbol="v_l", above=0.0
+        8e-3, "speed of a free listening pin, up and down", unit="m/s", symbol="v_l", above=0.0
     )
     following_speed: float = quantity(
-        20e-3, "speed of a free pin up and down while it is moved", unit="m/s", symbol="v_f", above=0.0
+        20e-3, "speed of a free touched pin, up and down", unit="m/s", symbol="v_f", above=0.0
     )
     threshold: float = quantity(
-        0.1e-3, "commanded less measured height that is a touch", unit="m", symbol="θ", above=0.0
+        0.1e-3, "commanded less measured height at which contact is detected", unit="m", symbol="θ", above=0.0
     )
     centring_time: float = quantity(
-        0.5, "time constant with which a listening pin is brought back", unit="s", symbol="τ_c", above=0.0
+        0.5, "time constant of a listening pin's centring", unit="s", symbol="τ_c", above=0.0
     )
     assist: float = quantity(
-        0.5, "share of its last drift that a moved pin goes on with", symbol="a", at_least=0.0, at_most=0.9
+        0.5, "share of its last drift speed that a touched pin keeps", symbol="a", at_least=0.0, at_most=0.9
     )
     release_time: float = quantity(
-        0.1, "time without drift after which a pin is let go", unit="s", symbol="t_r", at_least=0.0
+        0.1, "time without drift until a pin is released", unit="s", symbol="t_r", at_least=0.0
     )
 
     def check(self) -> None:

@@ -25,7 +25,7 @@ class Servo(Parameters):
     """
 
     gain: float = quantity(500.0, "proportional gain", unit="1/m", symbol="K_p", at_least=0.0)
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
 
     def command(self, target: Floats, height: Floats) -> Floats:
         """Return valve commands, shape (n,), for commanded and measured heights, m."""

@@ -45,22 +45,22 @@ class Progress(NamedTuple):
 class ShapeDisplay(DriveParameters):
     """What is displayed, and how the surface gets there."""
 
-    shape: str = quantity("dome", "what is displayed: its name, or a file .npy of heights, m")
+    shape: str = quantity("dome", "displayed shape: its name, or a file .npy of heights, m")
     amplitude: float = quantity(
         10e-3, "height of a named shape over the bed at rest", unit="m", symbol="h_s",
         at_least=-100.0, at_most=100.0,
     )  # fmt: skip
     refresh: str = quantity(
         "one_time",
-        "how the surface gets there",
+        "method of refresh",
         source="Zhu 2005",
         choices=("one_time", "gradual", "approximate_gradual"),
     )
     surfaces: int = quantity(
-        5, "intermediate surfaces of a gradual refresh, the last one counted", symbol="n_s",
+        5, "number of intermediate surfaces of a gradual refresh, including the last", symbol="n_s",
         at_least=1, at_most=1000,
     )  # fmt: skip
-    patience: float = quantity(2.0, "longest time a move is waited for", unit="s", symbol="t_p", above=0.0)
+    patience: float = quantity(2.0, "time limit of a move", unit="s", symbol="t_p", above=0.0)
 
     def check(self) -> None:
         """The shape has a name, or is a file."""

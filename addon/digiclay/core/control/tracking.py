@@ -19,12 +19,12 @@ class Tracking(ControlParameters):
     position_gain: float = quantity(
         500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
     )
-    dead_band: float = quantity(10e-6, "height error left alone", unit="m", symbol="δ", at_least=0.0)
+    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
     travel: float = quantity(
-        1.5e-3, "distance travelled that settles the direction", unit="m", symbol="d_t", above=0.0
+        1.5e-3, "distance travelled that determines the direction", unit="m", symbol="d_t", above=0.0
     )
     behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind", symbol="cos_f", at_least=-1.0, below=0.0
+        -0.3, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
     )
 
     @cached_property

@@ -59,14 +59,12 @@ class Spot(NamedTuple):
 class Viscous(TouchParameters):
     """A spring and a damper side by side under every pin, and the exchange between neighbours."""
 
-    damping: float = quantity(
-        10.0, "force for the speed at which a pin sinks", unit="N s/m", symbol="c", above=0.0
-    )
+    damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
     recovery_time: float = quantity(
-        1.0, "time constant with which the surface recovers", unit="s", symbol="τ_r", above=0.0
+        1.0, "time constant of the surface's recovery", unit="s", symbol="τ_r", above=0.0
     )
     diffusivity: float = quantity(
-        10e-6, "how quickly displacement spreads to neighbours", unit="m2/s", symbol="D", at_least=0.0
+        10e-6, "diffusivity of the displacement between neighbours", unit="m2/s", symbol="D", at_least=0.0
     )
 
 
