@@ -17,7 +17,7 @@ from digiclay.compat import bpy, scratch
 from digiclay.core.layout import Layout
 from digiclay.device import display, view
 from digiclay.live import bed_state, running, sculpting, tick
-from digiclay.live.waiting import obstacle
+from digiclay.live.waiting import blocking_reason
 from digiclay.operators.add_bed import add, select_only
 from digiclay.settings import properties
 from digiclay.settings.devices import device
@@ -146,7 +146,7 @@ def _timed_parts(bed: Any, count: int) -> dict[str, float]:
     session = running.of(bed)
     assert session is not None
     moments = [time.perf_counter()]
-    obstacle(bpy.context, bed)
+    blocking_reason(bpy.context, bed)
     pose = bridge.pose(view.fingertip_of(bed))
     moments.append(time.perf_counter())
     later = sculpting.advanced(session, pose, TICK * count, 1000)

@@ -12,7 +12,7 @@ from .compat import bpy
 from .core.errors import DigiclayError
 from .core.fingertip import Fingertip
 from .device.roles import ELLIPSOID, ROLE
-from .device.shapes import Shape
+from .device.primitives import Shape
 
 __all__ = [
     "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",

@@ -34,12 +34,12 @@ def take_palette(preferences: Any, context: Any) -> None:
     palettes.wear(preferences.palette)
 
 
-class Preferences(bpy.types.AddonPreferences):  # type: ignore[misc]
+class Preferences(bpy.types.AddonPreferences):
     """Edit > Preferences > Add-ons > Digital Clay."""
 
     bl_idname = __package__
 
-    redraw_rate: bpy.props.IntProperty(  # type: ignore[valid-type]
+    redraw_rate: bpy.props.IntProperty(
         name="Redraw Rate (Hz)",
         description="How often a running session is drawn at most, in Hz; drawing is what costs most",
         default=Choices.redraw_rate,
@@ -48,7 +48,7 @@ class Preferences(bpy.types.AddonPreferences):  # type: ignore[misc]
         soft_min=10,
         soft_max=60,
     )
-    most_periods: bpy.props.IntProperty(  # type: ignore[valid-type]
+    most_periods: bpy.props.IntProperty(
         name="Periods per Redraw",
         description=(
             "Control periods simulated between two redraws at most. A machine that does not manage them "
@@ -59,7 +59,7 @@ class Preferences(bpy.types.AddonPreferences):  # type: ignore[misc]
         max=1000,
         soft_max=100,
     )
-    palette: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    palette: bpy.props.EnumProperty(
         name="Mode Colours",
         description="Colours of the control modes; choosing one recolours the beds of the open file",
         items=[(name, *words) for name, words in palettes.WORDS.items()],

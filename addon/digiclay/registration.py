@@ -8,7 +8,7 @@ from . import command_line, operators, panels, preferences
 from .device import display, unit_watch
 from .exchange import image_reader
 from .live import handlers
-from .press import press_tool
+from .press import tool
 from .settings import properties
 
 __all__ = ["register", "unregister"]
@@ -21,7 +21,7 @@ MODULES: tuple[ModuleType, ...] = (
     preferences,
     operators,
     panels,
-    press_tool,
+    tool,
     command_line,
     unit_watch,
     handlers,  # the last to come and the first to go: it ends what runs

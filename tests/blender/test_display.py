@@ -16,9 +16,9 @@ from digiclay.core.modes import Mode
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
-from digiclay.overlay.layout import laid_out
 from digiclay.overlay.look import look
-from digiclay.panels.session import error_line
+from digiclay.overlay.placement import laid_out
+from digiclay.panels.live_session import error_line
 from digiclay.settings import properties
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -45,7 +45,7 @@ def session(bed: Any) -> Iterator[running.Running]:
         begun = sculpting.advanced(begun, pressed, tick / 30, 100, pins=display.picked(bed))
     # The trace keeps every other period: it ends with this state.
     while begun.state.period % begun.trace.every:
-        begun = sculpting.advanced(sculpting.stepped(begun), pressed, 1.0, 100)
+        begun = sculpting.advanced(sculpting.request_step(begun), pressed, 1.0, 100)
     begun = replace(begun, paused=False)
     running.put(begun)
     yield begun

@@ -18,7 +18,7 @@ from digiclay.core.modes import COLOURS, Mode
 from digiclay.core.shots import Film, Turntable
 from digiclay.device.instant import Instant
 from digiclay.pictures import film as films
-from digiclay.pictures import film_file, render
+from digiclay.pictures import film_file, still
 
 WIDTH, HEIGHT = 160, 100
 SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}
@@ -189,11 +189,11 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any
     data = path.read_bytes()
     assert film_file.whole_film(data)
     assert not any(film_file.whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
-    still = render.still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
-    picture = still.read_bytes()
-    assert render.whole_picture(picture)
+    path = still.render_still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
+    picture = path.read_bytes()
+    assert still.whole_picture(picture)
     assert not any(
-        render.whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
+        still.whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
     )
 
 

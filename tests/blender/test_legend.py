@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from digiclay.compat import scratch
 from digiclay.core.modes import Mode
+from digiclay.pictures.force_plot import SHARE, strip
 from digiclay.pictures.legend import READ, READ_BESIDE, Front, of_forces, of_modes
 from digiclay.pictures.stage import MARGINS, half_frame
-from digiclay.pictures.strip import SHARE, strip
 
 #: Sizes of pictures, pixels, and how large their ordinary letters and those beside them are.
 SIZES = {

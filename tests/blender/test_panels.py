@@ -11,7 +11,7 @@ from digiclay.core.methods import METHODS
 from digiclay.core.scene import SECTIONS
 from digiclay.device import view
 from digiclay.panels.base import CATEGORY, bed_of
-from digiclay.panels.section import in_use
+from digiclay.panels.parameters import in_use
 
 pytestmark = pytest.mark.usefixtures("extension")
 

@@ -13,7 +13,7 @@ from digiclay import bridge
 from digiclay.core.errors import DigiclayError
 from digiclay.core.layout import grid
 from digiclay.device import view
-from digiclay.press import aim, press_tool
+from digiclay.press import aim, tool
 from digiclay.settings import properties
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
@@ -61,7 +61,7 @@ def test_the_tool_comes_and_goes_with_the_extension() -> None:
     assert tools() == []
     for _ in range(2):
         digiclay.register()
-        assert tools() == [press_tool.PressTool.bl_idname]
+        assert tools() == [tool.PressTool.bl_idname]
         digiclay.unregister()
         assert tools() == []
 
@@ -137,7 +137,7 @@ def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
 
 def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed: Any) -> None:
     cells, height = aim.surface(bed)
-    rim = press_tool.outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
+    rim = tool.outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
     finger = bridge.finger_of(view.fingertip_of(bed))
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim[:, :2], axis=0) / 2

@@ -16,7 +16,7 @@ from digiclay.core.layout import Layout
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
-from digiclay.pictures import render, stage
+from digiclay.pictures import stage, still
 
 from tests.patience import HANGS
 
@@ -61,7 +61,7 @@ def inventory() -> dict[str, list[str]]:
 def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_colour_of_their_mode(
     mode: Mode, tmp_path: Path
 ) -> None:
-    out = render.still(bed_in(mode), tmp_path / "pins.png", width=WIDTH, height=HEIGHT, samples=2)
+    out = still.render_still(bed_in(mode), tmp_path / "pins.png", width=WIDTH, height=HEIGHT, samples=2)
     assert out.read_bytes().startswith(b"\x89PNG")
     pixels = picture(out)
     assert pixels.shape == (HEIGHT, WIDTH, 3)
@@ -74,7 +74,9 @@ def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_colour_of_thei
 
 def test_the_legend_names_the_modes_present_in_their_colours(tmp_path: Path) -> None:
     width = 2 * WIDTH
-    out = render.still(bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2)
+    out = still.render_still(
+        bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2
+    )
     legend = picture(out)[:, : width // 5]
     assert of_the_hue(legend, COLOURS[Mode.HOLD]) > 20
 
@@ -83,7 +85,9 @@ def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> 
     view.build(bed_in(Mode.HOLD), bpy.context.collection)
     palettes.wear("tol_muted")
     width = 2 * WIDTH
-    out = render.still(bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2)
+    out = still.render_still(
+        bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2
+    )
     legend = picture(out)[:, : width // 5]
     assert of_the_hue(legend, palettes.PALETTES["tol_muted"][Mode.HOLD]) > 20
     assert of_the_hue(legend, COLOURS[Mode.HOLD]) < 20
@@ -92,7 +96,7 @@ def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> 
 def test_a_still_leaves_the_users_file_as_it_was(tmp_path: Path, formed: Instant) -> None:
     scene, before = bpy.context.scene, inventory()
     active = bpy.context.view_layer.objects.active
-    render.still(formed, tmp_path / "pins.png", width=40, height=25, samples=1)
+    still.render_still(formed, tmp_path / "pins.png", width=40, height=25, samples=1)
     assert inventory() == before
     assert bpy.context.scene == scene
     assert bpy.context.view_layer.objects.active == active
@@ -104,14 +108,14 @@ def test_a_failed_render_leaves_neither_data_nor_files(tmp_path: Path, formed: I
     (folder / "pins.png").mkdir()
     before = inventory()
     with pytest.raises(OutputError, match=r"pins\.png cannot be written"):
-        render.still(formed, folder / "pins.png", width=40, height=25, samples=1)
+        still.render_still(formed, folder / "pins.png", width=40, height=25, samples=1)
     assert inventory() == before
     assert [path.name for path in folder.iterdir()] == ["pins.png"]
 
 
 def test_an_unknown_engine_is_refused_with_the_known_ones(tmp_path: Path, formed: Instant) -> None:
     with pytest.raises(DigiclayError, match="cycles, workbench"):
-        render.still(formed, tmp_path / "pins.png", engine="eevee")
+        still.render_still(formed, tmp_path / "pins.png", engine="eevee")
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
@@ -140,7 +144,7 @@ def test_rendering_without_blender_says_in_one_line_what_to_install(tmp_path: Pa
     (tmp_path / "bpy.py").write_text("raise ModuleNotFoundError(\"No module named 'bpy'\", name='bpy')\n")
     code = (
         "from digiclay.core.errors import DigiclayError\n"
-        "try:\n    import digiclay.pictures.render\n"
+        "try:\n    import digiclay.pictures.still\n"
         "except DigiclayError as error:\n    print(error)\n"
     )
     path = f"{tmp_path}:{Path(digiclay.__file__).parents[1]}"

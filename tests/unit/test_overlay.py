@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from digiclay.core.modes import COLOURS, Mode
 from digiclay.device import heat
-from digiclay.overlay.layout import free, laid_out
 from digiclay.overlay.look import LETTERS, LINES, contrast, look
 from digiclay.overlay.picture import Box, Picture, axis, scaled
+from digiclay.overlay.placement import free, laid_out
 from digiclay.overlay.sections import Told
 from hypothesis import given
 from hypothesis import strategies as st

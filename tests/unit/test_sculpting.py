@@ -53,7 +53,7 @@ def test_a_single_step_is_one_control_period() -> None:
     hand, session = Hand(), started()
     session = hand.move(session, [(0.0, 39.0)] * 5)
     before = session.state.period
-    session = hand.move(sculpting.stepped(session), [(0.0, 39.0)] * 10)
+    session = hand.move(sculpting.request_step(session), [(0.0, 39.0)] * 10)
     assert (session.state.period, session.paused) == (before + 1, True)
 
 
@@ -65,17 +65,17 @@ def test_rewinding_takes_back_one_gesture_after_the_other() -> None:
     twice = hand.press(once, 9.0)
     assert len(twice.gestures) == 2
     assert np.abs(heights(twice) - first).max() > 1e-3
-    back = sculpting.rewound(twice)
+    back = sculpting.rewind(twice)
     np.testing.assert_allclose(heights(back), first, rtol=0, atol=1e-5)  # pins were still coming to rest
-    back = sculpting.rewound(back)
+    back = sculpting.rewind(back)
     assert np.array_equal(heights(back), rest)
-    assert sculpting.rewound(back) is back
+    assert sculpting.rewind(back) is back
 
 
 def test_rewinding_puts_the_finger_where_the_gesture_began() -> None:
     hand = Hand()
     session = hand.press(hand.press(started(), -9.0), 9.0)
-    assert sculpting.rewound(session).pose[2] > 40e-3
+    assert sculpting.rewind(session).pose[2] > 40e-3
 
 
 def test_a_finger_that_moves_on_after_a_rest_makes_another_gesture() -> None:
@@ -96,7 +96,7 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     first = heights(session)
     session = hand.move(session, [(x, 38.0) for x in np.linspace(0, 5, 10)])
     assert len(session.gestures) == 2
-    back = sculpting.rewound(session)
+    back = sculpting.rewind(session)
     # Put there by 32 bits, the finger is read a little beside; and stands on the pins as it stood.
     back = hand.move(back, [(1e3 * off, 38.0)] * 3)
     assert len(back.gestures) == 1
@@ -104,7 +104,7 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     np.testing.assert_allclose(heights(back), first, rtol=0, atol=5e-5)
     again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
     assert len(again.gestures) == 2
-    back = sculpting.rewound(sculpting.rewound(again))
+    back = sculpting.rewind(sculpting.rewind(again))
     assert (heights(back) == 40e-3).all()
 
 
@@ -117,7 +117,7 @@ def test_gestures_kept_do_not_grow_in_number() -> None:
 
 def test_a_gesture_goes_on_after_rewinding_it() -> None:
     hand = Hand()
-    session = sculpting.rewound(hand.press(started()))
+    session = sculpting.rewind(hand.press(started()))
     session = hand.press(session)
     assert len(session.gestures) == 1
 
@@ -129,7 +129,7 @@ def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
     back = sculpting.reset(session)
     assert (heights(back) == 40e-3).all()
     assert back.state.period == 0
-    assert np.array_equal(heights(sculpting.rewound(back)), formed)
+    assert np.array_equal(heights(sculpting.rewind(back)), formed)
 
 
 def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:

@@ -66,7 +66,7 @@ def test_a_long_recording_copies_itself_seldom() -> None:
 def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     hand = Hand()
     session = hand.press(sculpting.recording(started(), True), -6.0)
-    session = hand.press(sculpting.rewound(hand.press(session)), 6.0)
+    session = hand.press(sculpting.rewind(hand.press(session)), 6.0)
     keep = session.recording
     assert keep is not None
     *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
@@ -87,6 +87,6 @@ def test_a_recording_ends_with_a_reset_that_is_rewound() -> None:
     session = sculpting.recording(sculpting.reset(hand.press(started())), True)
     session = hand.press(hand.press(session), 6.0)
     for _ in range(3):
-        session = sculpting.rewound(session)
+        session = sculpting.rewind(session)
     assert session.state.period > 0
     assert session.recording is None

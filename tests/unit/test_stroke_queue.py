@@ -100,7 +100,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the
 def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
     session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
     number = session.strokes[-1].number
-    back = sculpting.rewound(session)
+    back = sculpting.rewind(session)
     assert find_stroke(back, number) is None
     done = finish(back)
     assert depth_at(done, -15.0, 0.0) > FORMED

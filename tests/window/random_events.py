@@ -172,7 +172,7 @@ def check(blender: Any) -> None:
         assert np.isfinite(height).all()
         assert height.min() >= 0.0
         assert height.max() <= session.system.cell.actuator.stroke
-        bed = blender.part("live.waiting").found(session.uid, session.name)
+        bed = blender.part("live.waiting").find_bed(session.uid, session.name)
         if bed is not None and not session.stale:
             assert blender.part("live.bed_state").kept(bed) == session.kept
     for bed in blender.beds():

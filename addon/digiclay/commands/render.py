@@ -156,11 +156,11 @@ def draw_still(
 ) -> Path:
     """Draw an instant, or one row of a history; Blender is imported only now."""
     from ..device.instant import Instant
-    from ..pictures.render import still
+    from ..pictures.still import render_still
 
     instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
     names = ("width", "height", "engine", "samples", "colour", "arrows")
-    return still(instant, out, **{name: getattr(looks, name) for name in names})
+    return render_still(instant, out, **{name: getattr(looks, name) for name in names})
 
 
 def draw_turntable(

@@ -117,17 +117,17 @@ def _take_overlay(display: Any, context: Any) -> None:
     views.follow()
 
 
-class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
+class Display(bpy.types.PropertyGroup):
     """What is shown of a bed."""
 
-    colour: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    colour: bpy.props.EnumProperty(
         name="Colour",
         description="What the colour of a pin tells",
         items=COLOURINGS,
         get=_colour,
         set=_set_colour,
     )
-    top_force: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    top_force: bpy.props.FloatProperty(
         name="Top Colour at (N)",
         description="From this force on a pin has the last colour, in N",
         min=1e-3,
@@ -138,13 +138,13 @@ class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
         get=_top,
         set=_set_top,
     )
-    arrows: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    arrows: bpy.props.BoolProperty(
         name="Force Arrows",
         description="Draw the force on each pin as an arrow, and the fingertip clear; renders show it too",
         get=_arrows,
         set=_set_arrows,
     )
-    arrow_length: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    arrow_length: bpy.props.FloatProperty(
         name="Arrow Length (mm/N)",
         description="Length of the arrow of 1 N, in mm of the device",
         min=0.1,
@@ -156,13 +156,13 @@ class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
         get=_length,
         set=_set_length,
     )
-    overlay: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    overlay: bpy.props.BoolProperty(
         name="Overlay",
         description="While a session runs, show force, heights of picked pins, modes, speed and solver error",
         default=True,
         update=_take_overlay,
     )
-    seconds: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    seconds: bpy.props.FloatProperty(
         name="Past (s)",
         description="How much of the past the overlay's curves show, in s",
         default=5.0,
@@ -171,7 +171,7 @@ class Display(bpy.types.PropertyGroup):  # type: ignore[misc]
         precision=1,
         step=50,
     )
-    picked: bpy.props.IntVectorProperty(  # type: ignore[valid-type]
+    picked: bpy.props.IntVectorProperty(
         name="Picked Pins",
         description="Pins whose heights the overlay shows; -1 for none",
         size=PICKED,

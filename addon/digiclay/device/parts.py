@@ -10,7 +10,7 @@ from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
 from ..core.modes import COLOURS, Mode
-from . import heat, shapes
+from . import heat, primitives
 from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 
@@ -75,7 +75,7 @@ class Sources(NamedTuple):
 def sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
     """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m."""
     segments = 28 if len(instant.height) <= MANY else 12
-    shape = shapes.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
+    shape = primitives.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
     mesh.materials.append(None)
     looks = [(mode.name.lower(), COLOURS[mode]) for mode in Mode]
@@ -93,7 +93,7 @@ def sources(instant: Instant, length: float, deck: float, rim: float) -> Sources
 
 def _arrow(pitch: float) -> Any:
     """Make the mesh of a bed's arrow; the pitch in m."""
-    mesh = bridge.mesh("Digital Clay Force", shapes.arrow(HEAD * pitch * SCALE))
+    mesh = bridge.mesh("Digital Clay Force", primitives.arrow(HEAD * pitch * SCALE))
     mesh.materials.append(material("force_arrow", ARROW, roughness=0.5))
     return mesh
 
@@ -104,7 +104,7 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
     half = float(reach[0]) * SCALE, float(reach[1]) * SCALE
     wall = WALL * instant.pitch * SCALE
     bottom = deck * SCALE - wall / 2
-    shape = shapes.housing(half, wall, bottom, deck * SCALE, rim * SCALE)
+    shape = primitives.housing(half, wall, bottom, deck * SCALE, rim * SCALE)
     mesh = bridge.mesh("Digital Clay Housing", shape)
     mesh.materials.append(material("housing", CASE, roughness=0.55))
     return mesh
@@ -121,7 +121,7 @@ def fingertip(collection: Any, bed: Any) -> Any:
     made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
     made.rotation_mode = "QUATERNION"
     made.lock_scale = (True, True, True)
-    mesh = bridge.mesh("Digital Clay Ellipsoid", shapes.ball())
+    mesh = bridge.mesh("Digital Clay Ellipsoid", primitives.ball())
     mesh.materials.append(None)
     ball = marked(mesh, mesh.name, ELLIPSOID, collection, parent=made)
     made[BALL] = ball

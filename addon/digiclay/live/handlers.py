@@ -14,7 +14,7 @@ from . import keys, loop, recovery, running, tick
 from .running import Running
 from .stroke_queue import drop_strokes
 
-__all__ = ["STOPPED", "abandoned", "end_all", "ended", "register", "unregister", "watch"]
+__all__ = ["STOPPED", "abandoned", "end", "end_all", "register", "unregister", "watch"]
 
 #: Ticks until the state undo has put into a bed is taken up, that one included.
 STALE = 2
@@ -60,7 +60,7 @@ def watch() -> None:
             handler.append(function)
 
 
-def ended(how: str, *sessions: Running) -> None:
+def end(how: str, *sessions: Running) -> None:
     """End sessions at once; their beds keep the states of the last tick, and takes of what was recorded.
 
     Parameters
@@ -85,7 +85,7 @@ def ended(how: str, *sessions: Running) -> None:
 def end_all(how: str) -> None:
     """End all sessions; one undo step holds what they came to."""
     some = bool(running.all())
-    ended(how)
+    end(how)
     if some:
         bpy.ops.ed.undo_push(message="Stop Session")
 
@@ -93,7 +93,7 @@ def end_all(how: str) -> None:
 def abandoned(how: str) -> None:
     """End all sessions since their file goes away; what it does not have of a recording can be recovered."""
     unsaved = recovery.unsaved()
-    ended(how)
+    end(how)
     if unsaved:
         running.say(f"{running.said()}. {recovery.leave()}")
 

@@ -42,7 +42,7 @@ def begin(context: Any) -> int:
     )
     _LOOP.update(timer=timer, token=_COUNT[0], ticked=time.perf_counter(), numbers=0.0)
     bpy.types.STATUSBAR_HT_header.prepend(draw)
-    status_changed()
+    redraw_status()
     return _COUNT[0]
 
 
@@ -68,7 +68,7 @@ def end() -> None:
     bpy.context.window_manager.event_timer_remove(_LOOP["timer"])
     _LOOP.clear()
     bpy.types.STATUSBAR_HT_header.remove(draw)
-    status_changed()
+    redraw_status()
 
 
 def due(context: Any, now: float) -> bool:
@@ -93,7 +93,7 @@ def drawn(context: Any, now: float) -> None:
                         region.tag_redraw()
 
 
-def status_changed() -> None:
+def redraw_status() -> None:
     """Have the status bar drawn anew."""
     for window in bpy.context.window_manager.windows:
         window.workspace.status_text_set_internal(None)

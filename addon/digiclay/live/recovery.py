@@ -14,7 +14,7 @@ from pathlib import Path
 from ..compat import bpy
 from ..recorded import takes
 from . import running
-from .waiting import found
+from .waiting import find_bed
 
 __all__ = ["file", "leave", "lend", "take_back", "unsaved"]
 
@@ -26,7 +26,7 @@ def lend() -> None:
     """Put what is being recorded into the beds, as takes: the file is about to be saved."""
     take_back()
     for session in running.all():
-        bed, take = found(session.uid, session.name), takes.recorded(session)
+        bed, take = find_bed(session.uid, session.name), takes.recorded(session)
         if bed is not None and take is not None:
             _LENT.append((session.uid, session.name, takes.keep(bed, take).number))
 
@@ -41,7 +41,7 @@ def take_back(path: str = "") -> None:
     """
     while _LENT:
         uid, name, number = _LENT.pop()
-        bed = found(uid, name)
+        bed = find_bed(uid, name)
         if bed is None or number not in [entry.number for entry in takes.entries(bed)]:
             continue  # undone in the meantime
         takes.remove(bed, number)

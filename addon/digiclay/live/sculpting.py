@@ -25,8 +25,16 @@ from .running import Gesture, Recording, Running
 from .stroke_queue import drop_strokes, take_path
 
 __all__ = [
-    "adapted", "advanced", "begun", "recording", "reset", "restored", "rewound", "stepped",
-    "taken_back", "withdraw_stroke",
+    "adapted",
+    "advanced",
+    "begun",
+    "recording",
+    "request_step",
+    "reset",
+    "restored",
+    "rewind",
+    "taken_back",
+    "withdraw_stroke",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -116,7 +124,7 @@ def advanced(
     return followed(running, pose, count) if count else running
 
 
-def stepped(running: Running) -> Running:
+def request_step(running: Running) -> Running:
     """Ask a paused session for one more control period; pause one that is not."""
     return replace(running, paused=True, steps=running.steps + 1)
 
@@ -197,7 +205,7 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
     )  # fmt: skip
 
 
-def rewound(running: Running) -> Running:
+def rewind(running: Running) -> Running:
     """Take back the last gesture: state and finger are where it began; nothing changes if there is none."""
     if running.strokes:
         return withdraw_stroke(running)

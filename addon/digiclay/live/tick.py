@@ -20,7 +20,7 @@ from ..settings import properties
 from . import bed_state, running, sculpting
 from .running import Floats, Running
 from .stroke_queue import drop_strokes
-from .waiting import found, obstacle
+from .waiting import blocking_reason, find_bed
 
 __all__ = ["Note", "place", "show", "start", "stop", "tick", "withdraw_strokes"]
 
@@ -53,7 +53,7 @@ def start(context: Any, bed: Any) -> list[Note]:
     if got:
         notes.append(Note("INFO", got))
     context.view_layer.update()
-    why = obstacle(context, bed, scene.cells)
+    why = blocking_reason(context, bed, scene.cells)
     if why:
         raise DigiclayError(f"The session of {bed.name} cannot start: {why}.")
     begun, said = sculpting.begun(
@@ -67,7 +67,7 @@ def start(context: Any, bed: Any) -> list[Note]:
 def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and what was recorded as a take; return words about that."""
     ended = running.drop(uid)
-    bed = found(uid, ended.name) if ended else None
+    bed = find_bed(uid, ended.name) if ended else None
     return takes.keep_recorded(bed, ended) if ended is not None and bed is not None else ""
 
 
@@ -90,7 +90,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
     """Take back the last unfinished stroke of one session, or of each; tell whether there was one."""
     busy = [session for session in running.all() if session.strokes and uid in (None, session.uid)]
     for session in busy:
-        bed = found(session.uid, session.name)
+        bed = find_bed(session.uid, session.name)
         if bed is not None:
             back = sculpting.withdraw_stroke(session)
             show(bed, back)
@@ -103,7 +103,7 @@ def tick(context: Any, now: float) -> list[Note]:
     notes: list[Note] = []
     most = preferences.of(context).most_periods
     for session in running.all():
-        bed = found(session.uid, session.name)
+        bed = find_bed(session.uid, session.name)
         if bed is None:
             running.drop(session.uid)
             notes.append(Note("WARNING", f"The session of {session.name} ended: its bed was deleted"))
@@ -158,7 +158,7 @@ def _seen(session: Running) -> Floats:
 
 def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
     """Look at what the user may have changed; return why to wait, the session, and what to tell."""
-    why, said = obstacle(context, bed, session.system.grid.count), ""
+    why, said = blocking_reason(context, bed, session.system.grid.count), ""
     if why:
         return why, session, said
     try:

@@ -1,4 +1,4 @@
-"""Why a session has to stand still: what is missing or in the way, in words that say what to do."""
+"""The bed of a session, and what keeps a session from going on, with words that say what to do."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from .. import bridge
 from ..compat import bpy
 from ..core.errors import DigiclayError
 from ..device import view
+from . import running
+from .running import Running
 
-__all__ = ["found", "obstacle"]
+__all__ = ["active_session", "blocking_reason", "find_bed"]
 
 
-def found(uid: int, name: str) -> Any | None:
+def find_bed(uid: int, name: str) -> Any | None:
     """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.
 
     Parameters
@@ -38,7 +40,7 @@ def _shown(context: Any, thing: Any) -> bool:
     return any(layer.objects.get(thing.name) == thing for layer in layers)
 
 
-def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
+def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     """Return why the session of a bed cannot go on now, or an empty text.
 
     Parameters
@@ -74,3 +76,13 @@ def obstacle(context: Any, bed: Any, pins: int | None = None) -> str:
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         return "its fingertip is scaled to nothing: clear its scale to go on"
     return ""
+
+
+def active_session(context: Any) -> tuple[Any, Running] | None:
+    """Return the bed that is active, or the only one that runs, and its session; None without."""
+    bed = view.bed_of(context)
+    session = running.of(bed)
+    if session is None and bed is None and len(running.all()) == 1:
+        (session,) = running.all()
+        bed = find_bed(session.uid, session.name)
+    return (bed, session) if bed is not None and session is not None else None

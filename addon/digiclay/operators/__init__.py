@@ -1,11 +1,14 @@
-"""What a user can do in Blender: one small file an operator, and the menus they stand in."""
+"""What a user can do in Blender, and the menus it stands in.
+
+No module here postpones its annotations: Blender reads an operator's properties from them.
+"""
 
 from __future__ import annotations
 
 from ..compat import bpy
 from . import (
     add_bed,
-    bake,
+    bake_session,
     export_mesh,
     find_features,
     import_run,
@@ -13,19 +16,13 @@ from . import (
     open_scene,
     pick_pins,
     presets,
-    press,
-    rebuild,
-    session,
+    press_stroke,
+    session_actions,
     session_loop,
-    session_pause,
-    session_reset,
-    session_rewind,
-    session_step,
-    session_stop,
+    session_start,
     shape_in,
     shape_keep,
-    take_export,
-    take_record,
+    take_actions,
     take_replay,
 )
 
@@ -37,24 +34,24 @@ CLASSES: tuple[type, ...] = (
     presets.ApplyPreset,
     presets.SavePreset,
     presets.RemovePreset,
-    rebuild.Rebuild,
+    add_bed.Rebuild,
     pick_pins.PickPins,
     pick_pins.ClearPins,
-    press.Press,
+    press_stroke.Press,
     export_mesh.ExportMesh,
     export_mesh.ExportMenu,
     make_mesh.MakeMesh,
     find_features.FindFeatures,
     find_features.KeepSurface,
     find_features.ForgetSurface,
-    session.Session,
+    session_start.Session,
     session_loop.GoOn,
     session_loop.Escape,
-    session_stop.StopSession,
-    session_pause.PauseSession,
-    session_step.StepSession,
-    session_rewind.RewindSession,
-    session_reset.ResetSession,
+    session_actions.StopSession,
+    session_actions.PauseSession,
+    session_actions.StepSession,
+    session_actions.RewindSession,
+    session_actions.ResetSession,
     shape_in.ShapeFromObject,
     shape_in.ShapeFromFile,
     shape_in.ShapeSample,
@@ -66,13 +63,13 @@ CLASSES: tuple[type, ...] = (
     open_scene.ShapeSamples,
     open_scene.Samples,
     open_scene.SceneFiles,
-    take_record.RecordTake,
-    take_record.KeepTake,
+    take_actions.RecordTake,
+    take_actions.KeepTake,
     take_replay.ReplayTake,
-    take_export.ExportTake,
-    take_export.RemoveTake,
-    bake.Bake,
-    bake.FreeBake,
+    take_actions.ExportTake,
+    take_actions.RemoveTake,
+    bake_session.Bake,
+    bake_session.FreeBake,
 )
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (

@@ -1,27 +1,27 @@
-"""Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip."""
+"""Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed after its settings."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
 from .. import preferences
 from ..compat import bpy
 from ..core.actuator import Actuator
-from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.layout import Layout
 from ..core.methods import METHODS
 from ..core.scene import Scene
 from ..core.scene_table import PRESETS
-from ..device import palettes, view
+from ..device import palettes, rebuild, view
 from ..device.instant import Instant
+from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.declared import title
 from ..settings.devices import device
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import SHOWN, si
-from .reasons import allowed, edited
+from .action import Action
+from .poll_messages import baked, edited, no_bed, session_runs
 
-__all__ = ["AddBed", "add", "add_shown", "entry", "select_only", "stand_at_cursor"]
+__all__ = ["AddBed", "Rebuild", "add", "add_shown", "entry", "place_at_cursor", "select_only"]
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -37,20 +37,20 @@ def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
     return OFFERED
 
 
-class AddBed(bpy.types.Operator):  # type: ignore[misc]
+class AddBed(Action, bpy.types.Operator):
     """Add a Digital Clay device: a bed of pins that a fingertip forms"""
 
     bl_idname = "mesh.digital_clay_add"
     bl_label = "Digital Clay"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    rows: bpy.props.IntProperty(  # type: ignore[valid-type]
+    rows: bpy.props.IntProperty(
         name="Rows", description="Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST
     )
-    columns: bpy.props.IntProperty(  # type: ignore[valid-type]
+    columns: bpy.props.IntProperty(
         name="Columns", description="Number of pins in a row", default=DEFAULT.columns, min=1, max=MOST
     )
-    pitch: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    pitch: bpy.props.FloatProperty(
         name="Pitch (mm)",
         description="Distance between neighbouring pins in a row, in mm",
         default=DEFAULT.pitch * 1e3,
@@ -60,7 +60,7 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
         precision=2,
         step=10,
     )
-    arrangement: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    arrangement: bpy.props.EnumProperty(
         name="Arrangement",
         description="How neighbouring rows stand to each other",
         items=[
@@ -70,16 +70,16 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
         ],
         default=DEFAULT.arrangement,
     )
-    method: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    method: bpy.props.EnumProperty(
         name="Method",
         description="How the cells are controlled",
         items=method_items(),
         default=next(iter(METHODS)),
     )
-    preset: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    preset: bpy.props.EnumProperty(
         name="Preset", description="Fluid, valves and whatever else a preset of your own sets", items=offered
     )
-    scale: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    scale: bpy.props.FloatProperty(
         name="Scale (cm/mm)",
         description="How large the device is drawn: centimetres in Blender for a millimetre of the device",
         default=1.0,
@@ -90,27 +90,44 @@ class AddBed(bpy.types.Operator):  # type: ignore[misc]
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is an object: it cannot be added inside another object's edit mode."""
-        return allowed(cls, edited(context, "Leave Edit Mode first: the device is an object of its own"))
+        return edited(context, "Leave Edit Mode first: the device is an object of its own")
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Build the device at the 3D cursor."""
-        try:
-            layout = Layout(
-                rows=self.rows,
-                columns=self.columns,
-                pitch=si(self.pitch, SHOWN["m"][1]),
-                arrangement=self.arrangement,
-            )
-            bed = add(context, device(self.preset, layout, self.method))
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        layout = Layout(
+            rows=self.rows,
+            columns=self.columns,
+            pitch=si(self.pitch, SHOWN["m"][1]),
+            arrangement=self.arrangement,
+        )
+        bed = add(context, device(self.preset, layout, self.method))
         bed.scale = (self.scale,) * 3
-        stand_at_cursor(context, bed)
-        select_only(context, bed)
-        return {"FINISHED"}
+        place_at_cursor(context, bed)
+
+
+class Rebuild(Action, bpy.types.Operator):
+    """Make the pins and the housing anew after the settings; what was formed is lost, the fingertip stays"""
+
+    bl_idname = "digiclay.rebuild"
+    bl_label = "Rebuild"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed is needed, and no session on it."""
+        return (
+            no_bed(context)
+            or session_runs(context, "Stop the session first: its pins cannot be exchanged")
+            or baked(context, "Free the bake in the Takes panel first: it moves the pins there are now")
+            or edited(context, "Leave Edit Mode first")
+        )
+
+    def perform(self, context: Any) -> None:
+        """Make it anew."""
+        scene = rebuild.rebuild(bed_of(context))
+        self.report({"INFO"}, f"The bed has {scene.layout.rows} x {scene.layout.columns} pins now")
 
 
 def add(context: Any, scene: Scene) -> Any:
@@ -129,14 +146,15 @@ def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
     return bed
 
 
-def stand_at_cursor(context: Any, bed: Any) -> None:
-    """Put the housing's underside on the 3D cursor."""
+def place_at_cursor(context: Any, bed: Any) -> None:
+    """Put the housing's underside on the 3D cursor, and leave the bed selected and active."""
     bed.location = context.scene.cursor.location
     bed.location.z -= view.underside(bed) * bed.scale.z
+    select_only(context, bed)
 
 
 def select_only(context: Any, bed: Any) -> None:
-    """Leave the new bed selected and active, as Blender's own Add operators do."""
+    """Leave a new object selected and active, as Blender's own Add operators do."""
     for other in context.selected_objects:
         other.select_set(False)
     bed.select_set(True)

@@ -1,17 +1,14 @@
 """File > Export > Digital Clay: what was formed in a bed as a mesh file."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.export import FORMATS, UNITS, suffix, write
 from ..core.export_model import bodies
 from ..device.view import bed_of
 from ..exchange import formed_bed
-from .reasons import allowed, no_surface
-from .surface_options import SurfaceOptions, chosen, sentence
+from .mesh_options import SurfaceOptions, chosen, sentence
 
 __all__ = ["ExportMenu", "ExportMesh", "entry"]
 
@@ -28,40 +25,33 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
 )  # fmt: skip
 
 
-class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
+class ExportMesh(SurfaceOptions, bpy.types.Operator):
     """Write what was formed in the active bed as a mesh file"""
 
     bl_idname = "export_mesh.digital_clay"
     bl_label = "Export Digital Clay"
-    bl_options = {"PRESET"}  # noqa: RUF012
+    bl_options = {"PRESET"}
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})  # type: ignore[valid-type]
-    check_existing: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        default=True, options={"HIDDEN", "SKIP_PRESET"}
-    )
-    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_PRESET"})
+    filter_glob: bpy.props.StringProperty(
         default="*.stl;*.obj;*.ply;*.glb;*.3mf", options={"HIDDEN", "SKIP_PRESET"}
     )
-    file_format: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    file_format: bpy.props.EnumProperty(
         name="Format",
         description="Format of the file",
         items=[(name, name.upper().replace("_", " "), sentence(said)) for name, said in FORMATS.items()],
         default="stl",
     )
-    unit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    unit: bpy.props.EnumProperty(
         name="Unit",
         description="Length unit of the file; a GLB is always in metres",
         items=[(name, name, f"Lengths in {name}") for name in UNITS],
         default="mm",
     )
-    separate: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    separate: bpy.props.BoolProperty(
         name="A File Each", description="Write each feature into a file of its own", default=False
     )
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """A bed is needed."""
-        return allowed(cls, no_surface(context))
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the file, named after the bed."""
@@ -96,27 +86,22 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         row.active = self.kind == "features"
         row.prop(self, "separate")
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Write the file, or the files; a format nobody has asked for is told by the ending of the name."""
         if not self.properties.is_property_set("file_format"):
             self.file_format = _told_by(self.filepath) or self.file_format
         target = self._file()
-        try:
-            bed = chosen(context)
-            made = bodies(formed_bed.formed(bed), self.model(bed), self.finding())
-            files = [(target, made)]
-            if self.separate and self.kind == "features":
-                ending = suffix(self.file_format)
-                stem = target.name.removesuffix(ending)
-                files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
-            for path, some in files:
-                write(some, path, self.unit, self.file_format)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        bed = chosen(context)
+        made = bodies(formed_bed.formed(bed), self.model(bed), self.finding())
+        files = [(target, made)]
+        if self.separate and self.kind == "features":
+            ending = suffix(self.file_format)
+            stem = target.name.removesuffix(ending)
+            files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
+        for path, some in files:
+            write(some, path, self.unit, self.file_format)
         told = f"{len(files)} files beside {target}" if len(files) > 1 else str(files[0][0])
         self.report({"INFO"}, f"Written: {told}")
-        return {"FINISHED"}
 
     def _file(self) -> Path:
         """Return the file with the ending of its format, in place of that of another format."""
@@ -140,7 +125,7 @@ def _is_text(path: Path) -> bool:
     return path.name.lower().endswith(suffix("stl_ascii"))
 
 
-class ExportMenu(bpy.types.Menu):  # type: ignore[misc]
+class ExportMenu(bpy.types.Menu):
     """What is often wanted, and a dialog for all else"""
 
     bl_idname = "DIGICLAY_MT_export"

@@ -1,40 +1,29 @@
 """List the features of a bed in the panel, and choose the surface they are measured from."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.export_model import features
 from ..core.features import summary
 from ..exchange import formed_bed
-from ..panels.export import LISTED
-from .reasons import allowed, no_surface
-from .surface_options import FindingOptions, chosen
+from ..panels.shape_exchange import LISTED
+from .mesh_options import FindingOptions, SurfaceAction, chosen
+from .poll_messages import no_surface
 
 __all__ = ["FindFeatures", "ForgetSurface", "KeepSurface"]
 
 
-class FindFeatures(FindingOptions, bpy.types.Operator):  # type: ignore[misc]
+class FindFeatures(FindingOptions, bpy.types.Operator):
     """Find the bosses and creases of the active bed and list them in the panel"""
 
     bl_idname = "digiclay.find_features"
     bl_label = "List Features"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """A bed is needed."""
-        return allowed(cls, no_surface(context))
-
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Find them."""
-        try:
-            bed = chosen(context)
-            found = features(formed_bed.formed(bed), formed_bed.model(bed), self.finding())
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        bed = chosen(context)
+        found = features(formed_bed.formed(bed), formed_bed.model(bed), self.finding())
         lines = [summary(found)]
         for one in found:
             extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
@@ -43,47 +32,35 @@ class FindFeatures(FindingOptions, bpy.types.Operator):  # type: ignore[misc]
             lines.append(f"    {one.area * 1e6:.0f} mm², {one.volume * 1e9:.0f} mm³, {len(one.pins)} pins")
         bed[LISTED] = "\n".join(lines)
         self.report({"INFO"}, lines[0])
-        return {"FINISHED"}
 
 
-class KeepSurface(bpy.types.Operator):  # type: ignore[misc]
+class KeepSurface(SurfaceAction, bpy.types.Operator):
     """Measure features from the surface as it is now"""
 
     bl_idname = "digiclay.keep_surface"
     bl_label = "Measure from Here"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """A bed is needed."""
-        return allowed(cls, no_surface(context))
-
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Keep the surface."""
-        try:
-            formed_bed.keep(chosen(context))
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        formed_bed.keep(chosen(context))
 
 
-class ForgetSurface(bpy.types.Operator):  # type: ignore[misc]
+class ForgetSurface(SurfaceAction, bpy.types.Operator):
     """Measure features from the bed at rest again"""
 
     bl_idname = "digiclay.forget_surface"
     bl_label = "Measure from Rest"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is needed whose surface was kept."""
-        return allowed(cls, no_surface(context) or _from_rest(context))
+        return no_surface(context) or _from_rest(context)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Forget the surface."""
         formed_bed.forget(chosen(context))
-        return {"FINISHED"}
 
 
 def _from_rest(context: Any) -> str:

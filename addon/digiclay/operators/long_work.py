@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any
 
 from ..core.errors import DigiclayError
 from . import status
+from .action import Action
 
 __all__ = ["LongWork"]
 
@@ -15,30 +16,27 @@ __all__ = ["LongWork"]
 TICK, SHARE = 0.05, 0.9
 
 
-class LongWork:
+class LongWork(Action):
     """Mixin of an operator whose work is a generator of shares done, from 0 to 1.
 
-    The operator defines `begun`, and changes Blender's data only in the last of its steps, so
+    The operator defines `work`, and changes Blender's data only in the last of its steps, so
     that Esc leaves everything as it was.
     """
 
-    def begun(self, context: Any) -> Iterator[float]:
+    bl_label: str
+
+    def work(self, context: Any) -> Generator[float, None, None]:
         """Give the share done after each step; raises DigiclayError when the work cannot be done."""
         raise NotImplementedError
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Do all of the work at once."""
-        try:
-            for _ in self.begun(context):
-                pass
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        for _ in self.work(context):
+            pass
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin the work; it goes on while Blender draws and listens."""
-        self._steps = self.begun(context)
+        self._steps = self.work(context)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TICK, window=context.window)
         manager.progress_begin(0.0, 100.0)
@@ -48,8 +46,8 @@ class LongWork:
     def modal(self, context: Any, event: Any) -> set[str]:
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
-            self._ended(context)
-            self.report({"INFO"}, f"{self.bl_label}: stopped, nothing was changed")  # type: ignore[attr-defined]
+            self._end(context)
+            self.report({"INFO"}, f"{self.bl_label}: stopped, nothing was changed")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
@@ -59,22 +57,22 @@ class LongWork:
             while time.perf_counter() < until:
                 share = next(self._steps)
         except StopIteration:
-            self._ended(context)
+            self._end(context)
             return {"FINISHED"}
         except DigiclayError as error:
-            self._ended(context)
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+            self._end(context)
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         context.window_manager.progress_update(100.0 * share)
-        said = f"{self.bl_label}: {100.0 * share:.0f} %     Esc: stop"  # type: ignore[attr-defined]
+        said = f"{self.bl_label}: {100.0 * share:.0f} %     Esc: stop"
         status.tell(context, said)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
         """Stop when Blender takes the operator away, such as at the loading of a file."""
-        self._ended(context)
+        self._end(context)
 
-    def _ended(self, context: Any) -> None:
+    def _end(self, context: Any) -> None:
         """Take back what shows the progress."""
         self._steps.close()
         context.window_manager.event_timer_remove(self._timer)

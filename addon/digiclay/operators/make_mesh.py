@@ -1,6 +1,5 @@
 """Make Mesh: what was formed in a bed as new mesh objects, to go on with in Blender."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,12 +7,11 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.export_model import bodies
 from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
-from .reasons import allowed, edited, no_surface
-from .surface_options import SurfaceOptions, chosen
+from .mesh_options import SurfaceOptions, chosen
+from .poll_messages import edited, no_surface
 
 __all__ = ["MakeMesh"]
 
@@ -23,24 +21,24 @@ GAP = 0.35
 MADE = "digiclay_made"
 
 
-class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
+class MakeMesh(SurfaceOptions, bpy.types.Operator):
     """Make a mesh object of what was formed in the active bed, with its features as vertex groups"""
 
     bl_idname = "mesh.digital_clay_make"
     bl_label = "Make Mesh"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    beside: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    beside: bpy.props.BoolProperty(
         name="Beside the Bed",
         description="Put the mesh beside the bed, and not where its surface is",
         default=True,
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is needed, and no edit mode of another object."""
         why = edited(context, "Leave Edit Mode first: the mesh is an object of its own")
-        return allowed(cls, why or no_surface(context))
+        return why or no_surface(context)
 
     def draw(self, context: Any) -> None:
         """Draw the redo panel."""
@@ -48,15 +46,11 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
         self.draw_surface(self.layout)
         self.layout.prop(self, "beside")
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Make the objects, and select them."""
-        try:
-            bed = chosen(context)
-            formed = formed_bed.formed(bed)
-            made = bodies(formed, self.model(bed), self.finding())
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        bed = chosen(context)
+        formed = formed_bed.formed(bed)
+        made = bodies(formed, self.model(bed), self.finding())
         width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
         smooth = self.skin != "bilinear" and self.kind != "pins"
         where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
@@ -73,7 +67,6 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):  # type: ignore[misc]
             new.select_set(True)
         groups = f" with vertex groups {', '.join(made[0].groups)}" if made[0].groups else ""
         self.report({"INFO"}, f"Made {', '.join(new.name for new in things)}{groups}")
-        return {"FINISHED"}
 
 
 def _beside(context: Any, bed: Any, width: float) -> Any:

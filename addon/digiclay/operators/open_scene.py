@@ -1,13 +1,11 @@
 """Scene files and samples as beds: from the Add menu, the file dialog, or dropped into the 3D view."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.fingertip import Fingertip
 from ..core.scene import Scene
 from ..core.scene_file import find, load, sample_names
@@ -16,40 +14,40 @@ from ..core.shape import Shape
 from ..core.shape_file import sample_shapes
 from ..device import view
 from ..exchange import shape_show
-from ..recorded import sample_take, takes
+from ..recorded import takes
 from ..settings.declared import title
-from .add_bed import add, select_only, stand_at_cursor
-from .reasons import allowed, edited
+from .action import Action, FileAction
+from .add_bed import add, place_at_cursor
+from .poll_messages import edited
 
 __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]
 
 
-class Opened:
-    """What the operators share: a bed is added as Add > Mesh > Digital Clay does."""
+class AddSceneAction(Action):
+    """Mixin of the operators here: a bed is added as Add > Mesh > Digital Clay does."""
 
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    take: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    take: bpy.props.BoolProperty(
         name="Simulate as a Take",
         description="Simulate the scene's session and keep it as a take, to be replayed or baked",
         default=True,
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is an object: it cannot be added inside another object's edit mode."""
-        return allowed(cls, edited(context, "Leave Edit Mode first: the device is an object of its own"))
+        return edited(context, "Leave Edit Mode first: the device is an object of its own")
 
-    def opened(self, context: Any, scene: Scene) -> Any:
-        """Add the bed of a scene, its finger where its path begins; return it."""
+    def add_scene(self, context: Any, scene: Scene) -> None:
+        """Add the bed of a scene, its finger where its path begins."""
         scene = shape_show.embedded(scene)
-        taken = sample_take.of(scene) if self.take else None
+        taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
-        start = scene.trajectory.trajectory().poses(sample_take.START)[0]
+        start = scene.trajectory.trajectory().poses(takes.START)[0]
         bridge.place_fingertip(view.fingertip_of(bed), start, scene.fingertip or Fingertip())
-        stand_at_cursor(context, bed)
-        select_only(context, bed)
+        place_at_cursor(context, bed)
         context.view_layer.update()
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
@@ -58,42 +56,35 @@ class Opened:
         elif self.take:
             words += " Its session is too long to be simulated here: use 'digiclay run'."
         self.report({"INFO"}, words)
-        return bed
 
 
-class OpenScene(Opened, bpy.types.Operator):  # type: ignore[misc]
+class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
     """Add the bed a Digital Clay scene file describes"""
 
     bl_idname = "digiclay.open_scene"
     bl_label = "Open Digital Clay Scene"
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # type: ignore[valid-type]
-    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the file, unless one was dropped."""
         if self.filepath:
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return super().invoke(context, event)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Read the scene and build its bed at the 3D cursor."""
-        try:
-            self.opened(context, load(Path(bpy.path.abspath(self.filepath))))
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        self.add_scene(context, load(Path(bpy.path.abspath(self.filepath))))
 
 
-class AddSample(Opened, bpy.types.Operator):  # type: ignore[misc]
+class AddSample(AddSceneAction, bpy.types.Operator):
     """Add a bed with one of the sessions or shapes that come with Digital Clay"""
 
     bl_idname = "digiclay.add_sample"
     bl_label = "Digital Clay Sample"
 
-    sample: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    sample: bpy.props.EnumProperty(
         name="Sample",
         items=[
             *((f"session:{name}", title(name), "A session") for name in sample_names()),
@@ -101,25 +92,19 @@ class AddSample(Opened, bpy.types.Operator):  # type: ignore[misc]
         ],
     )
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Build the bed at the 3D cursor."""
         kind, _, name = self.sample.partition(":")
-        try:
-            if kind == "session":
-                self.opened(context, load(find(name)))
-            else:
-                self._shaped(context, name)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        if kind == "session":
+            self.add_scene(context, load(find(name)))
+        else:
+            self._add_shape(context, name)
 
-    def _shaped(self, context: Any, name: str) -> None:
+    def _add_shape(self, context: Any, name: str) -> None:
         """Add a bed that displays a shape."""
         bed = add(context, resolve({}, name))
         bed.name = title(name)
-        stand_at_cursor(context, bed)
-        select_only(context, bed)
+        place_at_cursor(context, bed)
         context.view_layer.update()
         laid, _ = shape_show.show_file(bed, replace(Shape(), file=name))
         self.report({"INFO"}, laid.told())
@@ -137,7 +122,7 @@ class Entries:
             entry.sample = f"{self.kind}:{name}"
 
 
-class SessionSamples(Entries, bpy.types.Menu):  # type: ignore[misc]
+class SessionSamples(Entries, bpy.types.Menu):
     """Sessions that come with Digital Clay"""
 
     bl_idname = "DIGICLAY_MT_session_samples"
@@ -145,7 +130,7 @@ class SessionSamples(Entries, bpy.types.Menu):  # type: ignore[misc]
     kind = "session"
 
 
-class ShapeSamples(Entries, bpy.types.Menu):  # type: ignore[misc]
+class ShapeSamples(Entries, bpy.types.Menu):
     """Shapes that come with Digital Clay, displayed on a bed"""
 
     bl_idname = "DIGICLAY_MT_shape_samples"
@@ -153,7 +138,7 @@ class ShapeSamples(Entries, bpy.types.Menu):  # type: ignore[misc]
     kind = "shape"
 
 
-class Samples(bpy.types.Menu):  # type: ignore[misc]
+class Samples(bpy.types.Menu):
     """Sessions and shapes that come with Digital Clay"""
 
     bl_idname = "DIGICLAY_MT_samples"
@@ -168,7 +153,7 @@ class Samples(bpy.types.Menu):  # type: ignore[misc]
         self.layout.operator(OpenScene.bl_idname, text="Scene File...", icon="FILE_FOLDER")
 
 
-class SceneFiles(bpy.types.FileHandler):  # type: ignore[misc]
+class SceneFiles(bpy.types.FileHandler):
     """Lets a scene file be dropped into the 3D view."""
 
     bl_idname = "DIGICLAY_FH_scene"

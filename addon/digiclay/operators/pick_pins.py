@@ -1,6 +1,5 @@
 """Pick pins in the view, so that the overlay shows their heights."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
 from ..compat import bpy
@@ -9,7 +8,8 @@ from ..device import display
 from ..device.view import bed_of
 from ..press import aim
 from . import status
-from .reasons import allowed, no_bed
+from .action import Action, Polled
+from .poll_messages import no_bed
 
 __all__ = ["ClearPins", "PickPins"]
 
@@ -17,18 +17,18 @@ NO_BED = "Select a bed of pins first"
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
 
-class PickPins(bpy.types.Operator):  # type: ignore[misc]
+class PickPins(Polled, bpy.types.Operator):
     """Click pins of the active bed to see their heights in the overlay"""
 
     bl_idname = "digiclay.pick_pins"
     bl_label = "Pick Pins"
-    bl_options = {"UNDO"}  # noqa: RUF012
+    bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """There must be a bed to pick pins of, in a view to click into."""
         in_view = context.area is not None and context.area.type == "VIEW_3D"
-        return allowed(cls, no_bed(context, NO_BED) or ("" if in_view else "Pins are picked in a 3D view"))
+        return no_bed(context, NO_BED) or ("" if in_view else "Pins are picked in a 3D view")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
@@ -82,20 +82,18 @@ def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
     return None, None
 
 
-class ClearPins(bpy.types.Operator):  # type: ignore[misc]
+class ClearPins(Action, bpy.types.Operator):
     """Drop all picked pins of the active bed"""
 
     bl_idname = "digiclay.clear_pins"
     bl_label = "Clear"
-    bl_options = {"UNDO"}  # noqa: RUF012
+    bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """There must be picked pins."""
-        why = no_bed(context, NO_BED) or ("" if display.picked(bed_of(context)) else "No pins are picked")
-        return allowed(cls, why)
+        return no_bed(context, NO_BED) or ("" if display.picked(bed_of(context)) else "No pins are picked")
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Drop them."""
         display.pick(bed_of(context), ())
-        return {"FINISHED"}

@@ -1,30 +1,29 @@
 """Presets of a device: applying one, saving one's own, removing one's own."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from dataclasses import replace
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.scene_file import load
 from ..core.scene_table import PRESETS
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.devices import laid_out
 from ..settings.groups import PRESET_WORDS
-from .reasons import allowed, no_bed
+from .action import Action
+from .poll_messages import no_bed
 
 __all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
 
 
-class ApplyPreset(bpy.types.Operator):  # type: ignore[misc]
+class ApplyPreset(Action, bpy.types.Operator):
     """Set the bed's parameters to those of a preset; its layout stays"""
 
     bl_idname = "digiclay.preset_apply"
     bl_label = "Apply Digital Clay Preset"
-    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    preset: bpy.props.StringProperty(name="Preset")  # type: ignore[valid-type]
+    preset: bpy.props.StringProperty(name="Preset")
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
@@ -32,88 +31,73 @@ class ApplyPreset(bpy.types.Operator):  # type: ignore[misc]
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is needed; a session that runs on it goes on with the new parameters."""
-        return allowed(cls, no_bed(context))
+        return no_bed(context)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Set the parameters."""
         bed = bed_of(context)
         settings = bed.digiclay
-        try:
-            if self.preset in PRESETS:
-                settings.preset, settings.own_preset = self.preset, ""
-            else:
-                layout = properties.described(bed).layout
-                properties.adopt(bed, laid_out(load(own_presets.path(self.preset)), layout))
-                settings.own_preset = self.preset
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        if self.preset in PRESETS:
+            settings.preset, settings.own_preset = self.preset, ""
+        else:
+            layout = properties.described(bed).layout
+            properties.adopt(bed, laid_out(load(own_presets.path(self.preset)), layout))
+            settings.own_preset = self.preset
 
 
-class SavePreset(bpy.types.Operator):  # type: ignore[misc]
+class SavePreset(Action, bpy.types.Operator):
     """Save the bed's parameters as a preset of your own, for other beds and files"""
 
     bl_idname = "digiclay.preset_save"
     bl_label = "Save Digital Clay Preset"
 
-    name: bpy.props.StringProperty(  # type: ignore[valid-type]
+    name: bpy.props.StringProperty(
         name="Name",
         description="What the preset is called; one of that name is replaced",
         maxlen=own_presets.LONGEST,
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is needed."""
-        return allowed(cls, no_bed(context))
+        return no_bed(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the name."""
         self.name = bed_of(context).digiclay.own_preset
         return context.window_manager.invoke_props_dialog(self)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Save it."""
         bed = bed_of(context)
-        try:
-            file = own_presets.save(self.name, replace(properties.described(bed), name=self.name.strip()))
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        file = own_presets.save(self.name, replace(properties.described(bed), name=self.name.strip()))
         bed.digiclay.own_preset = file.stem
         self.report({"INFO"}, f"Saved as {file}")
-        return {"FINISHED"}
 
 
-class RemovePreset(bpy.types.Operator):  # type: ignore[misc]
+class RemovePreset(Action, bpy.types.Operator):
     """Remove the preset of your own that was applied last"""
 
     bl_idname = "digiclay.preset_remove"
     bl_label = "Remove Digital Clay Preset"
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A preset of the user's own must be the bed's: the core's cannot be removed."""
-        return allowed(cls, no_bed(context) or _no_own_preset(context))
+        return no_bed(context) or _no_own_preset(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Make sure."""
         return context.window_manager.invoke_confirm(self, event)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Remove it; the bed keeps its parameters."""
         settings = bed_of(context).digiclay
-        try:
-            own_presets.remove(settings.own_preset)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        own_presets.remove(settings.own_preset)
         self.report({"INFO"}, f"Removed the preset {settings.own_preset}")
         settings.own_preset = ""
-        return {"FINISHED"}
 
 
 def _no_own_preset(context: Any) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import handlers, loop, recovery, running, tick
-from .reasons import allowed
+from .action import Action, Polled
 
 __all__ = ["Escape", "GoOn", "Looping"]
 
@@ -21,7 +21,7 @@ EVERY, MOMENT = 20.0, 0.1
 CLOSED = "ended: its window was closed"
 
 
-class Looping:
+class Looping(Polled):
     """Mixin of the operators that drive the sessions of a window."""
 
     def begun(self, context: Any) -> set[str]:
@@ -69,43 +69,42 @@ class Looping:
     def tell(self, notes: list[tick.Note]) -> None:
         """Report what there is to tell, and keep it for the panel."""
         for note in notes:
-            self.report({note.level}, note.words)  # type: ignore[attr-defined]
+            self.report({note.level}, note.words)
             running.say(note.words)
 
 
-class GoOn(Looping, bpy.types.Operator):  # type: ignore[misc]
+class GoOn(Looping, bpy.types.Operator):
     """Go on with the sessions after Blender had a moment to save by itself"""
 
     bl_idname = "digiclay.session_go_on"
     bl_label = "Go On"
-    bl_options = {"INTERNAL"}  # noqa: RUF012
+    bl_options = {"INTERNAL"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """Sessions without an operator that drives them are needed."""
-        return allowed(cls, "" if running.all() and context.window is not None else "No session runs")
+        return "" if running.all() and context.window is not None else "No session runs"
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Drive the loop again."""
         return self.begun(context)
 
 
-class Escape(bpy.types.Operator):  # type: ignore[misc]
+class Escape(Action, bpy.types.Operator):
     """Stop the sessions in the moment in which no operator of theirs takes the key"""
 
     bl_idname = "digiclay.session_escape"
     bl_label = "Stop Sessions"
-    bl_options = {"INTERNAL"}  # noqa: RUF012
+    bl_options = {"INTERNAL"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """At any other time Esc is for whoever else it is for."""
-        return allowed(cls, "" if loop.aside() else "The session takes the key itself")
+        return "" if loop.aside() else "The session takes the key itself"
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Stop them, as Esc does at any other time."""
         _stop(context)
-        return {"FINISHED"}
 
 
 def _drawn() -> int:

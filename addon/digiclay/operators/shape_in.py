@@ -1,11 +1,9 @@
 """Shapes onto a bed: from an object of the scene, from a file, or one of the samples."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
 from ..core.shape import LENGTHS, UPWARDS, Shape
 from ..core.shape_file import KINDS, sample_shapes
 from ..device.view import bed_of
@@ -13,7 +11,8 @@ from ..exchange import shape_show
 from ..live import running
 from ..settings.declared import title
 from ..settings.shown_units import SHOWN, si
-from .reasons import allowed, baked, edited, linked, no_bed, session_runs
+from .action import Action, FileAction
+from .poll_messages import baked, edited, linked, no_bed, session_runs
 
 __all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
 
@@ -40,29 +39,29 @@ def millimetres(name: str, default: float, words: str) -> Any:
     )  # fmt: skip
 
 
-class Shaped:
-    """What the operators share: how the shape is laid onto the bed, and how that is told."""
+class Shaped(Action):
+    """Mixin of the operators here: how the shape is laid onto the bed, and how that is told."""
 
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    fit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    fit: bpy.props.EnumProperty(
         name="Size", description="How it is laid onto the bed", items=FITS, default=DEFAULT.fit
     )
-    scale: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    scale: bpy.props.FloatProperty(
         name="Times", description="How much larger than that in plan", default=1.0, min=1e-3, max=1e3
     )
-    x: millimetres("Right", DEFAULT.x, "Shift of its middle from the bed's along x")  # type: ignore[valid-type]
-    y: millimetres("Back", DEFAULT.y, "Shift of its middle from the bed's along y")  # type: ignore[valid-type]
-    relief: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    x: millimetres("Right", DEFAULT.x, "Shift of its middle from the bed's along x")
+    y: millimetres("Back", DEFAULT.y, "Shift of its middle from the bed's along y")
+    relief: bpy.props.EnumProperty(
         name="Height", description="How high it is", items=RELIEFS, default=DEFAULT.relief
     )
-    rise: millimetres("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")  # type: ignore[valid-type]
-    foot: millimetres("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")  # type: ignore[valid-type]
+    rise: millimetres("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")
+    foot: millimetres("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed is needed that stands still and is nobody else's."""
-        why = (
+        return (
             no_bed(context)
             or session_runs(context, "Stop the session first: the bed is going to be shaped anew")
             or edited(context)
@@ -70,27 +69,21 @@ class Shaped:
             or linked(context)
             or cls.missing(context, bed_of(context))
         )
-        return allowed(cls, why)
 
     @classmethod
     def missing(cls, context: Any, bed: Any) -> str:
         """Return what else is needed, or an empty text."""
         return ""
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Display the shape, and say what of it the bed cannot show."""
         bed = bed_of(context)
         context.view_layer.update()
-        try:
-            laid, off = self.displayed(context, bed)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        laid, off = self.displayed(context, bed)
         lost = laid.too_low + laid.too_high + laid.overhanging
         words = f"{laid.told()}; displayed to within {off * 1e6:.2g} µm"
         running.say(words)
         self.report({"WARNING" if lost else "INFO"}, words)
-        return {"FINISHED"}
 
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the shape; return what `shape_show` does."""
@@ -106,7 +99,7 @@ class Shaped:
         )  # fmt: skip
 
 
-class ShapeFromObject(Shaped, bpy.types.Operator):  # type: ignore[misc]
+class ShapeFromObject(Shaped, bpy.types.Operator):
     """Display the upper side of another selected object on the active bed, driving the pins there"""
 
     bl_idname = "digiclay.shape_from_object"
@@ -129,31 +122,24 @@ class ShapeFromObject(Shaped, bpy.types.Operator):  # type: ignore[misc]
         return shape_show.show_relief(bed, relief, self.shape(thing.name, bed))
 
 
-class ShapeFromFile(Shaped, bpy.types.Operator):  # type: ignore[misc]
+class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
     """Display a mesh, a picture (light is high) or a .npy file of heights on the active bed"""
 
     bl_idname = "digiclay.shape_from_file"
     bl_label = "Shape from File"
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH")  # type: ignore[valid-type]
-    filter_glob: bpy.props.StringProperty(  # type: ignore[valid-type]
-        default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"}
-    )
-    up: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"})
+    up: bpy.props.EnumProperty(
         name="Up",
         description="Which direction of a mesh is up; automatic: y in a glTF file, else z",
         items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
     )
-    unit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    unit: bpy.props.EnumProperty(
         name="Unit",
         description="Length a mesh is in; automatic: metres in a glTF file, else millimetres",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
     )
-
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for the file."""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the file."""
@@ -161,15 +147,13 @@ class ShapeFromFile(Shaped, bpy.types.Operator):  # type: ignore[misc]
         return shape_show.show_file(bed, self.shape(path, bed, up=self.up, unit=self.unit))
 
 
-class ShapeSample(Shaped, bpy.types.Operator):  # type: ignore[misc]
+class ShapeSample(Shaped, bpy.types.Operator):
     """Display one of the shapes that come with Digital Clay on the active bed"""
 
     bl_idname = "digiclay.shape_sample"
     bl_label = "Sample Shape"
 
-    sample: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Shape", items=[(name, title(name), "") for name in sample_shapes()]
-    )
+    sample: bpy.props.EnumProperty(name="Shape", items=[(name, title(name), "") for name in sample_shapes()])
 
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the sample."""

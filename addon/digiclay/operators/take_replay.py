@@ -1,6 +1,5 @@
 """Play a take again: the finger and the pins go through it once more, and the end is compared bit for bit."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 import time
 from typing import Any
 
@@ -21,22 +20,21 @@ from ..live.running import Running
 from ..recorded import takes
 from ..settings import properties
 from . import status
-from .reasons import allowed, no_bed, no_take, session_runs
+from .action import Action
+from .poll_messages import no_bed, no_take, session_runs
+from .take_actions import ChosenTake
 
 __all__ = ["ReplayTake"]
 
 
-class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
+class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     """Play a take again at the speed it was recorded at. Esc stops, and the bed is as it was"""
 
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    take: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Take", description="Number of the take; empty: the last one"
-    )
-    parts: bpy.props.IntProperty(  # type: ignore[valid-type]
+    parts: bpy.props.IntProperty(
         name="Finer Steps",
         description="Parts each physics step is cut into: 1 replays the take bit for bit",
         default=1,
@@ -45,21 +43,17 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed with a take and without a session is needed."""
-        why = no_bed(context) or session_runs(context, "Stop the session on this bed first")
-        return allowed(cls, why or no_take(context))
+        runs = session_runs(context, "Stop the session on this bed first")
+        return no_bed(context) or runs or no_take(context)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Play it without showing anything but its end."""
-        try:
-            self._begin(context)
-            for state in self._states:
-                self._state, self._at = state, self._at + 1
-            return self._finish(context)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        self._begin(context)
+        for state in self._states:
+            self._state, self._at = state, self._at + 1
+        self._finish(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Play it in the window."""
@@ -114,7 +108,7 @@ class ReplayTake(bpy.types.Operator):  # type: ignore[misc]
         tip = view.fingertip_of(bed)
         # Where the finger is now: it may have been moved since the last session.
         self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
-        self._took: Take = takes.read(bed, self.take or takes.last(bed))
+        self._took: Take = takes.read(bed, self.take)
         self._system = assemble(finer(self._took.scene, self.parts))
         if self._system.grid.count != len(bed.data.vertices):
             here, there = len(bed.data.vertices), self._system.grid.count

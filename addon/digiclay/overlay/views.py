@@ -18,9 +18,9 @@ from ..core.set_point import asked
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import on_screen
-from .layout import Room, free, laid_out
 from .look import Look, look
 from .picture import Dot, Picture
+from .placement import Room, free, laid_out
 from .sections import Told
 
 __all__ = ["follow", "redraw", "shown", "stop", "told"]

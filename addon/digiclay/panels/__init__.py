@@ -1,23 +1,19 @@
-"""The tab "Digital Clay" in the 3D view's sidebar: one small file a panel, which draws only."""
+"""The tab "Digital Clay" in the 3D view's sidebar: its panels draw only."""
 
 from __future__ import annotations
 
 from ..compat import bpy
-from . import control, device, display, export, finger, session, shapes, takes
+from . import appearance, live_session, parameters, shape_exchange
 
 __all__ = ["register", "unregister"]
 
 #: In the order they are drawn, each with a `bl_order` of its own: device 10, finger 20, control 30,
 #: session 40, display 50, shapes 60, takes 70, export 80.
 CLASSES: tuple[type, ...] = (
-    *device.CLASSES,
-    *finger.CLASSES,
-    *control.CLASSES,
-    *session.CLASSES,
-    *display.CLASSES,
-    *shapes.CLASSES,
-    *takes.CLASSES,
-    *export.CLASSES,
+    *parameters.CLASSES,
+    *live_session.CLASSES,
+    *appearance.CLASSES,
+    *shape_exchange.CLASSES,
 )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..device.view import bed_of
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "lines"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines"]
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.
@@ -31,8 +31,16 @@ class Panel:
         return bed_of(context) is not None
 
 
-def lines(layout: Any, words: str, icon: str) -> None:
-    """Draw words on as many lines as they need."""
+def draw_lines(layout: Any, words: str, icon: str) -> None:
+    """Draw words on as many lines as they need.
+
+    Parameters
+    ----------
+    layout : bpy.types.UILayout
+    words : str
+    icon : str
+        Of the first line.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(words, LINE)):

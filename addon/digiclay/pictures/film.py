@@ -21,8 +21,8 @@ from ..device import view
 from ..device.instant import Instant
 from . import stage
 from .film_file import encoded, frames_beside
-from .render import draw, dress, hasten, picture_scene
-from .strip import SHARE, strip
+from .force_plot import SHARE, strip
+from .still import draw, dress, hasten, picture_scene
 
 __all__ = ["film", "turntable"]
 

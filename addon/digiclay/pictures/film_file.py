@@ -13,7 +13,7 @@ from ..compat import bpy, quiet, strips, to_video
 from ..core.errors import OutputError
 from ..core.shots import Moving
 from ..core.unfinished import unfinished
-from .render import why_not
+from .still import why_not
 
 __all__ = ["encoded", "frames_beside", "whole_film"]
 

@@ -14,7 +14,7 @@ from .. import bridge
 from ..bridge import linear
 from ..compat import bpy, shader_nodes
 from ..core.modes import MEANINGS, Mode
-from ..device import heat, palettes, shapes
+from ..device import heat, palettes, primitives
 
 __all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]
 
@@ -117,7 +117,7 @@ def of_modes(front: Front, modes: Sequence[Mode]) -> None:
     """List modes down the picture's left side, each with a dot of its colour; small pictures explain none."""
     size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
-    disc = shapes.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
+    disc = primitives.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
     left, y = LEFT * front.width, 0.86 * front.height
     for mode in modes:
         name = mode.name.lower().replace("_", " ")

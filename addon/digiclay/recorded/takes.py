@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from ..core.assembly import assemble
 from ..core.errors import DigiclayError
+from ..core.keeping import packed
+from ..core.live import lived
+from ..core.scene import Scene
+from ..core.simulation import begin
 from ..core.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
-__all__ = ["Entry", "entries", "keep", "keep_recorded", "last", "read", "recorded", "remove"]
+__all__ = [
+    "START", "Entry", "entries", "find", "keep", "keep_recorded", "read", "recorded", "remove", "simulate",
+]  # fmt: skip
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
+#: Most cells times control periods that are simulated while somebody waits: some seconds' worth.
+MOST = 8_000_000
+#: When a path begins, s.
+START = np.zeros(1)
 
 
 class Entry(NamedTuple):
@@ -38,18 +52,28 @@ def entries(bed: Any) -> list[Entry]:
     return [Entry(number, held[number]["name"], held[number]["seconds"]) for number in numbers]
 
 
-def last(bed: Any) -> str:
-    """Return the number of a bed's last take.
+def find(bed: Any, number: str = "") -> Entry:
+    """Return what a list shows of one take of a bed.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    number : str, optional
+        The last one when left out.
 
     Raises
     ------
     DigiclayError
-        When it has none.
+        When the bed has none, or none of that number.
     """
     known = entries(bed)
-    if not known:
+    if not known and not number:
         raise DigiclayError(f"{bed.name} has no take: record one in a session first.")
-    return known[-1].number
+    found = [entry for entry in known if number in ("", entry.number)]
+    if not found:
+        numbers = ", ".join(entry.number for entry in known) or "none"
+        raise DigiclayError(f"{bed.name} has no take {number!r}: its takes are {numbers}.")
+    return found[-1]
 
 
 def recorded(session: Running) -> Take | None:
@@ -78,15 +102,15 @@ def keep_recorded(bed: Any, session: Running) -> str:
     return f"The recording ended and was kept as {entry.name} ({entry.seconds:.1f} s)"
 
 
-def read(bed: Any, number: str) -> Take:
-    """Return a take of a bed.
+def read(bed: Any, number: str = "") -> Take:
+    """Return a take of a bed; see `find`.
 
     Raises
     ------
     DigiclayError
-        When there is none of that number, or it is damaged.
+        When there is no such take, or it is damaged.
     """
-    return from_bytes(bytes(_held(bed, number)["data"]))
+    return from_bytes(bytes(bed[PROPERTY][find(bed, number).number]["data"]))
 
 
 def remove(bed: Any, number: str) -> None:
@@ -97,14 +121,21 @@ def remove(bed: Any, number: str) -> None:
     DigiclayError
         When there is none of that number.
     """
-    _held(bed, number)
-    del bed[PROPERTY][number]
+    del bed[PROPERTY][find(bed, number).number]
 
 
-def _held(bed: Any, number: str) -> Any:
-    """Return the group of a take, or refuse its number."""
-    held = bed.get(PROPERTY)
-    if not held or number not in held:
-        known = ", ".join(one.number for one in entries(bed)) or "none"
-        raise DigiclayError(f"{bed.name} has no take {number!r}: its takes are {known}.")
-    return held[number]
+def simulate(scene: Scene) -> Take | None:
+    """Return the session of a scene, from rest to its end; None when that would take too long.
+
+    The finger goes straight from control period to control period, as every take's does.
+    """
+    if scene.cells * scene.periods > MOST:
+        return None
+    system = assemble(scene)
+    times = np.arange(scene.periods + 1) * scene.simulation.control_period
+    poses = scene.trajectory.trajectory().poses(times)
+    state = begin(system)
+    start = packed(system, state)
+    # Only the last state is wanted: the others' arrays are used up.
+    (state,) = deque(lived(system, state, poses), maxlen=1)
+    return Take(scene, start, poses, packed(system, state))

@@ -16,8 +16,8 @@ from ..core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
 from ..core.scene_table import ABSENT, resolve
 from ..device.pins_drawn import differs
 from .groups import CLASSES, SETTINGS
+from .messages import named
 from .table import Notes, read, write
-from .words import named
 
 __all__ = ["adopt", "described", "part_group", "register", "scene_of", "stale", "table_of", "unregister"]
 

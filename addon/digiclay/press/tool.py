@@ -80,7 +80,7 @@ def _trail(found: aim.Target) -> list[Floats]:
     ]
 
 
-class PressTool(bpy.types.WorkSpaceTool):  # type: ignore[misc]
+class PressTool(bpy.types.WorkSpaceTool):
     """Sculpt with the fingertip under the mouse."""
 
     bl_space_type = "VIEW_3D"

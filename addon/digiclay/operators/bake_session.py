@@ -1,7 +1,6 @@
 """Bake a take, or the session an animated fingertip would make, into the bed; and take a bake away."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -15,20 +14,22 @@ from ..core.take import Take
 from ..device.view import bed_of
 from ..recorded import bake, takes
 from ..settings import properties
+from .action import Action
 from .long_work import LongWork
-from .reasons import allowed, no_bed, session_runs
+from .poll_messages import no_bed, session_runs
+from .take_actions import ChosenTake
 
 __all__ = ["Bake", "FreeBake"]
 
 
-class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
+class Bake(ChosenTake, LongWork, bpy.types.Operator):
     """Turn a session into ordinary animation of the bed, which plays and renders without simulating"""
 
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
-    source: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    source: bpy.props.EnumProperty(
         name="Source",
         description="What moves the fingertip",
         items=[
@@ -37,22 +38,17 @@ class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
         ],
         default="FINGERTIP",
     )
-    take: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Take", description="Number of the take; empty: the last one"
-    )
-    first: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="First Frame", description="Frame the session begins at", default=1
-    )
-    last: bpy.props.IntProperty(  # type: ignore[valid-type]
+    first: bpy.props.IntProperty(name="First Frame", description="Frame the session begins at", default=1)
+    last: bpy.props.IntProperty(
         name="Last Frame",
         description="Frame the session ends at; a take has its own length",
         default=250,
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed without a running session is needed."""
-        return allowed(cls, no_bed(context) or session_runs(context, "Stop the session on this bed first"))
+        return no_bed(context) or session_runs(context, "Stop the session on this bed first")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Take the scene's frames where none are asked for, and begin."""
@@ -62,12 +58,12 @@ class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
             self.last = context.scene.frame_end
         return super().invoke(context, event)
 
-    def begun(self, context: Any) -> Iterator[float]:
+    def work(self, context: Any) -> Generator[float, None, None]:
         """Read the finger's path, simulate it, and write the bake."""
         bed, scene = bed_of(context), context.scene
         own = self.source == "TAKE"
         if own:
-            take = takes.read(bed, self.take or takes.last(bed))
+            take = takes.read(bed, self.take)
         else:
             made = properties.scene_of(bed)
             period = made.simulation.control_period
@@ -92,20 +88,18 @@ class Bake(LongWork, bpy.types.Operator):  # type: ignore[misc]
         self.report({"INFO"}, f"Baked {count} frames, {self.first} to {self.first + count - 1}")
 
 
-class FreeBake(bpy.types.Operator):  # type: ignore[misc]
+class FreeBake(Action, bpy.types.Operator):
     """Take the bake away: the bed shows its own state again. Keyframes of the fingertip stay"""
 
     bl_idname = "digiclay.bake_free"
     bl_label = "Free Bake"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A bed with a bake is needed."""
-        why = no_bed(context) or ("" if bake.is_baked(bed_of(context)) else "The bed has no bake")
-        return allowed(cls, why)
+        return no_bed(context) or ("" if bake.is_baked(bed_of(context)) else "The bed has no bake")
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Free it."""
         bake.free(bed_of(context))
-        return {"FINISHED"}

@@ -1,6 +1,5 @@
 """Properties of the operators that make meshes of a formed surface: what is made, and what is a feature."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 from typing import Any
 
 from ..compat import bpy
@@ -11,8 +10,10 @@ from ..core.quantity import quantities
 from ..core.skins import SKINS
 from ..device.view import bed_of
 from ..exchange import formed_bed
+from .action import Action
+from .poll_messages import no_surface
 
-__all__ = ["FindingOptions", "SurfaceOptions", "chosen", "sentence"]
+__all__ = ["FindingOptions", "SurfaceAction", "SurfaceOptions", "chosen", "sentence"]
 
 MODEL, FINDING = quantities(Model), quantities(Finding)
 
@@ -22,10 +23,19 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-class FindingOptions:
+class SurfaceAction(Action):
+    """Mixin of an action on the surface of the active bed."""
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed with a surface is needed."""
+        return no_surface(context)
+
+
+class FindingOptions(SurfaceAction):
     """What counts as a feature."""
 
-    threshold: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    threshold: bpy.props.FloatProperty(
         name="Threshold (mm)",
         description=sentence(FINDING["threshold"].doc) + ", in mm",
         default=Finding().threshold * 1e3,
@@ -34,7 +44,7 @@ class FindingOptions:
         precision=3,
         step=10,
     )
-    smallest: bpy.props.IntProperty(  # type: ignore[valid-type]
+    smallest: bpy.props.IntProperty(
         name="Smallest (pins)",
         description=sentence(FINDING["smallest"].doc),
         default=Finding().smallest,
@@ -51,19 +61,19 @@ class FindingOptions:
 class SurfaceOptions(FindingOptions):
     """What is made of a surface."""
 
-    kind: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    kind: bpy.props.EnumProperty(
         name="Mesh",
         description="What is made of the formed surface",
         items=[(name, sentence(name), sentence(said)) for name, said in KINDS.items()],
         default=Model().kind,
     )
-    skin: bpy.props.EnumProperty(  # type: ignore[valid-type]
+    skin: bpy.props.EnumProperty(
         name="Skin",
         description="What the surface is between the pins",
         items=[(name, sentence(name), sentence(said)) for name, said in SKINS.items()],
         default=Model().skin,
     )
-    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+    resolution: bpy.props.IntProperty(
         name="Points a Pitch",
         description=sentence(MODEL["resolution"].doc),
         default=0,
@@ -71,7 +81,7 @@ class SurfaceOptions(FindingOptions):
         max=64,
         soft_max=16,
     )
-    base_thickness: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    base_thickness: bpy.props.FloatProperty(
         name="Base (mm)",
         description=sentence(MODEL["base_thickness"].doc) + ", in mm",
         default=Model().base_thickness * 1e3,

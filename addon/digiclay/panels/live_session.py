@@ -1,4 +1,4 @@
-"""Panel Session: start and stop, and how the session fares."""
+"""Panels Session and Takes: start and stop, how the session fares, and what was recorded in it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from ..compat import bpy
 from ..live import bed_state, running
 from ..live.running import Running
 from ..overlay.sections import error_words
-from .base import Panel, bed_of, lines
+from ..recorded import bake, takes
+from .base import Panel, bed_of, draw_lines
 
-__all__ = ["CLASSES", "Session"]
+__all__ = ["CLASSES", "Session", "Takes", "error_line"]
 
 
-class Session(Panel, bpy.types.Panel):  # type: ignore[misc]
+class Session(Panel, bpy.types.Panel):
     """Sculpting live."""
 
     bl_idname = "DIGICLAY_PT_session"
@@ -36,7 +37,7 @@ class Session(Panel, bpy.types.Panel):  # type: ignore[misc]
             _numbers(self.layout, session)
         said = session.waits and f"Waits: {session.waits}" if session else running.said()
         if said:
-            lines(self.layout, said, "ERROR" if session else "INFO")
+            draw_lines(self.layout, said, "ERROR" if session else "INFO")
 
 
 def _buttons(column: Any, session: Running) -> None:
@@ -76,4 +77,36 @@ def error_line(session: Running) -> str:
     return error_words(errors and (errors.height, errors.force))
 
 
-CLASSES = (Session,)
+class Takes(Panel, bpy.types.Panel):
+    """The takes of the bed and its bake."""
+
+    bl_label = "Takes"
+    bl_idname = "DIGICLAY_PT_takes"
+    bl_order = 70
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the recording, the list of takes, and the bake."""
+        layout, bed = self.layout, bed_of(context)
+        session = running.of(bed)
+        if session is not None and session.recording is not None:
+            seconds = (len(session.recording.path) - 1) * session.system.period
+            layout.operator("digiclay.take_keep", text=f"Keep Take ({seconds:.1f} s)", icon="CHECKMARK")
+        else:
+            layout.operator("digiclay.take_record", icon="RECORD_ON")
+        for entry in takes.entries(bed):
+            row = layout.row(align=True)
+            row.label(text=f"{entry.name} ({entry.seconds:.1f} s)", icon="TRACKING")
+            row.operator("digiclay.take_replay", text="", icon="PLAY").take = entry.number
+            baking = row.operator("digiclay.bake", text="", icon="RENDER_ANIMATION")
+            baking.source, baking.take = "TAKE", entry.number
+            row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
+            row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
+        layout.separator()
+        if bake.is_baked(bed):
+            layout.operator("digiclay.bake_free", icon="TRASH")
+        else:
+            layout.operator("digiclay.bake", text="Bake Animated Fingertip").source = "FINGERTIP"
+
+
+CLASSES = (Session, Takes)

@@ -14,7 +14,7 @@ from ..device import view
 from ..device.instant import Instant
 from . import stage
 
-__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "still", "whole_picture", "why_not"]
+__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "render_still", "whole_picture", "why_not"]
 
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
@@ -22,7 +22,7 @@ ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
 SPACE = 2**20
 
 
-def still(
+def render_still(
     instant: Instant,
     out: Path,
     *,

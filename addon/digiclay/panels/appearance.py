@@ -11,7 +11,7 @@ from .base import Panel, bed_of
 __all__ = ["CLASSES", "Display"]
 
 
-class Display(Panel, bpy.types.Panel):  # type: ignore[misc]
+class Display(Panel, bpy.types.Panel):
     """What is shown of the bed; each part can be off, and then costs nothing."""
 
     bl_label = "Display"

@@ -1,6 +1,5 @@
 """The Press tool's operator: what the hand draws while the button is held is queued for the session."""
 
-# No postponed annotations here: Blender reads an operator's properties from them.
 import time
 from dataclasses import replace
 from functools import partial
@@ -14,7 +13,7 @@ from ..live.stroke import DEEPEST, deepen, draw
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..press import aim
 from . import status
-from .reasons import allowed
+from .action import Polled
 
 __all__ = ["Press"]
 
@@ -26,15 +25,15 @@ KEYS = (
 )
 
 
-class Press(bpy.types.Operator):  # type: ignore[misc]
+class Press(Polled, bpy.types.Operator):
     """Press the fingertip into the pins under the mouse, and drag it on"""
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
     # No undo step of its own: the session makes it when the finger has finished the stroke.
-    bl_options = {"INTERNAL"}  # noqa: RUF012
+    bl_options = {"INTERNAL"}
 
-    depth: bpy.props.FloatProperty(  # type: ignore[valid-type]
+    depth: bpy.props.FloatProperty(
         name="Depth (mm)",
         description="How deep to press below the surface as it was, in mm",
         default=4.0,
@@ -44,19 +43,19 @@ class Press(bpy.types.Operator):  # type: ignore[misc]
         precision=2,
         step=25,
     )
-    use_pressure: bpy.props.BoolProperty(  # type: ignore[valid-type]
+    use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
         description="A pen presses as deep as its pressure says, up to the depth",
         default=True,
     )
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll_message(cls, context: Any) -> str:
         """A view is needed, in object mode, with a bed in it."""
         if context.area is None or context.area.type != "VIEW_3D" or context.mode != "OBJECT":
-            return allowed(cls, "Pins are pressed in a 3D view, in Object Mode")
+            return "Pins are pressed in a 3D view, in Object Mode"
         seen = any(view.is_bed(thing) for thing in context.visible_objects)
-        return allowed(cls, "" if seen else "Add a bed first: Add > Mesh > Digital Clay")
+        return "" if seen else "Add a bed first: Add > Mesh > Digital Clay"
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""

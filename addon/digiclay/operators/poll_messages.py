@@ -1,6 +1,6 @@
-"""Why an operator cannot run now: each reason is a function of the context that gives words, or none: "".
+"""Why an operator cannot run now: each function of the context returns a message, or an empty text.
 
-A poll is given its reasons joined by ``or``, so that it says the first that holds and asks no further.
+`Action.poll_message` joins them by ``or``, so that Blender shows the first that holds.
 """
 
 from __future__ import annotations
@@ -8,38 +8,31 @@ from __future__ import annotations
 from typing import Any
 
 from ..device.view import bed_of
-from ..live import running, waiting
+from ..live import running
+from ..live.waiting import active_session, blocking_reason
 from ..recorded import takes
 from ..recorded.bake import is_baked
-from .session_context import session_of
 
 __all__ = [
-    "allowed", "baked", "edited", "linked", "no_bed", "no_session", "no_surface", "no_take", "session_runs",
+    "baked", "edited", "linked", "no_bed", "no_session", "no_surface", "no_take", "session_runs",
     "session_waits",
 ]  # fmt: skip
 
 
-def allowed(operator: Any, why: str) -> bool:
-    """Answer a poll: without a reason against it the operator can run, else Blender shows the reason."""
-    if why:
-        operator.poll_message_set(why)
-    return not why
-
-
-def no_bed(context: Any, words: str = "Select a bed or its fingertip first") -> str:
+def no_bed(context: Any, message: str = "Select a bed or its fingertip first") -> str:
     """No part of a bed is active; `linked`, `baked` and `no_take` are to be asked after this."""
-    return "" if bed_of(context) is not None else words
+    return "" if bed_of(context) is not None else message
 
 
-def session_runs(context: Any, words: str = "Stop the session first") -> str:
+def session_runs(context: Any, message: str = "Stop the session first") -> str:
     """A session runs on the bed."""
-    return words if running.of(bed_of(context)) is not None else ""
+    return message if running.of(bed_of(context)) is not None else ""
 
 
-def edited(context: Any, words: str = "Go back to Object Mode first") -> str:
+def edited(context: Any, message: str = "Go back to Object Mode first") -> str:
     """The active object, or the bed it belongs to, is being edited, painted or posed."""
     bed = bed_of(context)
-    return "" if context.mode == "OBJECT" and (bed is None or bed.mode == "OBJECT") else words
+    return "" if context.mode == "OBJECT" and (bed is None or bed.mode == "OBJECT") else message
 
 
 def linked(context: Any) -> str:
@@ -50,10 +43,10 @@ def linked(context: Any) -> str:
 
 
 def baked(
-    context: Any, words: str = "The bed plays a baked session: free the bake in the Takes panel first"
+    context: Any, message: str = "The bed plays a baked session: free the bake in the Takes panel first"
 ) -> str:
     """The bed plays a bake."""
-    return words if is_baked(bed_of(context)) else ""
+    return message if is_baked(bed_of(context)) else ""
 
 
 def no_take(context: Any) -> str:
@@ -71,14 +64,14 @@ def no_surface(context: Any) -> str:
 
 def no_session(context: Any) -> str:
     """There is no session the operator could be about."""
-    return "" if session_of(context) else "No session runs on the active bed: start one first"
+    return "" if active_session(context) else "No session runs on the active bed: start one first"
 
 
 def session_waits(context: Any) -> str:
     """There is no session, or its bed cannot be written now."""
-    active = session_of(context)
+    active = active_session(context)
     if active is None:
         return no_session(context)
     bed, session = active
-    why = waiting.obstacle(context, bed, session.system.grid.count)
+    why = blocking_reason(context, bed, session.system.grid.count)
     return f"The session waits: {why}" if why else ""

@@ -1,0 +1,53 @@
+"""What the operators share: a poll that says why not, errors that are reported, the file browser."""
+
+# No postponed annotations in this package: Blender reads an operator's properties from them.
+from typing import Any
+
+from ..core.errors import DigiclayError
+
+__all__ = ["Action", "FileAction", "Polled"]
+
+
+class Polled:
+    """Mixin of an operator that Blender greys out while `poll_message` says why it cannot run."""
+
+    report: Any
+    poll_message_set: Any
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """Return what stands against running now, or an empty text."""
+        return ""
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Tell whether the operator can run; Blender shows the message where it cannot."""
+        message = cls.poll_message(context)
+        if message:
+            cls.poll_message_set(message)
+        return not message
+
+
+class Action(Polled):
+    """Mixin of an operator that is done at once: a DigiclayError is reported, and nothing else follows."""
+
+    def perform(self, context: Any) -> set[str] | None:
+        """Do it; return the operator's result where that is not FINISHED."""
+        raise NotImplementedError
+
+    def execute(self, context: Any) -> set[str]:
+        """Do it, and report what stands in its way."""
+        try:
+            return self.perform(context) or {"FINISHED"}
+        except DigiclayError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+
+class FileAction(Action):
+    """Mixin of an action that asks for its `filepath` first."""
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}

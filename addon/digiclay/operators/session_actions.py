@@ -1,0 +1,164 @@
+"""What can be done to a session that runs: pause, step, stop, rewind, reset; and to a bed at rest: reset."""
+
+from dataclasses import replace
+from typing import Any
+
+from .. import bridge
+from ..compat import bpy
+from ..core.assembly import assemble
+from ..core.fingertip import Fingertip
+from ..core.simulation import begin
+from ..device import view
+from ..device.instant import CLEARANCE
+from ..device.view import bed_of
+from ..live import bed_state, handlers, loop, running, sculpting, tick
+from ..live.running import Running
+from ..live.waiting import active_session
+from ..recorded import takes
+from ..settings import properties
+from .action import Action
+from .poll_messages import edited, no_bed, no_session, session_waits
+
+__all__ = ["PauseSession", "ResetSession", "RewindSession", "StepSession", "StopSession"]
+
+
+class OfSession(Action):
+    """Mixin of an action on the session that `active_session` finds."""
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A session is needed."""
+        return no_session(context)
+
+    def perform(self, context: Any) -> None:
+        """Change the session."""
+        active = active_session(context)
+        assert active is not None  # so says the poll
+        self.change(context, *active)
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Change a session."""
+        raise NotImplementedError
+
+
+class PauseSession(OfSession, bpy.types.Operator):
+    """Let the bed stand still, or go on: it then takes the straight way to where the fingertip is"""
+
+    bl_idname = "digiclay.session_pause"
+    bl_label = "Pause or Resume"
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Turn it over."""
+        running.put(replace(session, paused=not session.paused))
+        loop.redraw_status()
+
+
+class StepSession(OfSession, bpy.types.Operator):
+    """Let the bed do one control period and stand still; a session that runs is paused"""
+
+    bl_idname = "digiclay.session_step"
+    bl_label = "Single Step"
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Ask for one more; the next tick does it."""
+        running.put(sculpting.request_step(session))
+        loop.redraw_status()
+
+
+class StopSession(OfSession, bpy.types.Operator):
+    """Stop the session of the bed; it keeps its state, and another session goes on from it"""
+
+    bl_idname = "digiclay.session_stop"
+    bl_label = "Stop Session"
+    bl_options = {"UNDO"}
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Stop it."""
+        handlers.end(handlers.STOPPED, session)
+
+
+class RewindSession(OfSession, bpy.types.Operator):
+    """Take back the last gesture: bed and fingertip are as they were when it began"""
+
+    bl_idname = "digiclay.session_rewind"
+    bl_label = "Take Back a Gesture"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A session with a gesture is needed."""
+        return session_waits(context) or _no_gesture(context)
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Go back, the fingertip along with the bed."""
+        back = sculpting.rewind(session)
+        if session.recording is not None and back.recording is None:
+            kept = takes.keep_recorded(bed, session)
+            self.report({"INFO"}, kept or "The recording ended: the gesture began before it")
+        tick.show(bed, back)
+        tick.place(context, bed, back)
+
+
+class ResetSession(OfSession, bpy.types.Operator):
+    """Bring all pins back to rest and lift the fingertip off them"""
+
+    bl_idname = "digiclay.session_reset"
+    bl_label = "Reset"
+    bl_options = {"UNDO"}
+
+    running_only: bpy.props.BoolProperty(
+        name="Only While It Runs",
+        description="Leave beds without a session alone: the key must not reach them by accident",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed that has left its rest is needed."""
+        if active_session(context) is not None:
+            return session_waits(context)
+        return no_bed(context) or _at_rest(context) or edited(context)
+
+    def perform(self, context: Any) -> set[str] | None:
+        """Begin anew; what a session has done can be taken back."""
+        if active_session(context) is not None:
+            super().perform(context)
+        elif self.running_only:
+            return {"PASS_THROUGH"}
+        else:
+            _bring_to_rest(bed_of(context))
+        return None
+
+    def change(self, context: Any, bed: Any, session: Running) -> None:
+        """Begin anew, the recording kept as a take."""
+        kept = takes.keep_recorded(bed, session)
+        back = sculpting.reset(session)
+        tick.show(bed, back)
+        tick.place(context, bed, back)
+        if kept:
+            self.report({"INFO"}, kept)
+
+
+def _no_gesture(context: Any) -> str:
+    """The fingertip has formed nothing yet."""
+    active = active_session(context)
+    formed = active is not None and (active[1].gestures or active[1].strokes)
+    return "" if formed else "There is no gesture to take back: the fingertip has not touched since"
+
+
+def _at_rest(context: Any) -> str:
+    """There is nothing to bring back."""
+    return "The bed is at rest already" if bed_state.kept(bed_of(context)) is None else ""
+
+
+def _bring_to_rest(bed: Any) -> None:
+    """Bring a bed without a session to rest."""
+    scene = properties.scene_of(bed)
+    system = assemble(scene)
+    bed_state.clear(bed)
+    view.show_state(bed, system, begin(system))
+    tip = view.fingertip_of(bed)
+    if tip is not None:
+        pose = bridge.pose(tip)
+        pose[2] = max(pose[2], scene.actuator.rest_height + CLEARANCE)
+        bridge.place_fingertip(tip, pose, scene.fingertip or Fingertip())

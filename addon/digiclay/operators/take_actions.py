@@ -1,0 +1,129 @@
+"""Takes: record one in a session, keep it, write it as a scene file for `digiclay run`, remove it."""
+
+from pathlib import Path
+from typing import Any
+
+from ..compat import bpy
+from ..core.errors import DigiclayError
+from ..core.scene_table import text
+from ..core.take import as_scene
+from ..core.whole_files import write_whole
+from ..device.view import bed_of
+from ..live import recovery, running, sculpting
+from ..recorded import takes
+from .action import Action, FileAction
+from .poll_messages import no_bed, no_take
+
+__all__ = ["ChosenTake", "ExportTake", "KeepTake", "RecordTake", "RemoveTake"]
+
+
+class ChosenTake:
+    """Mixin of an operator that is about one take of the active bed."""
+
+    take: bpy.props.StringProperty(name="Take", description="Number of the take; empty: the last one")
+
+    def chosen_take(self, context: Any) -> takes.Entry:
+        """Return the entry of the take; raises DigiclayError when the bed has none of that number."""
+        return takes.find(bed_of(context), self.take)
+
+
+class RecordTake(Action, bpy.types.Operator):
+    """Record the fingertip's path from now on, to replay, bake or export it"""
+
+    bl_idname = "digiclay.take_record"
+    bl_label = "Record Take"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A running session that does not record yet is needed."""
+        session = running.of(bed_of(context))
+        if session is None:
+            return "Start a session first"
+        return "A take is being recorded already" if session.recording is not None else ""
+
+    def perform(self, context: Any) -> None:
+        """Begin to record."""
+        running.put(sculpting.recording(running.of(bed_of(context)), True))
+
+
+class KeepTake(Action, bpy.types.Operator):
+    """Stop recording and keep the take in this file"""
+
+    bl_idname = "digiclay.take_keep"
+    bl_label = "Keep Take"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(name="Name", description="Name of the take; empty: its number", maxlen=60)
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A session that records is needed."""
+        session = running.of(bed_of(context))
+        records = session is not None and session.recording is not None
+        return "" if records else "Record a take first"
+
+    def perform(self, context: Any) -> set[str] | None:
+        """Keep it."""
+        recovery.take_back()
+        bed = bed_of(context)
+        session = running.of(bed)
+        take = takes.recorded(session)
+        running.put(sculpting.recording(session, False))
+        if take is None:
+            self.report({"WARNING"}, "Nothing was recorded: the session stood still")
+            return {"CANCELLED"}
+        entry = takes.keep(bed, take, self.name)
+        self.report({"INFO"}, f"{entry.name}: {entry.seconds:.1f} s kept")
+        return None
+
+
+class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
+    """Write a take as a scene file for `digiclay run`"""
+
+    bl_idname = "digiclay.take_export"
+    bl_label = "Export Take"
+    bl_options = {"REGISTER"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed with a take is needed."""
+        return no_bed(context) or no_take(context)
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask for the file, named after the take."""
+        try:
+            name = self.chosen_take(context).name
+        except DigiclayError:
+            name = "take"
+        self.filepath = bpy.path.clean_name(name) + ".toml"
+        return super().invoke(context, event)
+
+    def perform(self, context: Any) -> None:
+        """Write it."""
+        entry = self.chosen_take(context)
+        take = takes.read(bed_of(context), entry.number)
+        # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
+        file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
+        write_whole(file, text(as_scene(take, entry.name)).encode())
+        self.report({"INFO"}, f"{entry.name} written to {file}")
+
+
+class RemoveTake(ChosenTake, Action, bpy.types.Operator):
+    """Throw a take away"""
+
+    bl_idname = "digiclay.take_remove"
+    bl_label = "Remove Take"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed with a take is needed."""
+        return no_bed(context) or no_take(context)
+
+    def perform(self, context: Any) -> None:
+        """Remove it."""
+        takes.remove(bed_of(context), self.chosen_take(context).number)

@@ -1,0 +1,190 @@
+"""Panels Device, Finger and Control: presets, the method, and a sub-panel of parameters for each part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..compat import bpy
+from ..core.methods import METHODS
+from ..core.quantity import quantities
+from ..core.scene import NEEDS, OPTIONAL, parameters
+from ..core.scene_table import PRESETS
+from ..live import running
+from ..settings import own_presets, properties
+from ..settings.declared import title
+from ..settings.properties import part_group
+from .base import Panel, bed_of, draw_lines
+
+__all__ = ["CLASSES", "Control", "Device", "Finger", "Presets", "Start", "section_panel"]
+
+#: Kinds of properties whose label stands beside the field.
+BESIDE = {"ENUM", "STRING"}
+
+
+class Start(Panel, bpy.types.Panel):
+    """What the tab shows while no bed is active: how to come by one."""
+
+    bl_idname = "DIGICLAY_PT_start"
+    bl_label = "Digital Clay"
+    bl_order = 0
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Show it only while no bed is active."""
+        return bed_of(context) is None
+
+    def draw(self, context: Any) -> None:
+        """Draw the hint, and what was told last: a session may have ended with the file it was of."""
+        column = self.layout.column()
+        column.label(text="Select a bed or its fingertip,")
+        column.label(text="or add a new device:")
+        column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
+        draw_lines(self.layout, running.said(), "INFO")
+
+
+class Presets(bpy.types.Menu):
+    """The presets of the core, and the user's own."""
+
+    bl_idname = "DIGICLAY_MT_presets"
+    bl_label = "Presets"
+
+    def draw(self, context: Any) -> None:
+        """Draw one entry a preset."""
+        for name in PRESETS:
+            self.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
+        own = own_presets.names()
+        if own:
+            self.layout.separator()
+        for name in own:
+            self.layout.operator("digiclay.preset_apply", text=name).preset = name
+
+
+class Device(Panel, bpy.types.Panel):
+    """Which device it is."""
+
+    bl_idname = "DIGICLAY_PT_device"
+    bl_label = "Device"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the presets, and what a bed needs that no longer is as its settings say."""
+        bed = bed_of(context)
+        settings = bed.digiclay
+        row = self.layout.row(align=True)
+        row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
+        row.operator("digiclay.preset_save", text="", icon="ADD")
+        row.operator("digiclay.preset_remove", text="", icon="REMOVE")
+        reason = properties.stale(bed)
+        if reason:
+            column = self.layout.column()
+            column.alert = True
+            column.label(text=reason, icon="ERROR")
+        self.layout.operator("digiclay.rebuild", icon="FILE_REFRESH")
+
+
+class Finger(Panel, bpy.types.Panel):
+    """The finger that forms the bed."""
+
+    bl_idname = "DIGICLAY_PT_finger"
+    bl_label = "Finger"
+    bl_order = 20
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Say when there is none."""
+        if not bed_of(context).digiclay.use_fingertip:
+            self.layout.label(text="Left out: nothing touches the bed", icon="INFO")
+
+
+class Control(Panel, bpy.types.Panel):
+    """How the cells are controlled."""
+
+    bl_idname = "DIGICLAY_PT_control"
+    bl_label = "Control"
+    bl_order = 30
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the choice of the method."""
+        settings = bed_of(context).digiclay
+        row = self.layout.row()
+        row.active = settings.use_control
+        row.prop(settings, "method")
+
+
+def section_panel(section: str, parent: str, order: int, words: str = "") -> type:
+    """Make the sub-panel of a part.
+
+    Parameters
+    ----------
+    section : str
+        Of `core.scene.SECTIONS`. A part a scene may leave out has a switch in the header.
+    parent : str
+        `bl_idname` of the panel it stands in.
+    order : int
+        Place among the others.
+    words : str, optional
+        Its heading, where that is not the section's name.
+    """
+
+    class Section(Panel, bpy.types.Panel):
+        bl_idname = f"DIGICLAY_PT_part_{section}"
+        bl_label = words or title(section)
+        bl_parent_id = parent
+        bl_order = order
+        bl_options = {"DEFAULT_CLOSED"}
+
+        @classmethod
+        def poll(cls, context: Any) -> bool:
+            """Show a blister only where the method forms one."""
+            bed = bed_of(context)
+            return bed is not None and (
+                section != "blister" or METHODS[bed.digiclay.method].blister is not None
+            )
+
+        def draw_header(self, context: Any) -> None:
+            if section in OPTIONAL:
+                self.layout.prop(bed_of(context).digiclay, f"use_{section}", text="")
+
+        def draw(self, context: Any) -> None:
+            settings = bed_of(context).digiclay
+            column = self.layout.column(align=True)
+            column.active = in_use(settings, section)
+            group = part_group(settings, section)
+            for name in quantities(parameters(section, settings.method)):
+                place = column.row(align=True)
+                # A number's label stands in its field: beside it the sidebar would cut off the unit.
+                place.use_property_split = group.bl_rna.properties[name].type in BESIDE
+                place.use_property_decorate = False
+                place.prop(group, name)
+
+    Section.__name__ = Section.__qualname__ = Section.bl_idname
+    return Section
+
+
+def in_use(settings: Any, section: str) -> bool:
+    """Tell whether a part is simulated: neither it nor the one it belongs to is switched off."""
+    needed = NEEDS.get(section)
+    switches = [name for name in (section, needed) if name in OPTIONAL]
+    return all(getattr(settings, f"use_{name}") for name in switches)
+
+
+#: Parts that the panel Device shows.
+PARTS = ("layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay")
+CLASSES = (
+    Presets,
+    Start,
+    Device,
+    *(section_panel(section, Device.bl_idname, order) for order, section in enumerate(PARTS)),
+    Finger,
+    section_panel("fingertip", Finger.bl_idname, 0, words="Size"),
+    section_panel("contact", Finger.bl_idname, 1),
+    section_panel("relaxation", Finger.bl_idname, 2),
+    Control,
+    section_panel("control", Control.bl_idname, 0, words="Gains and Thresholds"),
+    section_panel("blister", Control.bl_idname, 1),
+    section_panel("sensors", Control.bl_idname, 2),
+    section_panel("simulation", Control.bl_idname, 3, words="Time Steps"),
+    section_panel("recorder", Control.bl_idname, 4),
+)

@@ -1,0 +1,89 @@
+"""Panels Shapes and Export: what the bed displays to begin with, and how what was formed leaves it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..compat import bpy
+from ..exchange import formed_bed
+from .base import Panel, bed_of
+
+__all__ = ["CLASSES", "LISTED", "Export", "Shapes"]
+
+#: Property of a bed that holds the list of its features; the operator that lists them writes it.
+LISTED = "digiclay_features"
+#: Lines shown of a long list.
+MOST = 24
+
+
+class Shapes(Panel, bpy.types.Panel):
+    """A shape in, clay, the finger, a shape out."""
+
+    bl_idname = "DIGICLAY_PT_shapes"
+    bl_label = "Shapes"
+    bl_order = 60
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the ways in, what is displayed, and the way out."""
+        settings = bed_of(context).digiclay
+        column = self.layout.column(align=True)
+        column.operator("digiclay.shape_from_object", icon="OBJECT_DATA")
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator("digiclay.shape_from_file", text="Shape from File...", icon="FILE_FOLDER")
+        column.operator_menu_enum("digiclay.shape_sample", "sample", text="Sample Shape", icon="RNDCURVE")
+        if not settings.use_shape:
+            self.layout.label(text="No shape: sessions begin at rest", icon="INFO")
+        else:
+            self._displayed(settings)
+        column = self.layout.column(align=True)
+        column.operator("digiclay.shape_keep", icon="PINNED")
+        column.operator("mesh.digital_clay_make", icon="OUTLINER_OB_MESH")
+
+    def _displayed(self, settings: Any) -> None:
+        """Draw what is displayed, and how the surface gets there."""
+        shape, box = settings.shape, self.layout.box()
+        row = box.row()
+        row.label(text=shape.file or "Formed", icon="RNDCURVE")
+        row.operator("digiclay.shape_remove", text="", icon="X")
+        column = box.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(shape, "refresh")
+        if shape.refresh != "one_time":
+            column.prop(shape, "surfaces")
+
+
+class Export(Panel, bpy.types.Panel):
+    """What was formed, as meshes."""
+
+    bl_idname = "DIGICLAY_PT_export"
+    bl_label = "Export"
+    bl_order = 80
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the list of features, and what can be done."""
+        bed, layout = bed_of(context), self.layout
+        column = layout.column(align=True)
+        column.operator("digiclay.find_features", icon="VIEWZOOM")
+        lines = str(bed.get(LISTED, "")).splitlines()
+        if lines:
+            listed = column.box().column(align=True)
+            listed.scale_y = 0.8
+            for line in lines[:MOST]:
+                listed.label(text=line)
+            if len(lines) > MOST:
+                listed.label(text="...")
+        kept = formed_bed.is_kept(bed)
+        column = layout.column(align=True)
+        column.label(text="Measured from the kept surface" if kept else "Measured from the bed at rest")
+        row = column.row(align=True)
+        row.operator("digiclay.keep_surface")
+        row.operator("digiclay.forget_surface")
+        column = layout.column(align=True)
+        column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
+        column.menu("DIGICLAY_MT_export", text="Export", icon="EXPORT")
+
+
+CLASSES = (Shapes, Export)
