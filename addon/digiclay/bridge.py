@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from .compat import bpy
 from .core.errors import DigiclayError
 from .core.fingertip import Fingertip
-from .device.roles import ELLIPSOID, ROLE
 from .device.primitives import Shape
+from .device.roles import ELLIPSOID, ROLE
 
 __all__ = [
     "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",
