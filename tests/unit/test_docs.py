@@ -1,0 +1,141 @@
+"""The pages: headings, words, links, commands and the figures' sources."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from digiclay.commands.parser import parser
+
+from benchmarks.kinds import parser as benchmarks_parser
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "benchmarks" / "README.md", *ROOT.glob("docs/*.md")]
+)
+#: Words that make a heading a sentence or a question.
+SENTENCE = re.compile(
+    r"^(what|how|why|where|when|who|which|whether)\b"
+    r"|\b(is|are|was|were|has|have|does|do|can|must|costs|brings|comes|goes|stays|knows|says|tells|ends|stands"
+    r"|changes|found|moved|moves|recovers|springs)\b",
+    re.IGNORECASE,
+)
+#: Words that give a will, a mind or a voice to a thing; and terms that the nomenclature has replaced.
+BANNED = re.compile(
+    r"\b(wants?|wishes|knows|knew|lives|lived|judges?|judged|judging|tells?|told|says?|said|asks?|speaks?"
+    r"|remembers?|forgets?|believes?|thinks?|sees|notices|feels?|likes to|a gift|for free|as ever"
+    r"|take part|takes part|taking part|taken part|stands? for|of its own accord"
+    r"|the finger|fingers? of|left out|what it costs)\b",
+    re.IGNORECASE,
+)
+#: A speed or a run time: a row of a table, not a sentence.
+TIMING = re.compile(r"\d x real time|\d (?:s|ms|min|minutes) of (?:CPU|processor) time", re.IGNORECASE)
+#: A program and its arguments; a number behind a name is a version.
+COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
+
+
+#: Pages that are being rewritten: their links and commands are checked, their language is not yet.
+DRAFTS = {"architecture.md"}
+READ = [page for page in PAGES if page.name not in DRAFTS]
+#: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
+PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
+
+
+def _lines(page: Path) -> Iterator[tuple[int, str, bool]]:
+    """Yield number, text and whether it is code, line by line."""
+    fenced = False
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        fence = line.lstrip().startswith("```")
+        fenced ^= fence
+        yield number, line, fenced or fence or line.startswith("    ")
+
+
+def _prose(page: Path) -> Iterator[tuple[int, str]]:
+    """Yield the lines of English: no code, no quotation in italics."""
+    for number, line, code in _lines(page):
+        if not code:
+            yield number, re.sub(r"`[^`]*`|\*[^*]+\*|\]\([^)]*\)", " ", line.replace("**", ""))
+
+
+def _headings(page: Path) -> list[str]:
+    return [line.lstrip("# ") for _, line, code in _lines(page) if not code and line.startswith("#")]
+
+
+def _anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as the usual renderers make them."""
+    plain = [re.sub(r"[^\w\- ]", "", heading.lower()) for heading in _headings(page)]
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+def _commands(page: Path) -> list[tuple[str, str]]:
+    """Return program and arguments of every command of a page, in blocks of code and within sentences."""
+    lines = list(_lines(page))
+    blocks = [line.strip() for _, line, code in lines if code]
+    text = " ".join(line for _, line, code in lines if not code)
+    found = [COMMAND.match(line) for line in (*blocks, *re.findall(r"`([^`]+)`", text))]
+    # Two blanks or a # begin the remark beside a command.
+    return [(match[1], re.split(r"\s{2,}|\s#", match[2])[0]) for match in found if match]
+
+
+def _refused(program: str, arguments: str) -> bool:
+    words = shlex.split(arguments)
+    try:
+        PARSERS[program]().parse_args(words if len(words) > 1 else [*words, "--help"])
+    except SystemExit as end:
+        return end.code != 0
+    return False
+
+
+@pytest.mark.parametrize("page", READ, ids=lambda page: page.name)
+def test_every_heading_is_a_noun_phrase(page: Path) -> None:
+    assert [heading for heading in _headings(page) if "?" in heading or SENTENCE.search(heading)] == []
+
+
+@pytest.mark.parametrize("page", READ, ids=lambda page: page.name)
+def test_no_page_personifies_a_thing(page: Path) -> None:
+    assert [(n, m.group()) for n, line in _prose(page) for m in BANNED.finditer(line)] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_run_time_stands_in_a_table(page: Path) -> None:
+    assert [(n, line) for n, line in _prose(page) if not line.startswith("|") and TIMING.search(line)] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_measurement_names_its_date_and_commit(page: Path) -> None:
+    """A table with the column *commit* has a date and a commit in every row."""
+    rows: list[str] = []
+    measured = False
+    for _, line, code in _lines(page):
+        if code or not line.startswith("|"):
+            measured = False
+        elif re.search(r"\|\s*commit\s*\|", line, re.IGNORECASE):
+            measured = True
+        elif measured and not re.fullmatch(r"[|\s:-]+", line):
+            rows.append(line)
+    assert [r for r in rows if not re.search(r"\b20\d\d-\d\d-\d\d\b.*\b[0-9a-f]{7}\b", r)] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
+    broken = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        if not file.exists() or (anchor and anchor not in _anchors(file)):
+            broken.append(target)
+    assert broken == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_is_one_that_its_program_takes(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert [command for command in _commands(page) if _refused(*command)] == [], capsys.readouterr().err
+
+
+def test_the_pages_have_commands_to_check() -> None:
+    assert sum(len(_commands(page)) for page in PAGES) > 25
