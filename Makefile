@@ -35,12 +35,13 @@ test: ## run all tests but those of the matrix, of the window and of other progr
 	cat .reports/time.txt >>.reports/test.txt; rm .reports/time.txt; \
 	echo; cat .reports/test.txt; exit $$status
 
-lint: ## check style, format and types
+lint: ## check style, format, types and docstrings
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@status=0; \
 	.venv/bin/ruff check . || status=1; \
 	.venv/bin/ruff format --check . || status=1; \
 	.venv/bin/mypy || status=1; \
+	.venv/bin/python tools/docstrings.py || status=1; \
 	exit $$status
 
 # All mutants of some modules: make mutants MODULES="valve steppers.bernoulli"
