@@ -26,13 +26,13 @@ LEVELS = (
     "control.travel metrics_signal set_point stack.columns processes safe_names",
     "feature_network "
     "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
-    "metrics_path sweep_axis",
+    "metrics_path",
     "mesh_in_placed mesh_in_checks mesh_in_obj whole_files "
     "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
     "formed methods run_folder metrics_force metrics_trace control.servo control.blister "
     "control.noise_floor",
-    "export mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane metrics "
-    "series_folder "
+    "export mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane "
+    "metrics series "
     "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
     "feature_line "
     "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
@@ -47,11 +47,12 @@ LEVELS = (
     "control.push_pull control.force_display control.shape_display "
     "stack.recording stack.traces stack.simulation",
     "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
-    "assembly form job_outputs",
+    "assembly form job_outputs axes",
     "jobs accuracy keeping live stack.assembly",
     "shadow session take",
-    "metrics_trial sweep budget stack.session",
-    "metrics_speed sweep_folder sweep_bundles",
+    "metrics_trial budget stack.session",
+    "metrics_speed evaluation",
+    "sweep",
 )
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}

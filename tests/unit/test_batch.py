@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 from digiclay.cli import main
+from digiclay.commands.batch import JobProcess
 from digiclay.commands.batch_folder import opened
-from digiclay.commands.worker import Worker
 from digiclay.core.errors import OutputError
 from digiclay.core.jobs import batch
 
@@ -163,7 +163,7 @@ def test_when_a_batch_is_killed_its_processes_end_and_the_next_one_goes_on() -> 
 def test_a_process_that_dies_is_told_by_its_signal() -> None:
     jobs(HOURS)
     main(["batch", "two.toml", "--prepare", "--quiet"])
-    worker = Worker(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
+    worker = JobProcess(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
     until(lambda: list(Path("two/runs").glob(".*.part")))
     worker.kill()
     assert worker.error().startswith("The process ended with signal 9")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.core.axes import Point
+from digiclay.core.evaluation import LEAST, make_bundles
 from digiclay.core.scene_file import find, load
 from digiclay.core.stack.assembly import structure
-from digiclay.core.sweep import Point
-from digiclay.core.sweep_bundles import LEAST, bundles
 
 from benchmarks import runs_together
 from benchmarks.__main__ import main
@@ -25,7 +25,7 @@ def test_the_runs_of_a_study_differ_and_stand_together(name: str) -> None:
     assert np.all(np.diff(values) > 0.0)
     assert low * usual < values[0] < values[-1] < high * usual
     assert len({structure(scene) for scene in scenes}) == 1
-    assert bundles([Point(i, (), scene) for i, scene in enumerate(scenes)]).alone == ()
+    assert make_bundles([Point(i, (), scene) for i, scene in enumerate(scenes)]).alone == ()
 
 
 def test_the_benchmark_prints_and_keeps_a_table_and_a_picture(

@@ -11,7 +11,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.errors import OutputError
 from digiclay.core.processes import host
-from digiclay.core.series_folder import Kind, series
+from digiclay.core.series import Kind, open_series
 from digiclay.core.whole_files import read_json
 
 from tests.other_process import dead
@@ -118,7 +118,7 @@ def test_points_that_found_the_disk_full_are_done_by_the_same_command(
 
 def test_what_a_killed_process_left_in_a_series_is_taken_away(here: Path) -> None:
     folder = here / "o"
-    with series(folder, KIND, {"a": 1}):
+    with open_series(folder, KIND, {"a": 1}):
         pass
     gone = dead()
     leftovers = [
@@ -128,7 +128,7 @@ def test_what_a_killed_process_left_in_a_series_is_taken_away(here: Path) -> Non
     foreign = folder / "parts" / f".000002.json.{gone}@elsewhere.part"
     for path in (*leftovers, foreign):
         path.touch()
-    with series(folder, KIND, {"a": 1}):
+    with open_series(folder, KIND, {"a": 1}):
         assert [path.exists() for path in leftovers] == [False, False]
     assert foreign.exists()
     assert json.loads((folder / "series.json").read_text(encoding="utf-8")) == {"a": 1}
@@ -139,14 +139,17 @@ def test_a_folder_is_gone_again_when_what_it_was_made_for_is_refused(here: Path)
     def refuse(there: object) -> None:
         raise OutputError(f"found {there}")
 
-    with series(here / "o", KIND, {"a": 1}, refuse):  # nothing is there to be refused
+    with open_series(here / "o", KIND, {"a": 1}, refuse):  # nothing is there to be refused
         pass
-    with pytest.raises(OutputError, match=r"found \{'a': 1\}"), series(here / "o", KIND, {"a": 2}, refuse):
+    with (
+        pytest.raises(OutputError, match=r"found \{'a': 1\}"),
+        open_series(here / "o", KIND, {"a": 2}, refuse),
+    ):
         pass
     (here / "file").touch()
-    with pytest.raises(OutputError, match="file is a file"), series(here / "file", KIND, {}):
+    with pytest.raises(OutputError, match="file is a file"), open_series(here / "file", KIND, {}):
         pass
-    with pytest.raises(OutputError, match="cannot be used"), series(here / "file" / "o", KIND, {}):
+    with pytest.raises(OutputError, match="cannot be used"), open_series(here / "file" / "o", KIND, {}):
         pass
 
 

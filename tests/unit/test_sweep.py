@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.core.accuracy import estimate_errors
+from digiclay.core.axes import Axis, make_points, read_axis
 from digiclay.core.errors import ParameterError
+from digiclay.core.evaluation import FIGURES, find_figure
 from digiclay.core.metrics import METRICS
 from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.session import run
-from digiclay.core.sweep import FIGURES, figure, points
-from digiclay.core.sweep_axis import Axis, axis
 
 from tests.scene_files import folder_with, scene_text
 
@@ -65,7 +65,7 @@ def kept(folder: str) -> dict[str, Any]:
     ],
 )
 def test_what_varies_is_read_from_a_line(said: str, words: tuple[str, ...], logarithmic: bool) -> None:
-    assert axis(said) == Axis(said.partition("=")[0], words, logarithmic)
+    assert read_axis(said) == Axis(said.partition("=")[0], words, logarithmic)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_varies_is_read_from_a_line(said: str, words: tuple[str, ...], loga
 )
 def test_what_cannot_vary_is_told_with_key_rule_and_value(said: str, message: str) -> None:
     with pytest.raises(ParameterError) as error:
-        axis(said)
+        read_axis(said)
     assert str(error.value).startswith(message)
 
 
@@ -135,13 +135,15 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
 
 
 def test_the_points_are_all_combinations_and_the_last_axis_varies_fastest() -> None:
-    found = points(find("my.toml"), [], [axis("control.force_gain=1,2"), axis("layout.rows=11:15:3")])
+    found = make_points(
+        find("my.toml"), [], [read_axis("control.force_gain=1,2"), read_axis("layout.rows=11:15:3")]
+    )
     assert [point.words for point in found] == [(g, r) for g in "12" for r in ("11", "13", "15")]
     assert [point.scene.layout.rows for point in found if point.scene] == [11, 13, 15] * 2
 
 
 def test_lag_stands_for_its_mean() -> None:
-    assert figure("lag") == "lag_mean"
+    assert find_figure("lag") == "lag_mean"
 
 
 def test_every_metric_of_a_run_can_be_asked_for() -> None:

@@ -1,4 +1,4 @@
-"""Sweeps while they run: any executor, a stop half way, a point that goes wrong; and their pictures."""
+"""Sweeps while they run: any executor, a stop half way, a point or a worker that goes wrong."""
 
 from __future__ import annotations
 
@@ -13,17 +13,15 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecu
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.errors import OutputError
-from digiclay.core.scene import Scene
+from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere
+from digiclay.commands.worker import Processes
+from digiclay.core.axes import Point, make_points, read_axis
+from digiclay.core.errors import DigiclayError, OutputError
+from digiclay.core.evaluation import Record, evaluate, evaluate_bundle
 from digiclay.core.scene_file import Setting, find
-from digiclay.core.sweep import Point, Record, evaluate, finish, points
-from digiclay.core.sweep_axis import axis
-from digiclay.core.sweep_bundles import evaluate_all
-from digiclay.core.sweep_folder import Column, columns
-from digiclay.plots.sweep import sweep_figure
+from digiclay.core.series import finish
 
 from tests.patience import HANGS, until
 
@@ -45,7 +43,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def some(count: int = 3) -> list[Point]:
     """Return the points of a small sweep."""
-    return points(find("slow_press"), SHORT, [axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
+    return make_points(find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
 
 
 class AtOnce(Executor):
@@ -54,7 +52,10 @@ class AtOnce(Executor):
     def submit(self, task: Any, /, *arguments: Any, **known: Any) -> Future[Any]:
         """Run."""
         future: Future[Any] = Future()
-        future.set_result(task(*arguments, **known))
+        try:
+            future.set_result(task(*arguments, **known))
+        except Exception as error:
+            future.set_exception(error)
         return future
 
 
@@ -74,8 +75,9 @@ def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> 
     finish(
         executor,
         task,
-        [[point] for point in todo],
-        lambda point, record: done.update({point.index: record}),
+        [(point, (point,)) for point in todo],
+        lambda point, records: done.update({point.index: records[0]}),
+        lambda point, why: done.update({point.index: {"error": why}}),
         **known,
     )
     return done
@@ -87,9 +89,9 @@ def never() -> bool:
 
 
 def test_any_executor_will_do() -> None:
-    at_once = finished(AtOnce(), evaluate_all, some(), stopped=never)
+    at_once = finished(AtOnce(), evaluate_bundle, some(), stopped=never)
     with ThreadPoolExecutor(2) as threads:
-        in_threads = finished(threads, evaluate_all, some(), stopped=never)
+        in_threads = finished(threads, evaluate_bundle, some(), stopped=never)
     assert [at_once[i]["figures"]["rfd"] for i in range(3)] == [
         in_threads[i]["figures"]["rfd"] for i in range(3)
     ]
@@ -99,7 +101,7 @@ def test_a_fault_in_one_point_is_recorded_by_its_name(monkeypatch: pytest.Monkey
     def faulty(*given: Any, **known: Any) -> None:
         raise ZeroDivisionError("one line\nand another")
 
-    monkeypatch.setattr("digiclay.core.sweep.run", faulty)
+    monkeypatch.setattr("digiclay.core.evaluation.run", faulty)
     scene = some()[0].scene
     assert scene is not None
     assert evaluate(scene) == {"error": "ZeroDivisionError: one line and another"}
@@ -112,11 +114,11 @@ def test_a_session_that_was_stopped_is_no_finished_point() -> None:
 
 
 def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
-    begun: list[Scene] = []
+    begun: list[Point] = []
     asked = threading.Semaphore(0)
 
-    def task(scenes: list[Scene]) -> list[Record | None]:
-        begun.extend(scenes)
+    def task(bundle: list[Point]) -> list[Record | None]:
+        begun.extend(bundle)
         # Asked once more after it was told to stop, it has given up what was not begun.
         assert asked.acquire(timeout=HANGS)
         assert asked.acquire(timeout=HANGS)
@@ -132,9 +134,25 @@ def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
     assert (len(begun), len(done)) == (1, 1)
 
 
+def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on() -> None:
+    def task(bundle: list[Point]) -> list[Record | None]:
+        if bundle[0].index == 1:
+            raise DigiclayError("killed too often")
+        if bundle[0].index == 2:
+            raise KeyError("own fault")
+        return [{"figures": {}}]
+
+    assert finished(AtOnce(), task, some(4), stopped=never) == {
+        0: {"figures": {}},
+        1: {"error": "killed too often"},
+        2: {"error": "KeyError: 'own fault'"},
+        3: {"figures": {}},
+    }
+
+
 def test_workers_that_die_are_told_in_one_line() -> None:
     with pytest.raises(OutputError, match=r"A worker died.*fewer --workers"):
-        finished(Broken(), evaluate_all, some(), stopped=never)
+        finished(Broken(), evaluate_bundle, some(), stopped=never)
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +167,7 @@ def interrupted(out: Path, number: int) -> tuple[int, str]:
     """Run a sweep that gets a signal as soon as it has kept its second point; return exit code and stderr."""
     script = (
         "import os\n"
-        "from digiclay.core.sweep_folder import Folder\n"
+        "from digiclay.core.sweep import Folder\n"
         "keep, kept = Folder.keep, []\n"
         "def told(*given):\n"
         "    keep(*given)\n"
@@ -200,98 +218,45 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
     assert (started.returncode, err, list((here / "out").glob("points/*"))) == (130, "", [])
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no sessions of processes")
+def test_ctrl_c_on_a_terminal_reaches_no_worker() -> None:
+    with Processes() as processes:
+        worker = processes.start(Evaluator)
+        assert worker is not None
+        assert os.getpgid(worker.process.pid) != os.getpgid(0)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_ctrl_c_does_not_reach_a_worker_that_is_just_being_started(here: Path) -> None:
-    # Python runs this file before all else; of the processes a sweep starts only workers are told of a fork.
-    ctrl_c = "import os, sys\nif '--multiprocessing-fork' in sys.orig_argv:\n    os.kill(os.getpid(), {})\n"
-    (here / "sitecustomize.py").write_text(ctrl_c.format(int(signal.SIGINT)), encoding="utf-8")
-    script = "from digiclay.cli import console; console()"
-    done = subprocess.run(
-        [sys.executable, "-c", script, *MANY, "--set", "simulation.duration=0.1", "--out", "out"],
-        env={**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{ADDON}"}, capture_output=True, text=True,
-        timeout=HANGS,
+def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here: Path, whole: bytes) -> None:
+    out = here / "out"
+    sweep = subprocess.Popen(
+        [sys.executable, "-m", "digiclay", *QUICK, "--out", str(out)], stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
+    until(lambda: list(out.glob("points/*.json")))
+    told = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    pairs = [tuple(map(int, line.split())) for line in told.splitlines()]
+    worker, *_ = (pid for pid, parent in pairs if parent == sweep.pid)
+    os.kill(worker, signal.SIGKILL)
+    _, err = sweep.communicate(timeout=HANGS)
+    assert (sweep.returncode, err) == (0, "")
+    assert (out / "sweep.csv").read_bytes() == whole
 
 
-ONE = Column("control.force_gain", "1/N", (1.0, 2.0, 4.0), True)
-TWO = Column("layout.pitch", "m", (2.5e-3, 3e-3), False)
-WORDS = Column("blister.profile", "", ("cone", "gaussian", "flat"), False)
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_bundle_that_no_worker_survives_is_told() -> None:
+    with Processes() as processes:
+        dead = []
+        for _ in range(2):
+            worker = processes.start(Evaluator)
+            assert worker is not None
+            worker.process.kill()
+            dead.append(worker)
+        with pytest.raises(DigiclayError, match=r"A worker died twice of this \(signal 9\)"):
+            evaluate_elsewhere(processes, dead, some(2), errors=False)
 
 
-def test_one_axis_is_a_line_with_markers_labelled_with_units() -> None:
-    picture = sweep_figure([ONE], "lag_mean", np.array([1e-3, 2e-3, 3e-3]))
-    (axes,) = picture.axes
-    (line,) = axes.get_lines()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "lag_mean (mm)")
-    assert (line.get_marker(), axes.get_xscale()) == ("o", "log")
-    np.testing.assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
-
-
-def test_values_in_any_order_make_a_line_from_left_to_right() -> None:
-    picture = sweep_figure([Column("a.b", "", (3, 1, 2), False)], "rfd", np.array([0.3, 0.1, 0.2]))
-    assert picture.axes[0].get_lines()[0].get_xydata().tolist() == [[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]]
-
-
-def test_words_are_not_joined_by_a_line() -> None:
-    picture = sweep_figure([WORDS], "rfd", np.array([0.3, 0.1, 0.2]))
-    assert [text.get_text() for text in picture.axes[0].get_xticklabels()] == list(WORDS.values)
-    assert picture.axes[0].get_lines()[0].get_linestyle() == "None"
-
-
-def test_two_axes_are_a_heat_map_labelled_with_units() -> None:
-    values = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, np.nan]])
-    axes, scale = sweep_figure([ONE, TWO], "rfd", values).axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")
-    assert scale.get_ylabel() == "rfd (N)"
-    drawn = axes.collections[0].get_array().reshape(2, 3)
-    np.testing.assert_array_equal(drawn.filled(np.nan), values.T)
-    assert [text.get_text() for text in axes.texts] == ["0.1", "0.3", "0.5", "0.2", "0.4", "×"]
-
-
-@pytest.mark.parametrize("columns", [[ONE], [ONE, TWO]])
-def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Column]) -> None:
-    nothing = np.full([len(one.values) for one in columns], np.nan)
-    picture = sweep_figure(columns, "rfd", nothing)
-    picture.canvas.draw()
-    crosses = sum(len(line.get_xdata()) for line in picture.axes[0].get_lines() if line.get_marker() == "x")
-    assert crosses + sum(text.get_text() == "×" for text in picture.axes[0].texts) == nothing.size
-
-
-def test_a_sweep_over_two_axes_leaves_a_picture_of_each_metric(here: Path) -> None:
-    two = ["--vary", "valve_lag.time_constant=1 ms,2 ms", "--vary", "delay.dead_time=0,0.001"]
-    assert (
-        main(
-            [
-                "sweep",
-                "slow_press",
-                "--set",
-                "simulation.duration=0.1",
-                *two,
-                "--metric",
-                "rfd,highest",
-                "--out",
-                "out",
-                "--quiet",
-            ]
-        )
-        == 0
-    )
-    assert sorted(path.name for path in (here / "out").glob("*.png")) == ["highest.png", "rfd.png"]
-
-
-def test_a_sweep_over_three_axes_says_that_there_is_a_table_only(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    three = [
-        f"--vary={key}" for key in ("valve_lag.time_constant=1 ms", "delay.dead_time=0", "layout.rows=11,13")
-    ]
-    assert main(["sweep", "slow_press", "--set", "simulation.duration=0.1", *three, "--out", "out"]) == 0
-    assert "3 axes: a table only, no pictures" in capsys.readouterr().out
-    assert list((here / "out").glob("*.png")) == []
-
-
-def test_an_axis_of_numbers_is_what_the_scenes_made_of_its_words() -> None:
-    axes = [axis("valve_lag.time_constant=1 ms:2 ms:2")]
-    (column,) = columns(some(2), axes)
-    assert (column.values, column.unit, column.numeric) == ((1e-3, 2e-3), "s", True)
+def test_after_a_stop_a_bundle_has_no_records() -> None:
+    processes = Processes()
+    processes.stop()
+    assert evaluate_elsewhere(processes, [], some(2), errors=False) == [None, None]

@@ -11,7 +11,16 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.assembly import assemble
+from digiclay.core.axes import Point, make_points, read_axis
 from digiclay.core.contact import Contact
+from digiclay.core.evaluation import (
+    RUNS,
+    StackWarning,
+    evaluate,
+    evaluate_bundle,
+    explain_failed_stacks,
+    make_bundles,
+)
 from digiclay.core.scene_file import Setting, find, load
 from digiclay.core.stack.assembly import put_together
 from digiclay.core.stack.columns import kind, together
@@ -19,9 +28,6 @@ from digiclay.core.stack.fingers import fingers
 from digiclay.core.stack.gathering import reach
 from digiclay.core.stack.simulation import advance, begin
 from digiclay.core.supply import Supply
-from digiclay.core.sweep import Point, evaluate, points
-from digiclay.core.sweep_axis import axis
-from digiclay.core.sweep_bundles import RUNS, StackWarning, bundles, evaluate_all, fallen_apart
 from digiclay.core.touch import approach
 
 SHORT = [Setting("simulation.duration", "0.1")]
@@ -36,7 +42,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
     """Return the points of a sweep over a tap."""
-    return points(find("tap"), settings or SHORT, [axis(one) for one in varied])
+    return make_points(find("tap"), settings or SHORT, [read_axis(one) for one in varied])
 
 
 def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
@@ -105,20 +111,20 @@ def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
 
 
 def test_points_of_one_structure_run_together() -> None:
-    parts = bundles(some("control.force_gain=1,2,3,4", "layout.rows=11,13"))
+    parts = make_bundles(some("control.force_gain=1,2,3,4", "layout.rows=11,13"))
     assert indices(parts.stacks) == [[0, 2, 4, 6], [1, 3, 5, 7]]
-    assert parts.told() == ["8 points run in 2 stacks"]
+    assert parts.describe() == ["8 points run in 2 stacks"]
 
 
 def test_a_stack_has_no_more_runs_than_pay() -> None:
     for count, sizes in ((2 * RUNS - 1, [2 * RUNS - 1]), (2 * RUNS + 1, [RUNS, RUNS + 1])):
-        parts = bundles(some(f"control.force_gain=1:6:{count}"))
+        parts = make_bundles(some(f"control.force_gain=1:6:{count}"))
         assert [len(stack) for stack in parts.stacks] == sizes
 
 
 def test_long_sessions_make_smaller_stacks() -> None:
     long = [Setting("simulation.duration", "1e4")]
-    parts = bundles(some("control.force_gain=1:6:20", settings=long))
+    parts = make_bundles(some("control.force_gain=1:6:20", settings=long))
     # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB.
     assert [len(stack) for stack in parts.stacks] == [10, 10]
 
@@ -126,33 +132,35 @@ def test_long_sessions_make_smaller_stacks() -> None:
 def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
     # A dead time of half a control period falls on the end of a half step.
     varied = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
-    assert indices(bundles(some(*varied)).stacks) == [[0, 1, 2, 3, 4, 5, 6, 7]]
-    assert indices(bundles(some(*varied), errors=True).stacks) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+    assert indices(make_bundles(some(*varied)).stacks) == [[0, 1, 2, 3, 4, 5, 6, 7]]
+    assert indices(make_bundles(some(*varied), errors=True).stacks) == [[0, 1, 2, 3], [4, 5, 6, 7]]
 
 
 def test_points_whose_steps_cannot_be_halved_are_told_when_they_run() -> None:
     finest = [*SHORT, Setting("simulation.physics_step", "5e-6")]
-    parts = bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
+    parts = make_bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
     assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
 
 
 def test_points_without_their_like_run_alone_and_it_is_said() -> None:
-    parts = bundles(some("layout.rows=11,13,15"))
+    parts = make_bundles(some("layout.rows=11,13,15"))
     assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2]])
-    assert parts.told() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
+    assert parts.describe() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
 
 
 def test_sessions_of_days_run_alone_and_it_is_said() -> None:
     days = [Setting("simulation.duration", "1e5")]
-    parts = bundles(some("control.force_gain=1:6:5", settings=days))
+    parts = make_bundles(some("control.force_gain=1:6:5", settings=days))
     assert parts.stacks == ()
-    assert parts.told() == ["5 points one at a time: they have too many rows to keep for many at once"]
+    assert parts.describe() == ["5 points one at a time: they have too many rows to keep for many at once"]
 
 
 def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
-    parts = bundles(some("control.method=viscous,push_pull,elastic", "valve_lag.time_constant=1e-3:2e-3:4"))
+    parts = make_bundles(
+        some("control.method=viscous,push_pull,elastic", "valve_lag.time_constant=1e-3:2e-3:4")
+    )
     assert indices(parts.stacks) == [[8, 9, 10, 11]]
-    assert parts.told() == [
+    assert parts.describe() == [
         "4 points run in 1 stack",
         "4 points one at a time: what viscous does depends on which cells take part",
         "4 points one at a time: what push_pull does depends on which cells take part",
@@ -162,16 +170,17 @@ def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
 def test_values_that_do_not_go_together_are_in_no_stack() -> None:
     triggers = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
     method = [*SHORT, Setting("control.method", "cell_states")]
-    parts = bundles(some(*triggers, settings=method))
+    parts = make_bundles(some(*triggers, settings=method))
     assert (indices(parts.stacks), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
 
 
 @pytest.mark.parametrize("errors", [False, True])
 def test_a_bundle_comes_to_the_figures_of_its_points(errors: bool) -> None:
-    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    found = evaluate_all(scenes, errors=errors)
-    for record, scene in zip(found, scenes, strict=True):
-        alone = evaluate(scene, errors=errors)
+    bundle = some("control.force_gain=1,5")
+    found = evaluate_bundle(bundle, errors=errors)
+    for record, point in zip(found, bundle, strict=True):
+        assert point.scene
+        alone = evaluate(point.scene, errors=errors)
         assert record is not None
         assert alone is not None
         times = ("run_time", "real_time_factor")
@@ -188,25 +197,27 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def faulty(*given: Any, **known: Any) -> Any:
         raise error
 
-    monkeypatch.setattr("digiclay.core.sweep_bundles.judge_together", faulty)
+    monkeypatch.setattr("digiclay.core.evaluation.judge_together", faulty)
 
 
 def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
     break_stacks(monkeypatch, MemoryError())
-    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    records = dict(enumerate(record or {} for record in evaluate_all(scenes)))
+    bundle = some("control.force_gain=1,5")
+    records = dict(enumerate(record or {} for record in evaluate_bundle(bundle)))
     assert all("figures" in record for record in records.values())
-    assert fallen_apart(records) == ["2 points one at a time: there is not enough memory for a stack"]
+    assert explain_failed_stacks(records) == (
+        "2 points one at a time: there is not enough memory for a stack",
+    )
 
 
 def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
-    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
+    bundle = some("control.force_gain=1,5")
     with pytest.raises(StackWarning, match="A stack of 2 runs failed: ZeroDivisionError: by zero"):
-        evaluate_all(scenes)
+        evaluate_bundle(bundle)
     with pytest.warns(StackWarning):
-        records = evaluate_all(scenes)
+        records = evaluate_bundle(bundle)
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
 
 
@@ -222,8 +233,8 @@ def test_a_sweep_says_which_points_ran_alone_because_their_stack_failed(
 
 
 def test_a_stack_that_is_stopped_has_no_records() -> None:
-    scenes = [point.scene for point in some("control.force_gain=1,5") if point.scene]
-    assert evaluate_all(scenes, lambda: True) == [None, None]
+    bundle = some("control.force_gain=1,5")
+    assert evaluate_bundle(bundle, lambda: True) == [None, None]
 
 
 def test_a_sweep_says_how_its_points_were_run(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import DigiclayError
+from ..core.errors import DigiclayError, one_line
 from ..core.jobs import Job, batch, find_jobs
 from .arguments import add_command
 from .batch_folder import Folder, opened
 from .exit_codes import FAILED, STOPPED
-from .job import check_outputs
+from .job import ERROR, PROGRESS, check_outputs
 from .progress import Counted, duration
 from .stop import Stop
 from .sweep import workers
-from .worker import Worker, cores
+from .worker import Process, Processes, count_cores, finish_here
 
-__all__ = ["add"]
+__all__ = ["JobProcess", "add"]
 
 EXAMPLES = """\
 examples:
@@ -32,8 +33,52 @@ examples:
 Stopped by Ctrl-C, or killed, it goes on when the same command is given again: finished jobs are kept, and
 done again only if the JOBS file has changed them. Exit code 1: some jobs failed, the others are there.
 """
-#: Seconds between two looks at the processes, and those a process gets to stop by itself.
-LOOK, GRACE = 0.1, 20.0
+#: Bytes at a log's end that are looked at for its last line.
+TAIL = 4096
+
+
+class JobProcess(Process):
+    """A process that does one job of a batch.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command line.
+    log : Path
+        What the process says.
+    """
+
+    def __init__(self, arguments: Sequence[str], log: Path) -> None:
+        self._log = log
+        with log.open("wb") as said:
+            super().__init__(arguments, stdout=said, stderr=subprocess.STDOUT)
+
+    def fraction(self) -> float:
+        """Return how much of the job is done, from 0 to 1."""
+        for line in reversed(self._read_tail()):
+            _, _, number = line.removeprefix(PROGRESS).partition(" ")
+            if line.startswith(PROGRESS) and number:
+                try:
+                    return min(1.0, max(0.0, float(number)))
+                except ValueError:
+                    break  # a line that is being written
+        return 0.0
+
+    def error(self) -> str:
+        """Return in one line why the job was not done."""
+        lines = self._read_tail()
+        told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
+        if told:
+            return one_line(told[-1])
+        others = [line for line in lines if line.strip() and not line.startswith(PROGRESS)]
+        said = f": {others[-1].strip()}" if others else ""
+        return one_line(f"The process ended with {self.wait()}{said}")
+
+    def _read_tail(self) -> list[str]:
+        """Return the last lines of the log."""
+        with self._log.open("rb") as file:
+            file.seek(max(0, self._log.stat().st_size - TAIL))
+            return file.read().decode("utf-8", errors="replace").splitlines()
 
 
 def add(commands: Any) -> None:
@@ -69,8 +114,8 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
     """Do the jobs, tell of them, and return the exit code."""
     made, started = folder.batch, time.monotonic()
     failed = {job.name: job.error for job in made.jobs if job.error}
-    before = sum(folder.is_done(job) for job in made.jobs)
     todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]
+    before = len(made.jobs) - len(todo)
 
     def tell(line: str) -> None:
         if not arguments.quiet:
@@ -78,21 +123,36 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
 
     for name, error in failed.items():
         tell(f"failed: {name}: {error}")
-    count = max(1, min(arguments.jobs or cores(), len(todo)))
-    with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before + len(failed)) as bar:
+    count = max(1, min(arguments.jobs or count_cores(), len(todo)))
+    with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before) as bar:
+        running: dict[str, JobProcess] = {}
+        ended: list[Job] = []
 
-        def draw(done: float) -> None:
+        def fail(job: Job, error: str) -> None:
+            ended.append(job)
+            if not stop():
+                failed[job.name] = error
+                tell(f"failed: {job.name}: {error}")
+
+        def draw() -> None:
             if not arguments.quiet:
-                bar(before + len(failed) + done, len(made.jobs), f", {len(failed)} failed" if failed else "")
+                done = before + len(ended) + sum(process.fraction() for process in list(running.values()))
+                bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
-        _work(folder, todo, count, stop, failed, draw, tell)
+        processes = Processes()
+        task = partial(_do_job, processes, running, folder)
+        pieces = [(job, job) for job in todo]
+        finish_here(
+            processes, count, task, pieces, lambda job, _: ended.append(job), fail, stop=stop, draw=draw
+        )
         stopped = stop()
-    done = sum(folder.is_done(job) for job in made.jobs)
+    now = sum(folder.is_done(job) for job in todo)
+    done = before - sum(bool(job.error) for job in made.jobs) + now
     said = f"{done} of {len(made.jobs)} jobs done" + (f", {len(failed)} failed" if failed else "")
     took = time.monotonic() - started
     if todo:
-        processes = "1 process" if count == 1 else f"{count} processes"
-        said += f"; {done - before} of them now, in {duration(took)} on {processes}"
+        at_a_time = "1 process" if count == 1 else f"{count} processes"
+        said += f"; {now} of them now, in {duration(took)} on {at_a_time}"
     ready = folder.start_up()
     if ready is not None:
         said += f"; a job's process takes {ready:.1f} s to start"
@@ -109,55 +169,18 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
     return 0
 
 
-def _work(
-    folder: Folder,
-    todo: list[Job],
-    count: int,
-    stop: Callable[[], bool],
-    failed: dict[str, str],
-    draw: Callable[[float], None],
-    tell: Callable[[str], None],
-) -> None:
-    """Keep so many processes busy until all jobs are done, or somebody asks to stop."""
-    waiting, running, ended = list(reversed(todo)), dict[str, tuple[Job, Worker]](), 0
-    with ExitStack() as at_the_end:
-        at_the_end.callback(lambda: [worker.kill() for _, worker in running.values()])
-        while running or (waiting and not stop()):
-            while waiting and len(running) < count and not stop():
-                job = waiting.pop()
-                running[job.name] = job, _started(folder, job)
-            time.sleep(LOOK)
-            for job, worker in list(running.values()):
-                if not worker.ended():
-                    continue
-                del running[job.name]
-                if not folder.is_done(job) and not stop():
-                    failed[job.name] = worker.error()
-                    tell(f"failed: {job.name}: {failed[job.name]}")
-                else:
-                    ended += 1
-            draw(ended + sum(worker.fraction() for _, worker in running.values()))
-            if stop():
-                deadline = time.monotonic() + GRACE
-                for _, worker in running.values():
-                    worker.stop()
-                for _, worker in running.values():
-                    worker.wait(deadline)
-
-
-def _started(folder: Folder, job: Job) -> Worker:
-    """Start the process of a job."""
+def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder, job: Job) -> None:
+    """Do a job in a process of its own; DigiclayError says why it is not done."""
     arguments = [
-        "job",
-        str(folder.job(job).resolve()),
-        "--out",
-        str(folder.run(job).resolve()),
-        "--overwrite",
-        "--follow",
-        "--since",
-        repr(time.time()),
-    ]
-    try:
-        return Worker(arguments, folder.log(job))
-    except OSError as error:
-        raise DigiclayError(f"A process cannot be started: {error.strerror or error}.") from None
+        "job", str(folder.job(job).resolve()), "--out", str(folder.run(job).resolve()),
+        "--overwrite", "--follow", "--since", repr(time.time()),
+    ]  # fmt: skip
+    process = processes.start(partial(JobProcess, arguments, folder.log(job)))
+    if process is None:
+        return
+    running[job.name] = process
+    process.wait()
+    del running[job.name]
+    processes.remove(process)
+    if not folder.is_done(job):
+        raise DigiclayError(process.error())

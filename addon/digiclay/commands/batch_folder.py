@@ -15,7 +15,7 @@ from ..core.finished import is_whole
 from ..core.jobs import JOB, SCENE, Batch, Job
 from ..core.run_folder import inside
 from ..core.scene_table import text
-from ..core.series_folder import Kind, series
+from ..core.series import Kind, open_series
 from ..core.unfinished import remove_abandoned
 from ..core.whole_files import read_json, write_whole
 from .gallery import Card, page
@@ -145,7 +145,7 @@ def opened(path: Path, batch: Batch) -> Iterator[Folder]:
         When it holds other things, cannot be written, or another process works in it.
     """
     known = {"batch": batch.name, "digiclay": __version__}
-    with series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), known):
+    with open_series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), known):
         yield Folder(path, batch)
 
 

@@ -6,6 +6,7 @@ import argparse
 import os
 import shutil
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -30,9 +31,8 @@ from .refusals import refuse_what_has_no_surface, refuse_without_blender
 from .render import draw_film, draw_still, draw_turntable
 from .stop import Stop
 from .thumbnail import of_heights, of_picture
-from .worker import ERROR, PROGRESS, follow
 
-__all__ = ["FILES", "RUNS", "TIMING", "add", "check_outputs"]
+__all__ = ["ERROR", "FILES", "PROGRESS", "RUNS", "TIMING", "add", "check_outputs"]
 
 EXAMPLES = """\
 examples:
@@ -44,6 +44,8 @@ A job is a folder with scene.toml, every parameter of its session, and job.toml,
 """
 #: Where a batch keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"
+#: What the lines begin with that are meant for the batch that has started the job.
+PROGRESS, ERROR = "@ ", "! "
 #: Seconds between two lines of progress, and those the process of a batch that was killed gets to end.
 PAUSE, GRACE = 0.2, 20.0
 
@@ -73,7 +75,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if not arguments.quiet:
             print(f"written to {out}")
         return 0
-    ended = follow()
+    ended = watch_input()
     try:
         _done(arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True))
         return 0
@@ -89,6 +91,20 @@ def carry_out(arguments: argparse.Namespace) -> int:
         traceback.print_exc()
         print(f"{ERROR}{type(error).__name__}: {one_line(error)}", flush=True)
         return 1
+
+
+def watch_input() -> threading.Event:
+    """Return an event that is set when standard input ends."""
+    ended = threading.Event()
+
+    def watch() -> None:
+        # Not sys.stdin: a thread that waits in it would keep Python from shutting down.
+        while os.read(0, 1):
+            pass
+        ended.set()
+
+    threading.Thread(target=watch, daemon=True).start()
+    return ended
 
 
 def check_outputs(scene: Scene, outputs: Outputs) -> None:

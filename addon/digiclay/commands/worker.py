@@ -1,7 +1,7 @@
-"""A job's process: how it is started, what it says of itself, and how it is asked to stop.
+"""Processes that do the work of a series on this machine: how they are started, and asked to stop.
 
-It runs what ``digiclay job`` runs, writes what it has to say into a log file, and stops when its
-standard input ends: so it does when it is asked to, and when whoever started it has died.
+Each runs this program once more, and stops when its standard input ends: so it does when it is asked to,
+and when whoever started it has died.
 """
 
 from __future__ import annotations
@@ -12,25 +12,41 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from ..core.errors import one_line
+from ..core.errors import DigiclayError
+from ..core.series import finish
 
-__all__ = ["ERROR", "PROGRESS", "Worker", "cores", "follow"]
+__all__ = ["Process", "Processes", "count_cores", "finish_here", "in_blender"]
 
-#: What the lines of a log start with that are meant for the process that started the job.
-PROGRESS, ERROR = "@ ", "! "
-#: Bytes at a log's end that are looked at for its last line.
-TAIL = 4096
+#: Seconds that processes get to stop by themselves.
+GRACE = 20.0
 #: The package, as an extension in Blender or installed with pip.
 PACKAGE = __name__.removesuffix(".commands.worker")
 
+Piece = TypeVar("Piece")
+Outcome = TypeVar("Outcome")
+Started = TypeVar("Started", bound="Process")
 
-def same_program() -> tuple[list[str], dict[str, str]]:
+
+def in_blender() -> bool:
+    """Tell whether this is an extension inside Blender, which cannot start others like itself."""
+    return PACKAGE != "digiclay"
+
+
+def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
     """Return a command that runs this program once more, and the environment it needs.
 
     Inside Blender there is no separate Python: Blender itself is started, with this extension.
+
+    Parameters
+    ----------
+    module : str, optional
+        A module of the package to be run in its place, ``.commands.evaluator``; not inside Blender.
     """
     bpy: Any = sys.modules.get("bpy")
     if bpy is not None and bpy.app.binary_path:
@@ -40,105 +56,138 @@ def same_program() -> tuple[list[str], dict[str, str]]:
     if bundled is not None and bundled.origin is not None:  # what an extension brings along is elsewhere
         folders.append(str(Path(bundled.origin).parents[1]))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
-    return [sys.executable, "-m", Path(__file__).resolve().parents[1].name], environment
+    return [sys.executable, "-m", f"{Path(__file__).resolve().parents[1].name}{module}"], environment
 
 
-def cores() -> int:
+def count_cores() -> int:
     """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-class Worker:
-    """A process that does one job.
+class Process:
+    """This program once more, in a process of its own.
 
     Parameters
     ----------
-    arguments : list of str
+    arguments : sequence of str
         Of the command line.
-    log : Path
-        What the process says.
+    module : str, optional
+        See `find_program`.
+    streams
+        Where its output goes, as `subprocess.Popen` has it.
     """
 
-    def __init__(self, arguments: list[str], log: Path) -> None:
-        command, environment = same_program()
-        self._log, self._asked = log, False
-        with log.open("wb") as said:
-            # A group of its own: Ctrl-C on a terminal is for the process that started it.
-            apart: dict[str, Any] = (
-                {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
-            )
-            self._process = subprocess.Popen(
-                [*command, *arguments], stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
-                env={**os.environ, **environment}, **apart,
+    def __init__(self, arguments: Sequence[str], module: str = "", **streams: Any) -> None:
+        command, environment = find_program(module)
+        # A group of its own: Ctrl-C on a terminal is for the process that started it.
+        apart: dict[str, Any] = {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
+        try:
+            self.process = subprocess.Popen(
+                [*command, *arguments], stdin=subprocess.PIPE, env={**os.environ, **environment},
+                **streams, **apart,
             )  # fmt: skip
-
-    def ended(self) -> bool:
-        """Tell whether the process has ended."""
-        if self._process.poll() is None:
-            return False
-        self.stop()  # nobody reads it any more
-        return True
-
-    def fraction(self) -> float:
-        """Return how much of the job is done, from 0 to 1."""
-        for line in reversed(self._last_lines()):
-            _, _, number = line.removeprefix(PROGRESS).partition(" ")
-            if line.startswith(PROGRESS) and number:
-                try:
-                    return min(1.0, max(0.0, float(number)))
-                except ValueError:
-                    break  # a line that is being written
-        return 0.0
-
-    def error(self) -> str:
-        """Return in one line why the job was not done."""
-        lines = self._last_lines()
-        told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
-        if told:
-            return one_line(told[-1])
-        others = [line for line in lines if line.strip() and not line.startswith(PROGRESS)]
-        said = f": {others[-1].strip()}" if others else ""
-        code = self._process.returncode
-        how = f"signal {-code}" if code < 0 else f"code {code}"
-        return one_line(f"The process ended with {how}{said}")
+        except OSError as error:
+            raise DigiclayError(f"A process cannot be started: {error.strerror or error}.") from None
+        assert self.process.stdin is not None
+        self.input = self.process.stdin
 
     def stop(self) -> None:
         """Ask the process to stop."""
-        if not self._asked and self._process.stdin is not None:
-            self._asked = True
-            self._process.stdin.close()
+        with suppress(OSError):  # it may have ended, and what was meant for it be left over
+            self.input.close()
 
     def kill(self) -> None:
         """End the process at once."""
+        self.process.kill()
+        self.wait()
+
+    def wait(self) -> str:
+        """Wait for the process to end, and say how it did."""
+        code = self.process.wait()
         self.stop()
-        self._process.kill()
-        self._process.wait()
-
-    def wait(self, until: float) -> None:
-        """Wait for the process to end, until a `time.monotonic`; then kill it."""
-        try:
-            self._process.wait(max(0.0, until - time.monotonic()))
-        except subprocess.TimeoutExpired:
-            self.kill()
-
-    def _last_lines(self) -> list[str]:
-        """Return the last lines of the log."""
-        with self._log.open("rb") as file:
-            file.seek(max(0, self._log.stat().st_size - TAIL))
-            return file.read().decode("utf-8", errors="replace").splitlines()
+        if self.process.stdout:
+            self.process.stdout.close()
+        return f"signal {-code}" if code < 0 else f"code {code}"
 
 
-def follow() -> threading.Event:
-    """Return an event that is set when standard input ends."""
-    ended = threading.Event()
+class Processes:
+    """All processes of a series: they are asked to stop together, and none is left when the block ends."""
 
-    def watch() -> None:
-        # Not sys.stdin: a thread that waits in it would keep Python from shutting down.
-        while os.read(0, 1):
-            pass
-        ended.set()
+    def __init__(self) -> None:
+        self._alive: list[Process] = []
+        self._deadline = 0.0
+        self._lock = threading.Lock()
 
-    threading.Thread(target=watch, daemon=True).start()
-    return ended
+    def __enter__(self) -> Processes:
+        return self
+
+    @property
+    def stopped(self) -> bool:
+        """Whether they were asked to stop."""
+        return self._deadline > 0.0
+
+    def start(self, make: Callable[[], Started]) -> Started | None:
+        """Start a process; None after a stop."""
+        with self._lock:
+            if self.stopped:
+                return None
+            process = make()
+            self._alive.append(process)
+            return process
+
+    def stop(self) -> None:
+        """Ask all to stop; asked again after some time, kill those that have not."""
+        with self._lock:
+            self._deadline = self._deadline or time.monotonic() + GRACE
+            for process in self._alive:
+                process.kill() if time.monotonic() >= self._deadline else process.stop()
+
+    def remove(self, process: Process) -> None:
+        """Forget a process that has ended."""
+        with self._lock:
+            self._alive.remove(process)
+
+    def __exit__(self, *raised: object) -> None:
+        self.stop()
+        with self._lock:
+            for process in self._alive:
+                process.kill()
+
+
+def finish_here(
+    processes: Processes,
+    count: int,
+    task: Callable[[Any], Outcome],
+    pieces: Iterable[tuple[Piece, Any]],
+    keep: Callable[[Piece, Outcome], None],
+    fail: Callable[[Piece, str], None],
+    *,
+    stop: Callable[[], bool],
+    draw: Callable[[], None],
+) -> None:
+    """Do what is left of a series on this machine, several pieces at a time, see `series.finish`.
+
+    Parameters
+    ----------
+    processes : Processes
+        Those that the task starts.
+    count : int
+        How many pieces are done at a time.
+    task, pieces, keep, fail
+        As `series.finish` has them.
+    stop : callable
+        Whether somebody asks to stop.
+    draw : callable
+        Called again and again meanwhile.
+    """
+
+    def stopped() -> bool:
+        if stop():
+            processes.stop()
+        draw()
+        return stop()
+
+    with ThreadPoolExecutor(count) as threads, processes:
+        finish(threads, task, pieces, keep, fail, stopped=stopped)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from .scene import Scene
 from .scene_table import resolve
 from .toml_text import LARGEST, tables
 
-__all__ = ["SAMPLES", "Setting", "find", "load", "read_table", "sample_names"]
+__all__ = ["SAMPLES", "Setting", "find", "load", "make_scene", "read_table", "sample_names"]
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[1] / "sample_shapes" / "sessions"
@@ -65,12 +65,30 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     SceneError
         One line: file or option, key, rule, value.
     """
-    table = read_table(path)
+    return make_scene(path, read_table(path), settings)
+
+
+def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = ()) -> Scene:
+    """Make a scene of what its file says, and let settings override it.
+
+    Parameters
+    ----------
+    path : Path
+        The file, by which messages call the scene, and beside which a shape may lie.
+    table : mapping
+        What `read_table` gives of it; it stays as it is.
+    settings : sequence of Setting, optional
+
+    Raises
+    ------
+    SceneError
+        As `load`.
+    """
     try:
-        return resolve(_overridden(_beside(table, path.parent), settings), path.stem)
+        return resolve(_override(_find_beside(table, path.parent), settings), path.stem)
     except ParameterError as error:
         if settings:
-            load(path)  # a file that is wrong by itself is told of first
+            make_scene(path, table)  # a file that is wrong by itself is told of first
         blamed = [one.option for one in settings if one.key == f"{error.owner}.{error.field}"]
         own = path.name if path.parent == SAMPLES else str(path)
         origin = (blamed or [one.option for one in settings] or [own])[-1]
@@ -99,29 +117,30 @@ def read_table(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path}, line {number}: {said}.") from None
 
 
-def _beside(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     """Find a shape's file that lies beside the scene file, or in a folder there."""
     shape = table.get("shape")
     name = shape.get("file") if isinstance(shape, dict) else None
     if isinstance(name, str) and Path(name).suffix and "\0" not in name and (folder / name).is_file():
-        table["shape"] = {**table["shape"], "file": str((folder / name).resolve())}
+        return {**table, "shape": {**table["shape"], "file": str((folder / name).resolve())}}
     return table
 
 
-def _overridden(table: dict[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
-    """Put settings into the tables of a scene file."""
+def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
+    """Return the tables of a scene file with settings in them."""
+    whole = dict(table)
     for key, value, _ in settings:
         *groups, last = key.split(".")
-        inner = table
+        inner = whole
         for group in groups:
-            if not isinstance(inner.get(group), dict):
-                inner[group] = {}
+            own = inner.get(group)
+            inner[group] = dict(own) if isinstance(own, dict) else {}
             inner = inner[group]
-        inner[last] = _value(value)
-    return table
+        inner[last] = _read_value(value)
+    return whole
 
 
-def _value(text: str) -> Any:
+def _read_value(text: str) -> Any:
     """Read the value of a setting: TOML, or else a bare text."""
     try:
         read = tables(f"value = {text}")

@@ -1,212 +1,134 @@
-"""Sweeps: a scene at many points of its parameters, one session each; no processes in here.
-
-Who runs the sessions is a place: anything with the interface of ``concurrent.futures.Executor``.
-"""
+"""A sweep's folder: what it is, one small file for each finished point, and the table of all."""
 
 from __future__ import annotations
 
+import csv
+import hashlib
+import io
 import itertools
-import math
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any
 
-from .accuracy import estimate_errors, has_every_command
-from .errors import DigiclayError, OutputError, ParameterError, SceneError, one_line
-from .metrics import METRICS
-from .quantity import nearest
-from .scene import Scene
-from .scene_file import Setting, load
-from .session import Result, run
-from .sweep_axis import MOST, Axis
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["ERRORS", "FIGURES", "Point", "Record", "evaluate", "figure", "finish", "points", "recorded"]
+from .axes import Axis, Column, Point
+from .errors import OutputError
+from .evaluation import FIGURES, Record
+from .scene_table import text
+from .series import Kind, open_series
+from .whole_files import as_json, read_json, write_whole
 
-Record = dict[str, Any]
+__all__ = ["MARK", "Folder", "format_table", "make_grid", "open_sweep"]
 
-#: How exact a session is: unit and meaning. It is integrated once more for them, where they are asked for.
-ERRORS: dict[str, tuple[str, str]] = {
-    "height_error": ("m", "largest error of a pin's height, estimated"),
-    "force_error": ("N", "largest error of the force on a cell, estimated"),
-    "total_force_error": ("N", "largest error of the total force, estimated"),
-}
-#: What a session can be judged by: unit and meaning.
-FIGURES: dict[str, tuple[str, str]] = {
-    **{name: (known[0], known[1]) for name, known in METRICS.items()},
-    "simulated": ("s", "simulated time"),
-    "run_time": ("s", "time the simulation took"),
-    "real_time_factor": ("1", "simulated time over the time it took"),
-    **ERRORS,
-}
-#: Short names of figures.
-SHORT = {"lag": "lag_mean"}
-#: Seconds between two looks at whether somebody asked to stop.
-PAUSE = 0.1
+#: The file by which a folder is known as a sweep's, and the folder of its points.
+MARK, POINTS = "sweep.json", "points"
 
 
 @dataclass(frozen=True)
-class Point:
-    """One session of a sweep.
+class Folder:
+    """Where a sweep is kept."""
 
-    Attributes
-    ----------
-    index : int
-        The last axis varies fastest.
-    words : tuple of str
-        A value on each axis.
-    scene : Scene or None
-        None where the values do not go together; `error` says why.
-    """
+    path: Path
 
-    index: int
-    words: tuple[str, ...]
-    scene: Scene | None
-    error: str = ""
+    def read_records(self) -> dict[int, Record]:
+        """Return what is kept of the finished points, by their index."""
+        records = {}
+        for path in self.path.glob(f"{POINTS}/*.json"):
+            record = read_json(path)  # a file that cannot be read is a point to be done again
+            if path.stem.isdecimal() and record is not None and record.keys() & {"figures", "error"}:
+                records[int(path.stem)] = record
+        return records
 
-
-def points(path: Path, settings: Sequence[Setting], axes: Sequence[Axis]) -> list[Point]:
-    """Make the scenes of all points of a sweep.
-
-    A value that no point can have is refused; values that only do not go together with some
-    of the other axes' make a point with an error.
-
-    Raises
-    ------
-    ParameterError, SceneError
-        In one line.
-    """
-    keys = [one.key for one in axes]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise ParameterError(f"--vary {key}", "", "must be given once", f"{keys.count(key)} times")
-        if key in [setting.key for setting in settings]:
-            raise ParameterError(f"--vary {key}", "", "must not be given to --set as well", key)
-    count = math.prod(len(one.words) for one in axes)
-    if count > MOST:
-        raise ParameterError("--vary", "", f"must come to {MOST} points at most", f"{count} points")
-    load(path, settings)  # what is wrong without the axes is told of first
-    found = []
-    for index, words in enumerate(itertools.product(*(one.words for one in axes))):
-        varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
-        try:
-            found.append(Point(index, words, load(path, [*settings, *varied])))
-        except SceneError as error:
-            found.append(Point(index, words, None, str(error)))
-    for number, one in enumerate(axes):
-        for word in one.words:
-            mine = [point for point in found if point.words[number] == word]
-            if not any(point.scene for point in mine):
-                raise SceneError(mine[0].error)
-    return found
+    def keep(self, point: Point, axes: Sequence[Axis], record: Record) -> None:
+        """Write the file of a finished point, whole or not at all."""
+        values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
+        write_whole(self.path / POINTS / f"{point.index:06d}.json", as_json({"values": values, **record}))
 
 
-def figure(word: str) -> str:
-    """Return the name of a figure asked for, such as ``lag``.
-
-    Raises
-    ------
-    ParameterError
-        When there is none; the nearest is suggested.
-    """
-    name = SHORT.get(word, word)
-    if name in FIGURES:
-        return name
-    close = nearest(word, [*FIGURES, *SHORT])
-    hint = f"Did you mean {close}?" if close else f"Known: {', '.join(FIGURES)}."
-    raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
-
-
-def evaluate(
-    scene: Scene, stopped: Callable[[], bool] | None = None, *, errors: bool = False
-) -> Record | None:
-    """Run one point; return its ``figures``, or the ``error`` it ended in; None when it was stopped.
+@contextmanager
+def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Iterator[Folder]:
+    """Make a sweep's folder, or go on with one that holds the same sweep; nobody else works in it meanwhile.
 
     Parameters
     ----------
-    scene : Scene
-    stopped : callable, optional
-        Asked after each control period.
-    errors : bool, optional
-        Estimate `ERRORS` too.
-    """
-    try:
-        result = run(scene, stopped=stopped)
-        if errors and result.history is not None and not result.incomplete and has_every_command(scene):
-            found = estimate_errors(scene, result.history, stopped=stopped)
-            if found is None:
-                return None
-            result = result.with_errors(found)
-    except DigiclayError as error:
-        return {"error": one_line(error)}
-    except MemoryError:
-        return {"error": "There is not enough memory."}
-    except Exception as error:  # whatever is wrong with one point, the others are worth having
-        return {"error": f"{type(error).__name__}: {one_line(error)}"}
-    return None if result.incomplete else recorded(result, errors=errors)
-
-
-def recorded(result: Result, *, errors: bool = False) -> Record:
-    """Return what is kept of a session that came to its end; `ERRORS` only where they were asked for."""
-    names = [name for name in FIGURES if errors or name not in ERRORS]
-    return {"figures": {name: result.metrics.get(name) for name in names}}
-
-
-def finish(
-    executor: Executor,
-    task: Callable[[list[Scene]], list[Record | None]],
-    todo: Iterable[Sequence[Point]],
-    keep: Callable[[Point, Record], None],
-    *,
-    stopped: Callable[[], bool],
-) -> None:
-    """Have an executor run the points that are to be done; keep each as soon as its bundle is.
-
-    Parameters
-    ----------
-    executor : Executor
-        Any.
-    task : callable
-        What it runs, on a bundle: `sweep_bundles.evaluate_all`, in a form it can hand on.
-    todo : iterable of sequences of Point
-        In bundles that are run at a time.
-    keep : callable
-        Told of each point that came to an end.
-    stopped : callable
-        Asked all the time; then nothing more is begun, and what runs is waited for.
+    path : Path
+    points : sequence of Point
+        All of the sweep.
+    axes : sequence of Axis
+    version : str
+        Of digiclay: another one may come to other figures.
 
     Raises
     ------
     OutputError
-        When the executor itself breaks down.
+        When it holds anything else, cannot be written, or another process works in it.
     """
-    arrived: SimpleQueue[Future[list[Record | None]]] = SimpleQueue()
-    waiting: dict[Future[list[Record | None]], list[Point]] = {}
-    try:
-        for bundle in todo:
-            for point in bundle:
-                if point.scene is None:
-                    keep(point, {"error": point.error})
-            able = [point for point in bundle if point.scene]
-            if able:
-                future = executor.submit(task, [point.scene for point in able if point.scene])
-                waiting[future] = able
-                future.add_done_callback(arrived.put)
-        while waiting:
-            if stopped():
-                for future in waiting:
-                    future.cancel()
-            try:
-                future = arrived.get(timeout=PAUSE)
-            except Empty:
-                continue
-            records = [] if future.cancelled() else future.result()
-            # Of a bundle that was cancelled there are no records.
-            for point, record in zip(waiting.pop(future), records, strict=False):
-                if record is not None:
-                    keep(point, record)
-    except BrokenExecutor:
-        rule = "A worker died, perhaps for lack of memory; what was done is kept."
-        raise OutputError(f"{rule} Run the same again with fewer --workers.") from None
+    identity = hashlib.sha256(version.encode())
+    for point in points:
+        identity.update((text(point.scene) if point.scene else point.error).encode())
+    description = {
+        "digiclay": version,
+        "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
+        "points": len(points),
+        "identity": identity.hexdigest(),
+    }
+
+    def refuse_another(there: Any) -> None:
+        if there == description:
+            return
+        try:
+            varied = " and ".join(one["key"] for one in there["axes"])
+            said = f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
+        except (KeyError, TypeError):
+            said = f"its {MARK} cannot be read"
+        raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
+
+    with open_series(path, Kind("sweep", MARK, (POINTS,)), description, refuse_another):
+        yield Folder(path)
+
+
+def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
+    """Return a figure at all points, one dimension an axis; NaN where there is none.
+
+    Parameters
+    ----------
+    records : mapping of int to Record
+        By the index of their point.
+    axes : sequence of Axis
+    name : str
+        A key of `evaluation.FIGURES`.
+    """
+    shape = [len(one.words) for one in axes]
+    values = np.full(int(np.prod(shape)), np.nan)
+    for index, record in records.items():
+        value = record.get("figures", {}).get(name)
+        values[index] = np.nan if value is None else value
+    return values.reshape(shape)
+
+
+def format_table(columns: Sequence[Column], records: Mapping[int, Record], names: Sequence[str]) -> str:
+    """Return the sweep as CSV: the axes, the figures asked for, and the error; SI units, in the header.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+    records : mapping of int to Record
+        Of every point, by its index.
+    names : sequence of str
+        Keys of `evaluation.FIGURES`.
+    """
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    units = [(one.key, one.unit) for one in columns] + [(name, FIGURES[name][0]) for name in names]
+    writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
+    for values, (_, record) in zip(
+        itertools.product(*(one.values for one in columns)), sorted(records.items()), strict=True
+    ):
+        figures = record.get("figures", {})
+        written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
+        writer.writerow([*values, *written, record.get("error", "")])
+    return lines.getvalue()

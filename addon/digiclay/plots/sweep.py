@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.sweep import FIGURES
-from ..core.sweep_folder import Column
+from ..core.axes import Column
+from ..core.evaluation import FIGURES
 from .figure import INK, LINES, canvas, save
 
 if TYPE_CHECKING:  # only named in annotations
@@ -45,7 +45,7 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
     columns : sequence of Column
         One or two.
     name : str
-        A key of `sweep.FIGURES`.
+        A key of `evaluation.FIGURES`.
     values : ndarray
         One dimension a column; NaN where a point failed or has no such figure.
 

@@ -1,0 +1,123 @@
+"""Processes that evaluate bundles of a sweep, one after the other: what starts them, and what they run.
+
+Bundles come in by standard input, records go out by standard output, as pickles.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import threading
+from collections.abc import Sequence
+from queue import SimpleQueue
+from typing import Any
+
+from ..core.axes import Point
+from ..core.errors import DigiclayError
+from ..core.evaluation import Record, evaluate_bundle
+from .worker import Process, Processes
+
+__all__ = ["Evaluator", "evaluate_elsewhere", "serve"]
+
+#: How often a bundle is begun whose process dies.
+TRIES = 2
+
+
+class Evaluator(Process):
+    """A process that evaluates one bundle of points after the other."""
+
+    def __init__(self) -> None:
+        super().__init__([], ".commands.evaluator", stdout=subprocess.PIPE)
+
+    def evaluate(self, bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
+        """Return the records of a bundle; EOFError when the process has died.
+
+        Parameters
+        ----------
+        bundle : sequence of Point
+        errors : bool
+            Whether their errors are estimated.
+        """
+        try:
+            pickle.dump((tuple(bundle), errors), self.input)
+            self.input.flush()
+            records: list[Record | None] = pickle.load(self.process.stdout)  # type: ignore[arg-type]
+        except (OSError, ValueError, pickle.UnpicklingError):  # it died, or was stopped, in the middle
+            raise EOFError from None
+        return records
+
+
+def evaluate_elsewhere(
+    processes: Processes, idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
+) -> list[Record | None]:
+    """Evaluate a bundle in a process that has nothing to do; in another one, when that dies.
+
+    Parameters
+    ----------
+    processes : Processes
+        Of the sweep.
+    idle : list of Evaluator
+        Those of them that have nothing to do.
+    bundle : sequence of Point
+    errors : bool
+        Whether their errors are estimated.
+
+    Raises
+    ------
+    DigiclayError
+        When the other one dies as well.
+    """
+    how = ""
+    for _ in range(TRIES):
+        try:
+            evaluator = idle.pop()
+        except IndexError:
+            started = processes.start(Evaluator)
+            if started is None:
+                break
+            evaluator = started
+        try:
+            records = evaluator.evaluate(bundle, errors=errors)
+        except EOFError:
+            how = evaluator.wait()
+            processes.remove(evaluator)
+            if processes.stopped:
+                break
+        else:
+            idle.append(evaluator)
+            return records
+    if processes.stopped:
+        return [None] * len(bundle)
+    rule = f"A worker died twice of this ({how}), perhaps for lack of memory"
+    raise DigiclayError(f"{rule}. Run the same again with fewer --workers.")
+
+
+def serve() -> None:
+    """Evaluate what comes in, until standard input ends."""
+    source, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print is no reply
+    bundles: SimpleQueue[Any] = SimpleQueue()
+    ended = threading.Event()
+
+    def read() -> None:
+        try:
+            while True:
+                bundles.put(pickle.load(source))
+        except (EOFError, OSError, pickle.UnpicklingError):  # it may end in the middle
+            ended.set()
+            bundles.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    while (asked := bundles.get()) is not None:
+        bundle, errors = asked
+        records = evaluate_bundle(bundle, ended.is_set, errors=errors)
+        try:
+            pickle.dump(records, replies)
+            replies.flush()
+        except OSError:  # nobody is there any more
+            os._exit(1)
+
+
+if __name__ == "__main__":
+    serve()

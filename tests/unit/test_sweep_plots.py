@@ -1,0 +1,103 @@
+"""Pictures of sweeps: lines over one axis, heat maps over two; and the axes in numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.axes import Column, make_columns, make_points, read_axis
+from digiclay.core.scene_file import Setting, find
+from digiclay.plots.sweep import sweep_figure
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+ONE = Column("control.force_gain", "1/N", (1.0, 2.0, 4.0), True)
+TWO = Column("layout.pitch", "m", (2.5e-3, 3e-3), False)
+WORDS = Column("blister.profile", "", ("cone", "gaussian", "flat"), False)
+
+
+def test_one_axis_is_a_line_with_markers_labelled_with_units() -> None:
+    picture = sweep_figure([ONE], "lag_mean", np.array([1e-3, 2e-3, 3e-3]))
+    (axes,) = picture.axes
+    (line,) = axes.get_lines()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "lag_mean (mm)")
+    assert (line.get_marker(), axes.get_xscale()) == ("o", "log")
+    np.testing.assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
+
+
+def test_values_in_any_order_make_a_line_from_left_to_right() -> None:
+    picture = sweep_figure([Column("a.b", "", (3, 1, 2), False)], "rfd", np.array([0.3, 0.1, 0.2]))
+    assert picture.axes[0].get_lines()[0].get_xydata().tolist() == [[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]]
+
+
+def test_words_are_not_joined_by_a_line() -> None:
+    picture = sweep_figure([WORDS], "rfd", np.array([0.3, 0.1, 0.2]))
+    assert [text.get_text() for text in picture.axes[0].get_xticklabels()] == list(WORDS.values)
+    assert picture.axes[0].get_lines()[0].get_linestyle() == "None"
+
+
+def test_two_axes_are_a_heat_map_labelled_with_units() -> None:
+    values = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, np.nan]])
+    axes, scale = sweep_figure([ONE, TWO], "rfd", values).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")
+    assert scale.get_ylabel() == "rfd (N)"
+    drawn = axes.collections[0].get_array().reshape(2, 3)
+    np.testing.assert_array_equal(drawn.filled(np.nan), values.T)
+    assert [text.get_text() for text in axes.texts] == ["0.1", "0.3", "0.5", "0.2", "0.4", "×"]
+
+
+@pytest.mark.parametrize("columns", [[ONE], [ONE, TWO]])
+def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Column]) -> None:
+    nothing = np.full([len(one.values) for one in columns], np.nan)
+    picture = sweep_figure(columns, "rfd", nothing)
+    picture.canvas.draw()
+    crosses = sum(len(line.get_xdata()) for line in picture.axes[0].get_lines() if line.get_marker() == "x")
+    assert crosses + sum(text.get_text() == "×" for text in picture.axes[0].texts) == nothing.size
+
+
+def test_a_sweep_over_two_axes_leaves_a_picture_of_each_metric(here: Path) -> None:
+    two = ["--vary", "valve_lag.time_constant=1 ms,2 ms", "--vary", "delay.dead_time=0,0.001"]
+    assert (
+        main(
+            [
+                "sweep",
+                "slow_press",
+                "--set",
+                "simulation.duration=0.1",
+                *two,
+                "--metric",
+                "rfd,highest",
+                "--out",
+                "out",
+                "--quiet",
+            ]
+        )
+        == 0
+    )
+    assert sorted(path.name for path in (here / "out").glob("*.png")) == ["highest.png", "rfd.png"]
+
+
+def test_a_sweep_over_three_axes_says_that_there_is_a_table_only(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    three = [
+        f"--vary={key}" for key in ("valve_lag.time_constant=1 ms", "delay.dead_time=0", "layout.rows=11,13")
+    ]
+    assert main(["sweep", "slow_press", "--set", "simulation.duration=0.1", *three, "--out", "out"]) == 0
+    assert "3 axes: a table only, no pictures" in capsys.readouterr().out
+    assert list((here / "out").glob("*.png")) == []
+
+
+def test_an_axis_of_numbers_is_what_the_scenes_made_of_its_words() -> None:
+    axes = [read_axis("valve_lag.time_constant=1 ms:2 ms:2")]
+    points = make_points(find("slow_press"), [Setting("simulation.duration", "0.1")], axes)
+    (column,) = make_columns(points, axes)
+    assert (column.values, column.unit, column.numeric) == ((1e-3, 2e-3), "s", True)
