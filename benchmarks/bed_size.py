@@ -101,7 +101,14 @@ def gathered_cells(side: int) -> list[int]:
 
 
 def measured(side: int, repeats: int) -> Size:
-    """Build a bed and run the session on it; the median of the repeats counts."""
+    """Build a bed and run the session on it; the median of the repeats counts.
+
+    Parameters
+    ----------
+    side : int
+        Pins along each side.
+    repeats : int
+    """
     built, spent, cells, means = [], [], [], []
     known = scene(side)
     bytes_a_pin = 0.0

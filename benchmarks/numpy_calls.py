@@ -54,7 +54,17 @@ class Ledger:
     def note(
         self, name: str, call: Callable[..., Any], arguments: tuple[Any, ...], known: dict[str, Any]
     ) -> None:
-        """Take down a call."""
+        """Take down a call.
+
+        Parameters
+        ----------
+        name : str
+        call : callable
+        arguments : tuple
+            Their shapes and types are part of the key.
+        known : dict
+            Keyword arguments.
+        """
         kinds = (one.shape if isinstance(one, np.ndarray) else type(one).__name__ for one in arguments)
         key = (name, *kinds)
         self.calls[key] += 1

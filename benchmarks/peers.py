@@ -133,7 +133,15 @@ class Line:
         self.pulp: Any = cell.touch.pulp
 
     def underside(self, t: float, x: Floats, y: Floats) -> Floats:
-        """Return the finger's underside, m."""
+        """Return the finger's underside, m.
+
+        Parameters
+        ----------
+        t : float
+            s.
+        x, y : ndarray (k,)
+            m.
+        """
         at_x, at_y, at_z = self.finger(t)
         inward = 1.0 - ((x - at_x) / self.tip.length) ** 2 - ((y - at_y) / self.tip.width) ** 2
         kept = np.maximum(inward, 1.0 - JOIN)
@@ -141,7 +149,15 @@ class Line:
         return under
 
     def rates(self, x: Floats, y: Floats, command: Floats) -> Callable[[float, Floats], Floats]:
-        """Return the right-hand side for some cells, the first of which the finger may touch."""
+        """Return the right-hand side for some cells, the first of which the finger may touch.
+
+        Parameters
+        ----------
+        x, y : ndarray (k,)
+            Places of the cells the finger may touch, m.
+        command : ndarray (n,)
+            Commands of the cells that are integrated; the first k are those above.
+        """
         k, n, cell, contact = x.size, command.size, self.cell, self.contact
         out, weights, speeds = np.zeros((n, 5)), self.pulp.shares, self.pulp.rates[:, 0]
         high, low = cell.supply.high, cell.supply.low
@@ -169,7 +185,17 @@ class Line:
 def peer(
     known: Problem, solver: Solver, tolerance: float, periods: int | None = None
 ) -> tuple[Measured, float, int]:
-    """Integrate a problem by one of the `SOLVERS`; return it, the CPU time, s, and the evaluations."""
+    """Integrate a problem by one of the `SOLVERS`; return it, the CPU time, s, and the evaluations.
+
+    Parameters
+    ----------
+    known : Problem
+    solver : callable
+    tolerance : float
+        Relative.
+    periods : int, optional
+        Control periods to integrate; by default all.
+    """
     line = Line(known)
     system, grid = line.system, line.system.grid
     state = begin(system).rows[: system.rows.physics].T.copy()
@@ -220,7 +246,18 @@ def reference_and_check(known: Problem) -> tuple[Measured, float]:
 
 
 def points(known: Problem, exact: Measured, name: str, tolerances: tuple[float, ...]) -> Iterator[Work]:
-    """Give the points of one solver, one a tolerance."""
+    """Give the points of one solver, one a tolerance.
+
+    Parameters
+    ----------
+    known : Problem
+    exact : Measured
+        Its exact solution.
+    name : str
+        Key of `SOLVERS`.
+    tolerances : tuple of float
+        Relative.
+    """
     for tolerance in tolerances:
         found, took, evaluations = peer(known, SOLVERS[name], tolerance)
         height, force = found.against(exact)

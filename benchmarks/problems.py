@@ -110,7 +110,18 @@ def live(
     *,
     side: int | None = None,
 ) -> Scene:
-    """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns."""
+    """Return a problem's scene under Method I, on its own bed or one of `side` rows and columns.
+
+    Parameters
+    ----------
+    name : str
+        Key of `PROBLEMS`.
+    period, step : float
+        Control period and physics step, s.
+    stepper : str
+    side : int, optional
+        Rows and columns of the bed; by default the problem's own.
+    """
     own, waypoints, joined, held = PROBLEMS[name]
     table: dict[str, Any] = {
         "layout": {"rows": side or own, "columns": side or own},
@@ -126,7 +137,15 @@ def live(
 
 
 def problem(name: str, *, side: int | None = None) -> Problem:
-    """Record a problem's commands, on its own bed or another, and work out which cells take part."""
+    """Record a problem's commands, on its own bed or another, and work out which cells take part.
+
+    Parameters
+    ----------
+    name : str
+        Key of `PROBLEMS`.
+    side : int, optional
+        Rows and columns of the bed; by default the problem's own.
+    """
     scene, held = live(name, side=side), PROBLEMS[name][3]
     system = assemble(scene)
     if held is None:
@@ -140,7 +159,14 @@ def problem(name: str, *, side: int | None = None) -> Problem:
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
-    """Return a scene's system that plays commands."""
+    """Return a scene's system that plays commands.
+
+    Parameters
+    ----------
+    scene : Scene
+    commands : ndarray (t, n)
+        Held for a control period each.
+    """
     system = assemble(scene)
     return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
 
@@ -152,7 +178,14 @@ def _at(known: Problem, stepper: str, step: float) -> Scene:
 
 
 def solved(scene: Scene, commands: Floats) -> Measured:
-    """Integrate under recorded commands."""
+    """Integrate under recorded commands.
+
+    Parameters
+    ----------
+    scene : Scene
+    commands : ndarray (t, n)
+        Held for a control period each.
+    """
     system = replaying(scene, commands)
     run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
     rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
@@ -160,7 +193,15 @@ def solved(scene: Scene, commands: Floats) -> Measured:
 
 
 def timed(scene: Scene, commands: Floats, repeats: int) -> float:
-    """Return the CPU time of a run of which nothing is kept, s: the median."""
+    """Return the CPU time of a run of which nothing is kept, s: the median.
+
+    Parameters
+    ----------
+    scene : Scene
+    commands : ndarray (t, n)
+        Held for a control period each.
+    repeats : int
+    """
     spent = []
     for _ in range(repeats):
         system, trajectory = replaying(scene, commands), scene.trajectory.trajectory()
@@ -175,7 +216,19 @@ def timed(scene: Scene, commands: Floats, repeats: int) -> float:
 def ours(
     known: Problem, exact: Measured, stepper: str, steps: tuple[float, ...], repeats: int
 ) -> Iterator[Work]:
-    """Give the points of one of our steppers, one a step."""
+    """Give the points of one of our steppers, one a step.
+
+    Parameters
+    ----------
+    known : Problem
+    exact : Measured
+        Its exact solution.
+    stepper : str
+    steps : tuple of float
+        Physics steps, s.
+    repeats : int
+        Timed runs; the median counts.
+    """
     for step in steps:
         scene = _at(known, stepper, step)
         with np.errstate(all="ignore"):

@@ -20,11 +20,22 @@ from digiclay.commands.refusals import refuse_unwritable
 from digiclay.commands.tables import table
 from digiclay.core.errors import OutputError
 
-__all__ = ["add_kind", "kept", "made_with", "number", "progress", "table"]
+__all__ = ["add_kind", "kept", "made_with", "progress", "table"]
 
 
 def add_kind(kinds: Any, name: str, help: str, examples: str, *, out: bool = True) -> argparse.ArgumentParser:
-    """Add a benchmark with the options all of them take."""
+    """Add a benchmark with the options all of them take.
+
+    Parameters
+    ----------
+    kinds : argparse's subparsers
+    name : str
+    help : str
+    examples : str
+        Lines below *examples* in its help.
+    out : bool
+        Whether it can keep its results in a folder.
+    """
     parser = add_command(kinds, name, help, f"examples:\n{examples}")
     parser.add_argument("--quick", action="store_true", help="fewer and shorter runs")
     parser.add_argument("--quiet", action="store_true", help="no progress")
@@ -45,13 +56,18 @@ def _folder(text: str) -> Path:
 
 
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
-    """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet."""
+    """Return the bar of a benchmark, on stderr; one that draws nothing with --quiet.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        `quiet` is asked for.
+    label : str
+        In front of the bar.
+    total : int
+        Steps of the bar.
+    """
     return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
-
-
-def number(value: float, unit: str = "") -> str:
-    """Write a number with three digits."""
-    return f"{value:.3g} {unit}".rstrip()
 
 
 def made_with(*packages: str) -> str:
@@ -74,6 +90,18 @@ def _processor() -> str:
 
 def kept(out: Path | None, name: str, text: str, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     """Write a benchmark's text as ``name.md`` and its figures as ``name.csv``, if there is a folder for them.
+
+    Parameters
+    ----------
+    out : Path or None
+        The folder.
+    name : str
+        Of both files, without suffix.
+    text : str
+    head : sequence of str
+        Names of the columns of the CSV.
+    rows : sequence of sequences
+        Their values.
 
     Raises
     ------

@@ -63,7 +63,16 @@ class Size:
 
 
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
-    """Return the runs of a study: a parameter of the scene spread evenly."""
+    """Return the runs of a study: a parameter of the scene spread evenly.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        Key of `STUDIES`.
+    count : int
+        Runs.
+    """
     section, key, low, high = STUDIES[name]
     part: Any = getattr(scene, section)
     shares = [low + (high - low) * (i + 0.5) / count for i in range(count)]
@@ -82,6 +91,15 @@ def measured(scene: Scene, name: str, count: int, repeats: int) -> Size:
     """Run a study of so many runs; the medians of the repeats count.
 
     One run alone and all in one call take turns, so that what else the machine does befalls both alike.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        Key of `STUDIES`.
+    count : int
+        Runs of the study.
+    repeats : int
     """
     scenes = study(scene, name, count)
     plain = study(replace(scene, recorder=None), name, count)

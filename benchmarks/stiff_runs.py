@@ -82,7 +82,17 @@ def strict() -> Iterator[None]:
 
 
 def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
-    """Return what is wrong with the heights and forces of a period; nothing: an empty text."""
+    """Return what is wrong with the heights and forces of a period; nothing: an empty text.
+
+    Parameters
+    ----------
+    height : ndarray (n,)
+        m.
+    force : ndarray (n,)
+        N.
+    stroke : float
+        m.
+    """
     if not (np.isfinite(height).all() and np.isfinite(force).all()):
         return "not finite"
     if height.min() < 0.0 or height.max() > stroke:
@@ -137,7 +147,15 @@ def commands_of(case: Case) -> Floats:
 
 
 def live(case: Case, stepper: str, step: float) -> Floats:
-    """Run a case with its controller, and return the heights, (t, n)."""
+    """Run a case with its controller, and return the heights, (t, n).
+
+    Parameters
+    ----------
+    case : Case
+    stepper : str
+    step : float
+        Physics step, s.
+    """
     known = scene(case, stepper, step, period_of(step))
     return _played(assemble(known), known.trajectory.trajectory(), known.periods)[0]
 
@@ -154,23 +172,58 @@ def _replaying(
 
 
 def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
-    """Integrate a case under recorded commands and return the heights, (t, n)."""
+    """Integrate a case under recorded commands and return the heights, (t, n).
+
+    Parameters
+    ----------
+    case : Case
+    commands : ndarray (t, n)
+        Held for `HOLD` each.
+    stepper : str
+    step, period : float
+        Physics step and control period, s.
+    """
     return _played(*_replaying(case, commands, stepper, step, period))[0]
 
 
 def largest_force(case: Case, commands: Floats) -> float:
-    """Return the largest force on a cell at the end of a control period, N."""
+    """Return the largest force on a cell at the end of a control period, N.
+
+    Parameters
+    ----------
+    case : Case
+    commands : ndarray (t, n)
+        Held for `HOLD` each.
+    """
     return _played(*_replaying(case, commands, "bernoulli", 1e-3, PERIOD))[2]
 
 
 def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
-    """Return the numpy calls a control period of the default stepper makes, the median over the run."""
+    """Return the numpy calls a control period of the default stepper makes, the median over the run.
+
+    Parameters
+    ----------
+    case : Case
+    commands : ndarray (t, n)
+        Held for `HOLD` each.
+    step : float
+        Physics step, s.
+    """
     system, trajectory, count = _replaying(case, commands, "bernoulli", step, period_of(step))
     return statistics.median(period_calls(system, trajectory, count // 2)[0])
 
 
 def reference(case: Case, commands: Floats, step: float = FINE) -> tuple[Floats, float]:
-    """Return the heights every 5 ms, (t, n), and how far they may be off, m."""
+    """Return the heights every 5 ms, (t, n), and how far they may be off, m.
+
+    Parameters
+    ----------
+    case : Case
+    commands : ndarray (t, n)
+        Held for `HOLD` each.
+    step : float
+        Physics step, s.
+    """
     fine = replayed(case, commands, "richardson", step, PERIOD)
     coarse = replayed(case, commands, "richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
     # Order 2 is what is left of order 3 across a kink.
@@ -178,7 +231,19 @@ def reference(case: Case, commands: Floats, step: float = FINE) -> tuple[Floats,
 
 
 def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: float) -> Outcome:
-    """Run one stepper at one step, and judge it."""
+    """Run one stepper at one step, and judge it.
+
+    Parameters
+    ----------
+    case : Case
+    commands : ndarray (t, n)
+        Held for `HOLD` each.
+    exact : ndarray (t, n)
+        Heights every 5 ms, m.
+    stepper : str
+    step : float
+        Physics step, s.
+    """
     period = period_of(step)
     every = round(period / PERIOD)
     try:

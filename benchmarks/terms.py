@@ -69,7 +69,14 @@ class Run:
 
 
 def without(scene: Scene, term: str) -> Scene | None:
-    """Return a scene without a term; None where it has none."""
+    """Return a scene without a term; None where it has none.
+
+    Parameters
+    ----------
+    scene : Scene
+    term : str
+        Key of `TERMS`, or `LONGER`.
+    """
     if term == LONGER:
         simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
         return None if simulation == scene.simulation else replace(scene, simulation=simulation)
@@ -100,7 +107,16 @@ def _run(scene: Scene, commands: Floats | None, repeats: int) -> Run:
 
 
 def effect(scene: Scene, full: Run, repeats: int = 1) -> Effect:
-    """Judge a scene against the run of the full one."""
+    """Judge a scene against the run of the full one.
+
+    Parameters
+    ----------
+    scene : Scene
+    full : Run
+        Of the full scene.
+    repeats : int
+        Timed runs; the median counts.
+    """
     alive, played = _run(scene, None, repeats), _run(scene, full.commands, 1)
     system = assemble(scene)
     calls = period_calls(system, scene.trajectory.trajectory(), min(scene.periods, 400))[0]

@@ -72,7 +72,15 @@ class Beside:
 
 
 def carry_out(arguments: argparse.Namespace, names: Sequence[str]) -> None:
-    """Run some problems, and print the tables."""
+    """Run some problems, and print the tables.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        Of `precision`.
+    names : sequence of str
+        Keys of `PROBLEMS`.
+    """
     own, others, once, rounds = (
         (QUICK, QUICK_PEERS, {}, 1) if arguments.quick else (OURS, PEERS, ONCE, ROUNDS)
     )
@@ -156,7 +164,16 @@ def _fastest(runs: Sequence[list[Work]]) -> list[Work]:
 
 
 def report(found: Sequence[Beside], apart: Sequence[float], rounds: int) -> Iterator[str]:
-    """Give the lines of the report; `apart` is how far two references are from each other, m."""
+    """Give the lines of the report; `apart` is how far two references are from each other, m.
+
+    Parameters
+    ----------
+    found : sequence of Beside
+    apart : sequence of float
+        Of each problem, how far two references are from each other, m.
+    rounds : int
+        Runs of each setting; the fastest counted.
+    """
     yield f"Peers over the whole bed: the problems on the paper's bed of {SIDE} x {SIDE}, for all methods."
     yield "Peers are told which cells take part, or go through all of them in the same form ('whole"
     yield "bed'); ours finds them itself. Errors are those of all cells of the bed.\n"

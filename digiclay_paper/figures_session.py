@@ -22,7 +22,14 @@ PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 
 
 def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the heights of the same cells, and the total force, side by side for both methods."""
+    """Draw the heights of the same cells, and the total force, side by side for both methods.
+
+    Parameters
+    ----------
+    sessions : mapping of str to Session
+        By method.
+    title : str
+    """
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM
     names = [f"{name} ({x:.0f}, {y:.0f})" for name, (x, y) in zip(LETTERS, spots, strict=False)]
@@ -62,7 +69,13 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
 
 
 def details(results: Results, title: str) -> Any:
-    """Draw a detail of the heights in the session: the first press, and what swings during the lift."""
+    """Draw a detail of the heights in the session: the first press, and what swings during the lift.
+
+    Parameters
+    ----------
+    results : Results
+    title : str
+    """
     shown = _detailed(results)
     with canvas(13.5, 7.6, title) as (figure, place):
         wide = 13.5 / len(shown)
@@ -117,7 +130,14 @@ def _swinging(time: Any, height: Any) -> Any:
 
 
 def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the final surfaces in relief and from above, side by side for both methods."""
+    """Draw the final surfaces in relief and from above, side by side for both methods.
+
+    Parameters
+    ----------
+    sessions : mapping of str to Session
+        By method.
+    title : str
+    """
     with canvas(13.5, 9.6, title) as (figure, place):
         for column, method in enumerate(METHODS):
             history, left = sessions[method].history, 6.6 * column
@@ -145,7 +165,14 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 
 def profiles(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw sections through the final surfaces, formed and asked for."""
+    """Draw sections through the final surfaces, formed and asked for.
+
+    Parameters
+    ----------
+    sessions : mapping of str to Session
+        By method.
+    title : str
+    """
     found = {method: list(sections(sessions[method])) for method in METHODS}
     count = len(found[METHODS[0]])
     with canvas(13.5, 8.6, title) as (figure, place):

@@ -72,7 +72,15 @@ def _plain(text: str) -> str:
 
 
 def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> str:
-    """Return rows as CSV, numbers with six digits."""
+    """Return rows as CSV, numbers with six digits.
+
+    Parameters
+    ----------
+    rows : iterable of iterables
+        Values of each row.
+    columns : iterable of str
+        Names of the columns.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)

@@ -39,7 +39,16 @@ QUICKER: Device = {
 
 
 def blister(method: str, height: float, profile: str) -> Scene:
-    """Return a scene that presses, and raises or sinks a blister with a profile to `height`, m."""
+    """Return a scene that presses, and raises or sinks a blister with a profile to `height`, m.
+
+    Parameters
+    ----------
+    method : str
+    height : float
+        Of the finger's lowest point over the bed at rest while it holds, m.
+    profile : str
+        Of the blister.
+    """
     table = _table(method, 17, {}, {"profile": profile})
     there = 1.7 + abs(height + PRESS) / GENTLY
     points = [(0.0, 1e-3), (1.3, -PRESS), (1.7, -PRESS), (there, height), (there + 0.6, height)]
@@ -103,7 +112,13 @@ def _with_path(found: Scene, points: list[tuple[float, float]]) -> Scene:
 
 
 def slowed(session: Scene, factor: float) -> Scene:
-    """Return a session that takes `factor` times as long."""
+    """Return a session that takes `factor` times as long.
+
+    Parameters
+    ----------
+    session : Scene
+    factor : float
+    """
     way = tuple(replace(point, time=factor * point.time) for point in session.trajectory.waypoints)
     return replace(
         session,

@@ -31,7 +31,14 @@ Told = Callable[[str], None]
 
 
 def simulate(extent: Extent, told: Told) -> Results:
-    """Simulate all of it; `told` hears what comes next, and may raise KeyboardInterrupt."""
+    """Simulate all of it; `told` hears what comes next, and may raise KeyboardInterrupt.
+
+    Parameters
+    ----------
+    extent : Extent
+        How many speeds and gains.
+    told : callable
+    """
     results = Results()
     for method in METHODS:
         told(f"blisters, {method}")
@@ -107,7 +114,17 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
 
 
 def sessions(results: Results, told: Told, session: str = SESSION) -> None:
-    """Run the paper's session at its times, and again slowly where a method loses the finger."""
+    """Run the paper's session at its times, and again slowly where a method loses the finger.
+
+    Parameters
+    ----------
+    results : Results
+        Takes them in.
+    told : callable
+        Hears what comes next.
+    session : str
+        The sample scene.
+    """
     for method in METHODS:
         told(f"the paper's session, {method}")
         found = load(find(session), [Setting("control.method", method)])

@@ -37,7 +37,16 @@ Told = Callable[[str], None]
 
 
 def vary(results: Results, extent: Extent, told: Told) -> None:
-    """Run the drags of every variant, and locate a finger under noise."""
+    """Run the drags of every variant, and locate a finger under noise.
+
+    Parameters
+    ----------
+    results : Results
+        Takes them in.
+    extent : Extent
+    told : callable
+        Hears what comes next.
+    """
     for variant, (setting, methods) in VARIANTS.items():
         for method in methods:
             for name in extent.ways:
@@ -52,7 +61,16 @@ def vary(results: Results, extent: Extent, told: Told) -> None:
 
 
 def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Trial]:
-    """Run a drag, and return what it came to, and the whole of it."""
+    """Run a drag, and return what it came to, and the whole of it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its device and method.
+    way : Drag
+    speed : float
+        m/s.
+    """
     follows, done = followed(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = done.between(start, end)

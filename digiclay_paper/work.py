@@ -31,6 +31,14 @@ SURFACES = "fig10_surfaces"
 def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
     """Simulate, draw and write into an existing folder; return the claims' verdicts as lines.
 
+    Parameters
+    ----------
+    folder : Path
+    extent : Extent
+        How many speeds and gains.
+    told : callable
+        Hears what comes next.
+
     Raises
     ------
     OutputError

@@ -30,7 +30,15 @@ RESOLVED = 100
 
 
 def draw_map(axes: Any, history: History, title: str) -> None:
-    """Draw the final heights from above, with a colour bar."""
+    """Draw the final heights from above, with a colour bar.
+
+    Parameters
+    ----------
+    axes : Axes
+    history : mapping of str to array_like
+        Needs `position` and `height`.
+    title : str
+    """
     from mpl_toolkits.axes_grid1 import make_axes_locatable
 
     pins, top, rows, columns = _thinned(history)
@@ -55,7 +63,15 @@ def draw_map(axes: Any, history: History, title: str) -> None:
 
 
 def draw_path(axes: Axes, history: History) -> None:
-    """Draw where the fingertip went: a line in contact, dots while lifted."""
+    """Draw where the fingertip went: a line in contact, dots while lifted.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of `draw_map`, in mm.
+    history : mapping of str to array_like
+        Needs `fingertip` and `total_force`.
+    """
     from matplotlib.patheffects import withStroke
 
     touching = in_contact(array(history, "total_force"))[:, None]
@@ -70,7 +86,14 @@ def draw_path(axes: Axes, history: History) -> None:
 
 
 def draw_relief(axes: Any, history: History) -> None:
-    """Draw the final surface in three dimensions, lit from the left, equal scale on all axes."""
+    """Draw the final surface in three dimensions, lit from the left, equal scale on all axes.
+
+    Parameters
+    ----------
+    axes : Axes3D
+    history : mapping of str to array_like
+        Needs `position` and `height`.
+    """
     from matplotlib import colormaps
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -120,11 +143,26 @@ def _thinned(history: History) -> tuple[Floats, Floats, int, int]:
 
 
 def ends(values: Floats, least: float) -> tuple[float, float]:
-    """Return the ends of a scale, `least` apart at least: what does not vary still gets one."""
+    """Return the ends of a scale, `least` apart at least: what does not vary still gets one.
+
+    Parameters
+    ----------
+    values : ndarray
+        Any shape, in the unit of the scale.
+    least : float
+        In the same unit.
+    """
     spare = max(0.0, 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - spare, float(values.max()) + spare
 
 
 def array(history: History, name: str) -> Floats:
-    """Return one array of the history as float64."""
+    """Return one array of the history as float64.
+
+    Parameters
+    ----------
+    history : mapping of str to array_like
+    name : str
+        Its key in the history.
+    """
     return np.asarray(history[name], dtype=np.float64)

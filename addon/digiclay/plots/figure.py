@@ -37,7 +37,17 @@ STYLE: dict[str, Any] = {
 
 @contextmanager
 def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known: Any) -> Iterator[Figure]:
-    """Give an empty figure, its size in inches, in a style that also holds for what is drawn on it."""
+    """Give an empty figure, its size in inches, in a style that also holds for what is drawn on it.
+
+    Parameters
+    ----------
+    width, height : float
+        Inches.
+    style : mapping
+        Matplotlib's rc parameters.
+    **known
+        More arguments of `matplotlib.figure.Figure`.
+    """
     try:
         from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -52,7 +62,15 @@ def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known
 
 @contextmanager
 def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figure, Any]]:
-    """Give an empty figure, and what places axes on it (label, then a box in inches)."""
+    """Give an empty figure, and what places axes on it (label, then a box in inches).
+
+    Parameters
+    ----------
+    width, height : float
+        Inches.
+    title : str
+        Upper left; none when empty.
+    """
     with empty(width, height) as figure:
         if title:
             figure.text(0.3 / width, 1.0 - 0.33 / height, title, fontsize=14, fontweight="bold")
@@ -65,7 +83,14 @@ def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figur
 
 
 def legend_above(axes: Axes, columns: int = 6) -> None:
-    """Put the legend on the line of the title, where it hides nothing."""
+    """Put the legend on the line of the title, where it hides nothing.
+
+    Parameters
+    ----------
+    axes : Axes
+    columns : int
+        Of the legend.
+    """
     close = {"handlelength": 1.4, "columnspacing": 1.2, "handletextpad": 0.5, "borderaxespad": 0.0}
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=columns, **close)
 
@@ -75,6 +100,12 @@ def save(figure: Figure, out: str | Path) -> Path:
 
     As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else as
     a PNG. What an artist marks as rasterized is pixels in an SVG.
+
+    Parameters
+    ----------
+    figure : Figure
+    out : str or Path
+        Ends with .svg, or with anything else for a PNG.
     """
     content, path = io.BytesIO(), Path(out)
     if path.suffix == ".svg":

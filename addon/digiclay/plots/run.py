@@ -33,12 +33,28 @@ FIGURES = (
 
 
 def session(history: History, out: str | Path, set_point: SetPoint | None) -> Path:
-    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    """Write `session_figure` as a PNG and return its path; OutputError when it cannot be written.
+
+    Parameters
+    ----------
+    history : mapping of str to array_like
+    out : str or Path
+        The PNG.
+    set_point : SetPoint or None
+        Force asked for; None where none is.
+    """
     return save(session_figure(history, set_point), out)
 
 
 def surface(history: History, out: str | Path) -> Path:
-    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    """Write `surface_figure` as a PNG and return its path; OutputError when it cannot be written.
+
+    Parameters
+    ----------
+    history : mapping of str to array_like
+    out : str or Path
+        The PNG.
+    """
     return save(surface_figure(history), out)
 
 

@@ -33,7 +33,19 @@ LABELS = 12
 
 
 def picture(columns: Sequence[Column], name: str, values: Floats, out: str | Path) -> Path:
-    """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written."""
+    """Write `sweep_figure` as a PNG and return its path; OutputError when it cannot be written.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        The varied parameters.
+    name : str
+        Of the metric.
+    values : ndarray
+        One dimension a column; NaN where a point failed or has no such figure.
+    out : str or Path
+        The PNG.
+    """
     return save(sweep_figure(columns, name, values), out)
 
 
