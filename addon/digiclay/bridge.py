@@ -1,4 +1,4 @@
-"""Between numpy and Blender: the one file that knows arrays, metres, attributes and poses alike."""
+"""Conversion between numpy and Blender: arrays, lengths, attributes and poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line: ``digiclay``, ``python -m digiclay``, and ``blender --command digiclay``.
+"""Command line: ``digiclay``, ``python -m digiclay``, and ``blender --command digiclay``.
 
 What the commands need is imported in `main`, where Ctrl-C is looked after already.
 """

@@ -1,4 +1,4 @@
-"""``blender --command digiclay``: the command line, run by Blender with the extension as it is installed."""
+"""Command line in Blender: ``blender --command digiclay`` with the installed extension."""
 
 from __future__ import annotations
 

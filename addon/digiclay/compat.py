@@ -1,4 +1,4 @@
-"""Blender's module and the differences between its versions 4.2 to 5.2, in one place."""
+"""Differences between Blender 4.2 to 5.2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user sets once for all beds: how often the view is drawn, its colours, how far a tick catches up."""
+"""Preferences of all beds: redraw rate, colours, control periods to catch up in a tick."""
 
 # No postponed annotations here: Blender reads the preferences' properties from them.
 from dataclasses import dataclass

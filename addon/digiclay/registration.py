@@ -1,4 +1,4 @@
-"""What the extension adds to Blender, in the order it is added; taken back in the opposite order."""
+"""Registration of the extension in Blender, in order, and its reverse."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The commands of the command line, one file each: arguments in, core called, outcome shown."""
+"""Commands of the command line, one file each: arguments, call of the core, output."""

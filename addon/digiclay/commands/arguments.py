@@ -1,4 +1,4 @@
-"""Arguments several commands take."""
+"""Arguments of several commands."""
 
 from __future__ import annotations
 

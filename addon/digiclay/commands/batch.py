@@ -1,4 +1,4 @@
-"""``digiclay batch``: scenes × methods × settings in the background, on several processes."""
+"""``digiclay batch``: a job series in the background, on several processes."""
 
 from __future__ import annotations
 

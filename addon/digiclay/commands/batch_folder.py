@@ -1,4 +1,4 @@
-"""A batch's folder: the jobs' files, their finished runs, their logs, and the page about them."""
+"""Folder of a job series: files of the jobs, finished runs, logs, and the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay run --budget``: tells what the scene does without, and the error measured then."""
+"""``digiclay run --budget``: report of the omitted parts and of the measured error."""
 
 from __future__ import annotations
 

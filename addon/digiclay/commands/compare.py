@@ -1,4 +1,4 @@
-"""``digiclay compare``: several control methods on the same input, their metrics side by side."""
+"""``digiclay compare``: metrics of several control methods on the same input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay describe``: what stands at each place of a scene, and what it costs."""
+"""``digiclay describe``: parts and null parts of a scene, and their cost."""
 
 from __future__ import annotations
 

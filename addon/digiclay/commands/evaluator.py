@@ -1,4 +1,4 @@
-"""Processes that evaluate bundles of a sweep, one after the other: what starts them, and what they run.
+"""Processes that evaluate bundles of a sweep in turn: their start and their loop.
 
 Bundles come in by standard input, records go out by standard output, as pickles.
 """

@@ -1,4 +1,4 @@
-"""What a command leaves behind for whoever started it."""
+"""Exit codes of the commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay export``: what was formed in a finished run, as mesh files."""
+"""``digiclay export``: the formed surface of a run as mesh files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made of a session besides its folder; what a stop has left out is named, with what makes it."""
+"""Files of a command beside the run folder; names of those that an interruption prevents."""
 
 from __future__ import annotations
 

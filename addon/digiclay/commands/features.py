@@ -1,4 +1,4 @@
-"""``digiclay features``: the bosses and creases a finished run has formed, listed."""
+"""``digiclay features``: list of the bosses and creases of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay form``: a shape in, clay, a finger, a shape out."""
+"""``digiclay form``: display of a shape, forming, and export."""
 
 from __future__ import annotations
 

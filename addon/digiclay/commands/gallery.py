@@ -1,4 +1,4 @@
-"""The index page of a batch: one HTML file that needs nothing but itself, links aside."""
+"""Index page of a job series: one self-contained HTML file."""
 
 from __future__ import annotations
 

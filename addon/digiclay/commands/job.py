@@ -1,4 +1,4 @@
-"""``digiclay job``: one job of a batch, from its own two files alone."""
+"""``digiclay job``: one job of a series, from its two files alone."""
 
 from __future__ import annotations
 

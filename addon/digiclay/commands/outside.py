@@ -1,4 +1,4 @@
-"""Commands that are not part of the extension: ``digiclay paper`` and ``digiclay benchmark``.
+"""Commands outside the extension: ``digiclay paper`` and ``digiclay benchmark``.
 
 The paper's reproduction is a package of its own beside this one, which adds the command itself where it
 is installed. Here stands what is said where it is not, and where the benchmarks are.

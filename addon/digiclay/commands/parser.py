@@ -1,4 +1,4 @@
-"""The parser of all commands: what may be written behind ``digiclay``."""
+"""Parser of all commands."""
 
 from __future__ import annotations
 

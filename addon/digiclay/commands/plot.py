@@ -1,4 +1,4 @@
-"""``digiclay plot``: heights and force of a finished run over time, and its surface, as pictures."""
+"""``digiclay plot``: heights and force of a run over time, and its surface, as pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Progress on a terminal: one line, drawn over again and again, gone in the end; nothing elsewhere."""
+"""Progress line on a terminal, redrawn in place and removed at the end."""
 
 from __future__ import annotations
 

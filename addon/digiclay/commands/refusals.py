@@ -1,4 +1,4 @@
-"""What is refused before any work, because it is bound to fail after it."""
+"""Refusal of commands that are bound to fail, before any work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay render``: a picture, a turntable or a film of a finished run, drawn by Blender."""
+"""``digiclay render``: picture, turntable or film of a run, drawn by Blender."""
 
 from __future__ import annotations
 

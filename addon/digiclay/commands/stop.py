@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM ask a session to stop; what was computed is kept."""
+"""Stop of a session by Ctrl-C or SIGTERM, with the computed rows kept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options of what is made of a run's surface: its skin, and what counts as a feature."""
+"""Options of the formed surface: skin and features."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``digiclay sweep``: a scene at many points of its parameters, on all cores of this machine."""
+"""``digiclay sweep``: a scene over a grid of parameter values, on all cores of this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The small picture by which a run is known on an index page."""
+"""Thumbnail of a run on an index page."""
 
 from __future__ import annotations
 

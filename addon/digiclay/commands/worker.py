@@ -1,4 +1,4 @@
-"""Processes that do the work of a series on this machine: how they are started, and asked to stop.
+"""Worker processes of a series on this machine: start and stop.
 
 Each runs this program once more, and stops when its standard input ends: so it does when it is asked to,
 and when whoever started it has died.

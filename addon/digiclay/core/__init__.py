@@ -1,1 +1,1 @@
-"""The simulation core: numpy only, no Blender, imports strictly down the levels of docs/architecture.md."""
+"""Simulation core: numpy only, no Blender, imports strictly down the levels of docs/architecture.md."""

@@ -1,4 +1,4 @@
-"""Stand-ins for what a scene leaves out: they own no state and compute nothing."""
+"""Null parts, which replace omitted parts: no state, no computation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a session is from the exact solution: integrated once more, more finely, under the same commands.
+"""Error estimate of a session: second, finer integration under the same commands.
 
 The commands are those the session gave, so what differs is the integration alone. Richardson's
 form is more accurate than the other methods and cannot blow up: a method that did does not

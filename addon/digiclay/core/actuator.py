@@ -1,4 +1,4 @@
-"""The fluidic cylinder under each pin (equations 1 and 2)."""
+"""Fluidic cylinder under each pin (equations 1 and 2)."""
 
 from __future__ import annotations
 

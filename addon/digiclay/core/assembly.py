@@ -1,4 +1,4 @@
-"""From a scene to the system that simulates it: each place gets its part, or a stand-in that does nothing.
+"""Assembly of a scene's system: a part or a null part at each interface.
 
 Modules of parts that a scene may leave out are imported where the part is put in.
 """

@@ -1,4 +1,4 @@
-"""What varies in a sweep: axes as a line of text says them, the points over them, and columns of numbers."""
+"""Axes of a sweep: their text form, the points over them, and columns of numbers."""
 
 from __future__ import annotations
 

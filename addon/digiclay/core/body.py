@@ -1,4 +1,4 @@
-"""A triangle mesh on its way into a file or into Blender."""
+"""Triangle mesh for a file or for Blender."""
 
 from __future__ import annotations
 

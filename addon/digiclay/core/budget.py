@@ -1,4 +1,4 @@
-"""What a scene can do without, within a budget of height error: tried, measured, and left out if it fits.
+"""Omission of model parts within a budget of height error, tried and measured.
 
 Each omission is tried by itself, the controller acting on what it then sees, in step with the
 full scene. Those that fit are added one after another, the one that saves most work for its

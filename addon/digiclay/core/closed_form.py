@@ -1,4 +1,4 @@
-"""The exact solution of a loaded cell's equation over a step with frozen coefficients.
+"""Exact solution of a loaded cell's equation over a step with frozen coefficients.
 
 An exponential spring behind a linear flow resistance. All is dimensionless: the exponent
 ``e = m (x - x0)`` of the indentation x, time s in steps (0 to 1). While the finger presses,

@@ -1,4 +1,4 @@
-"""The conduit between valve and cylinder: Hagen-Poiseuille, in series with the valve (equation 8)."""
+"""Conduit between valve and cylinder: Hagen-Poiseuille, in series with the valve (equation 8)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The fingertip's pulp over one cell: an exponential spring (equation 11)."""
+"""Pulp over one cell: an exponential spring (equation 11)."""
 
 from __future__ import annotations
 

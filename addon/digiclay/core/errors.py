@@ -1,4 +1,4 @@
-"""What can go wrong, said in one line: owner, field, rule and value."""
+"""Errors with a message of one line: owner, field, rule and value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sessions of a sweep's points: which run in one stack and which alone, and what is kept of each."""
+"""Evaluation of a sweep's points: batches, single runs, and their results."""
 
 from __future__ import annotations
 

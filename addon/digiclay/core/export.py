@@ -1,4 +1,4 @@
-"""Bodies as mesh files: STL, OBJ, PLY, GLB and 3MF, each whole or not at all."""
+"""Mesh files of bodies: STL, OBJ, PLY, GLB and 3MF, each complete or not at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is exported of a formed surface: its skin, a solid, the pins, or its features."""
+"""Bodies of a formed surface for export: skin, solid, pins, or features."""
 
 from __future__ import annotations
 

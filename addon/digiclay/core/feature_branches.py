@@ -1,4 +1,4 @@
-"""The branches of a skeleton, between the pins where it ends and those where three or more ways meet."""
+"""Branches of a skeleton, between ends and junctions."""
 
 from __future__ import annotations
 

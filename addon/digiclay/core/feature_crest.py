@@ -1,4 +1,4 @@
-"""Crests: the lines along the top of a boss, or the bottom of a crease, to a fraction of a pitch.
+"""Crests: lines along the top of a boss or the bottom of a crease, to a fraction of a pitch.
 
 The pins along the top give their number and their order (feature_skeleton, feature_network). Each line is
 then drawn through the middle of the feature's sections, and ends where its spine does: half the width at half

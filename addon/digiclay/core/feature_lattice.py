@@ -1,4 +1,4 @@
-"""The pins of a bed as a lattice: who stands beside whom, and heights between them."""
+"""Lattice of the pins: neighbours, and heights between them."""
 
 from __future__ import annotations
 

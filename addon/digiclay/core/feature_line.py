@@ -1,4 +1,4 @@
-"""The line along the top of one feature, to a fraction of a pitch: through the middle of its sections."""
+"""Line along the top of one feature, through the middle of its sections."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lines of a skeleton: branches between ends and junctions, and the crests they make together.
+"""Network of a skeleton: branches between ends and junctions, and the crests they form.
 
 A branch that does not reach out of the flank it stands on is none. At a junction the branches go on into each
 other where they do so straightest: a cross is two lines, and the third branch of a T ends at the other two.

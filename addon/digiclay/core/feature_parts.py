@@ -1,4 +1,4 @@
-"""The parts of a feature: a mound that stands on a ridge is one by itself, and the ridge goes on under it.
+"""Division of a feature into parts, such as a ridge and the mound on it.
 
 Along a crest the ridge is a straight line of heights that most of the crest keeps to and little of it lies
 below. What rises above that line, by much and for a short way, is a mound. Places belong to the part that is

@@ -1,4 +1,4 @@
-"""Parts of a skin, cut out along contours: where it is off its former place, and nearer to one top."""
+"""Regions of a skin, cut along contours: off the former surface, and nearest to one top."""
 
 from __future__ import annotations
 

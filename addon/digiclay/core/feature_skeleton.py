@@ -1,4 +1,4 @@
-"""The pins along the top of a feature: what is left when it is taken off from its lowest pin upwards.
+"""Skeleton of a feature: the pins that remain when it is thinned from its lowest pin upwards.
 
 A pin is taken off as long as that neither parts what is left nor opens a hole in it, the lowest first, on
 whatever side it stands; one at the end of a line stays. What is left is one pin wide, runs along the top,

@@ -1,4 +1,4 @@
-"""Features as closed bodies, to be added to or cut from another model."""
+"""Features as closed bodies, for addition to or subtraction from another model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formed features: the bosses and creases of a surface, found, measured and named."""
+"""Features of a formed surface: bosses and creases, found, measured and named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A lock that one process holds at a time, and that ends with it however it ends."""
+"""File lock of one process, which ends with the process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrays that hold one number over and over.
+"""Cached constant arrays.
 
 Numpy takes two operands of one shape twice as fast as an array and a number, and at the few
 hundred cells under and around a finger it is the calls that cost.

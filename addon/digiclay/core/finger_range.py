@@ -1,4 +1,4 @@
-"""How hard and how deep a finger is pressed where its contact law is known, and what to say beyond."""
+"""Range of force and depth of the contact law, and the message beyond it."""
 
 from __future__ import annotations
 

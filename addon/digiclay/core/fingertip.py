@@ -1,4 +1,4 @@
-"""The fingertip as an ellipsoid, seen from below: its underside over each cell.
+"""Fingertip ellipsoid: its underside over each cell.
 
 Beyond nine tenths of the way to its rim the ellipsoid is continued by the paraboloid
 that meets it with equal slope. The ellipsoid itself ends there with infinite slope; the

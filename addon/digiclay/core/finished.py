@@ -1,4 +1,4 @@
-"""A finished run, read back from its folder."""
+"""Finished run, read from its folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The working fluid."""
+"""Working fluid."""
 
 from __future__ import annotations
 

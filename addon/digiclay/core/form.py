@@ -1,4 +1,4 @@
-"""From a shape to a formed one: how long a bed takes to display it, and a finger that finds it."""
+"""Forming of a shape: duration of its display, and a fingertip path to its highest part."""
 
 from __future__ import annotations
 

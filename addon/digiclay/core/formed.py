@@ -1,4 +1,4 @@
-"""A formed surface: the pins as they are, and as they were before."""
+"""Formed surface: the pins now and before."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cells take part in a period, and taking them out of the bed and putting them back.
+"""Active set of cells: its selection, and the transfer of its rows out of the bed and back.
 
 A cell takes part if the finger may touch it, the controller commands it, or it still moves:
 its valve is not shut, a command is on its way, or a force acts on it. All others stay

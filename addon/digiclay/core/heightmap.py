@@ -1,4 +1,4 @@
-"""A shape as a map of heights: a grid of values, seen as a surface over its pixels."""
+"""Height map: a shape as a grid of values, bilinear over its pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures as maps of heights: dark is low, light is high.
+"""Pictures as height maps: dark is low, light is high.
 
 Outside Blender, Pillow reads them. Blender reads them with what it has itself, which knows EXR as
 well: its part of the program puts a reader into `READERS`.

@@ -1,4 +1,4 @@
-"""What is made of a job's run: exports, stills, turntables and films; as a value, a table and a text."""
+"""Outputs of a job's run: exports, stills, turntables and films; as a value, a table and a text."""
 
 from __future__ import annotations
 

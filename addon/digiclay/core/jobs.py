@@ -1,4 +1,4 @@
-"""Batches: scenes × methods × settings, read from a JOBS file into jobs that need nothing else.
+"""Jobs of a JOBS file: scenes × methods × settings, each self-contained.
 
 A job's folder holds ``scene.toml``, every parameter of its session, and ``job.toml``, what is
 made of the run. Whoever has that folder and this package can do the job, on any machine.

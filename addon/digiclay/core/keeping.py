@@ -1,4 +1,4 @@
-"""A state as bytes, to be kept where a session is saved, and taken up again bit for bit.
+"""Snapshot of a state as bytes, restored bit for bit.
 
 A short header in JSON says what follows; then come the arrays, little-endian. The
 controller's memory is written by its structure and rebuilt after the memory a session of the

@@ -1,4 +1,4 @@
-"""A controller's memory by its structure: numbers, enumerations, arrays, and named tuples of them."""
+"""Snapshot of a controller's memory: numbers, enumerations, arrays, and named tuples of them."""
 
 from __future__ import annotations
 

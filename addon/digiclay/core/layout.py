@@ -1,4 +1,4 @@
-"""The bed of cells: how many, how far apart, and which of them lie near a point."""
+"""Layout of the bed: number and spacing of the cells, and the cells near a point."""
 
 from __future__ import annotations
 

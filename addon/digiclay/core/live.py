@@ -1,4 +1,4 @@
-"""What a live session adds to a simulation: the clock on the wall, and a finger that is read now and then.
+"""Clock of a live session: due control periods, and the fingertip path between ticks.
 
 The wall's clock says how many whole control periods are due. A machine that is too slow for
 them leaves some out and says so by its real-time factor; it never falls behind for good.

@@ -1,4 +1,4 @@
-"""3MF files, the format of printers: a zip of XML that names its unit; an object a body."""
+"""3MF files: a zip of XML with its unit; an object a body."""
 
 from __future__ import annotations
 

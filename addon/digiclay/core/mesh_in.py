@@ -1,4 +1,4 @@
-"""Meshes from files, all of a file in one: what is too large, cut off or refers elsewhere is refused first.
+"""Mesh input: all meshes of a file as one; oversized, truncated and external files are refused first.
 
 OBJ, glTF and 3MF are read here; STL, PLY and OFF, which refer to nothing else, by trimesh.
 """

@@ -1,4 +1,4 @@
-"""STL, PLY and OFF files looked at before they are read: whether they hold what their heads promise."""
+"""Checks of STL, PLY and OFF files against their headers, before reading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large a mesh may be that is read, and how its refusal is worded."""
+"""Size limits of input meshes, and the messages of their refusal."""
 
 from __future__ import annotations
 

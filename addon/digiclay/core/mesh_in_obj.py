@@ -1,4 +1,4 @@
-"""Wavefront OBJ files read: vertices and faces of all objects; what is not shape is passed over.
+"""Reading of Wavefront OBJ files: vertices and faces of all objects.
 
 Materials are not opened.
 """

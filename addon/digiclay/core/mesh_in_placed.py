@@ -1,4 +1,4 @@
-"""Meshes put where a file's items or nodes place them, and joined to one."""
+"""Transformation of meshes by a file's items or nodes, and their union."""
 
 from __future__ import annotations
 

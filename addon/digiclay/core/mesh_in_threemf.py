@@ -1,4 +1,4 @@
-"""3MF files read: a zip of XML parts; the build's items, each an object or components of others.
+"""Reading of 3MF files: a zip of XML parts; the build's items, each an object or components of others.
 
 Read as a stream and with what Python brings along. A document type, which is where XML names what
 is to be put in elsewhere, is refused: 3MF forbids it.

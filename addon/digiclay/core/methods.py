@@ -1,4 +1,4 @@
-"""The control methods a scene can name: one row a method, one module each."""
+"""Control methods of a scene: one row a method, one module each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session is judged by: pure functions on the arrays of a history.
+"""Metrics of a session: pure functions on the arrays of a history.
 
 Averages are over time, by the trapezium rule: a row stands for half of the intervals on
 either side of it, so histories with uneven rows are judged alike. *In contact* are the

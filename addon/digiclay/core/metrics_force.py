@@ -1,4 +1,4 @@
-"""What a session is judged by on its total force alone: deviation, loss of contact, first touch."""
+"""Metrics of the total force: deviation, contact loss, first touch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session is judged by along the finger's path: contact, lag, and the heights it leaves behind."""
+"""Metrics along the fingertip path: contact, lag, and the heights behind it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one signal over time is judged by: averages, overshoot, settling, oscillation."""
+"""Metrics of one signal over time: averages, overshoot, settling, oscillation."""
 
 from __future__ import annotations
 

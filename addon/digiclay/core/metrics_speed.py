@@ -1,4 +1,4 @@
-"""The fastest finger a method can follow: a straight drag or a lift, and a bisection on its speed."""
+"""Largest tracking speed of a control method: a straight drag or a lift, with a bisection on its speed."""
 
 from __future__ import annotations
 

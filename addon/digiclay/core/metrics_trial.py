@@ -1,4 +1,4 @@
-"""A session whose controller is listened to: what is measured, and when it lost the finger."""
+"""Trial session with an observed controller: its measurements and the instants of loss."""
 
 from __future__ import annotations
 

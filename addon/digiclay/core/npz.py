@@ -1,4 +1,4 @@
-"""Arrays in numpy's files, looked at by their heads before anything of them is unpacked."""
+"""Headers of numpy files, checked before unpacking."""
 
 from __future__ import annotations
 

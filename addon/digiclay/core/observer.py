@@ -1,4 +1,4 @@
-"""A force observer: what presses on a pin, told from its height and its commands alone."""
+"""Force observer: force on a pin from its height and its commands alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of TOML files, read into a part's parameters; what is wrong is told in one line."""
+"""Parameters of a part from a TOML table, with errors of one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One cell's continuous physics, in the order of the paper: from touch to flow to motion."""
+"""Continuous physics of one cell, in the order of the paper: from touch to flow to motion."""
 
 from __future__ import annotations
 

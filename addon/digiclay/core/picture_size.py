@@ -1,4 +1,4 @@
-"""How large a picture says it is, read from its head: nothing of it is unpacked."""
+"""Size of a picture, read from its header without unpacking."""
 
 from __future__ import annotations
 

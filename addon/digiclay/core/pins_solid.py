@@ -1,4 +1,4 @@
-"""The stepped bed as one printable body: every pin a prism over its own part of the bed.
+"""Stepped bed as one printable body: a prism for every pin.
 
 The parts are those that are nearest to a pin: squares in an aligned bed, hexagons in a shifted one. Where
 neighbours differ in height a wall stands between them. Two squares that meet at a corner only, and are

@@ -1,4 +1,4 @@
-"""The places on the line from fingertip to pins, as protocols.
+"""Interfaces of the parts between fingertip and pins, as protocols.
 
 A place holds either the real part or a stand-in from `absent` that owns no state and
 computes nothing. Parts hold parameters only: state is handed in and handed back.

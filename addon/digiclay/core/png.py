@@ -1,4 +1,4 @@
-"""PNG files, written with what Python has: small pictures where neither Blender nor matplotlib is at hand."""
+"""PNG writer for small pictures, without Blender or matplotlib."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a ray meets the pins, and what of a finger that is pressed there would touch them."""
+"""Intersection of a ray with the pins, and the contact of a fingertip pressed there."""
 
 from __future__ import annotations
 

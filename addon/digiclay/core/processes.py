@@ -1,4 +1,4 @@
-"""Processes of this machine: which one made something, and whether it still runs."""
+"""Processes of this machine: identity and life."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session leaves behind: the arrays of ``history.npz``."""
+"""Recorder of a session: the arrays of ``history.npz``."""
 
 from __future__ import annotations
 

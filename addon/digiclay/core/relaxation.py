@@ -1,4 +1,4 @@
-"""The pulp relaxes: quasi-linear viscoelasticity by Prony filters (equations 10, 12 to 14)."""
+"""Relaxation of the pulp: quasi-linear viscoelasticity by Prony filters (equations 10, 12 to 14)."""
 
 from __future__ import annotations
 

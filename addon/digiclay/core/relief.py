@@ -1,4 +1,4 @@
-"""What a shape from outside is to the bed: a top surface that can be asked for at every pin."""
+"""Relief: the top surface of an external shape, sampled at every pin."""
 
 from __future__ import annotations
 

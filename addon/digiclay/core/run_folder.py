@@ -1,4 +1,4 @@
-"""A run's folder: claimed when the run starts, it appears whole, under its own name, or not at all."""
+"""Run folder: locked at the start of a run, and complete under its name or absent."""
 
 from __future__ import annotations
 

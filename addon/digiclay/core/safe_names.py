@@ -1,4 +1,4 @@
-"""Names of folders from whatever a user names: safe on every file system, and no two alike."""
+"""Folder names for user-defined names: valid on every file system, and unique."""
 
 from __future__ import annotations
 

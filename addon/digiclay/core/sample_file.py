@@ -1,4 +1,4 @@
-"""Files a user names: a sample by its name, anything else by its path."""
+"""Files by user input: a sample by its name, anything else by its path."""
 
 from __future__ import annotations
 

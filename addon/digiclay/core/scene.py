@@ -1,4 +1,4 @@
-"""A scene: every part of a session with its parameters, as one value that is valid once built."""
+"""Scene: all parameters of a session as one valid value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scene files: found by path or by name, read, overridden, and told of in one line when they are wrong."""
+"""Scene files: search by path or name, reading, overrides, errors of one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes as tables: what a scene file says, to a `scene.Scene` and back to text."""
+"""Conversion between scene files' tables and `scene.Scene`."""
 
 from __future__ import annotations
 

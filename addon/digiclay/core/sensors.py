@@ -1,4 +1,4 @@
-"""What keeps the controller from knowing the true forces and heights: noise, quantisation, delay.
+"""Sensor model: noise, quantisation and delay of forces and heights.
 
 Each is a small part around another, so a scene puts together what it wants:
 ``Delayed(Quantised(Noisy(PerfectSensors())))``, and `observer.ValveObserver` in between. A

@@ -1,4 +1,4 @@
-"""A series: pieces of work in one folder, such as a sweep's points or a batch's jobs.
+"""Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
 
 Its folder is made once, gone on with after a stop, and worked in by one process at a time. What is left
 of its pieces is done by an executor; each is kept as soon as it is done.

@@ -1,4 +1,4 @@
-"""A session from scene to results: run it, judge it, write its folder."""
+"""Session from scene to results: simulation, metrics, run folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The force a control method asks for: of all cells together, or of each cell that follows the finger."""
+"""Set point of a control method: force of all cells together, or of each following cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section [shape] of a scene: what the bed displays before the finger comes, and how it is fitted."""
+"""Section [shape] of a scene: the shape displayed before the fingertip arrives, and its placement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes from files: sample shapes by name, meshes, pictures, and arrays of numpy's."""
+"""Shapes from files: samples by name, meshes, pictures, and numpy arrays."""
 
 from __future__ import annotations
 

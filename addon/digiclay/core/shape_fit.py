@@ -1,4 +1,4 @@
-"""A shape laid onto a bed: its plan fitted, its relief scaled, what leaves the stroke clipped and counted."""
+"""Placement of a shape on a bed: fit of the plan, scale of the relief, clipping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small holes of an open mesh, such as a scan: the pins under them get their heights from around."""
+"""Filling of small holes of an open mesh, such as a scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A shape as a mesh: its top surface by rays that go down through it along the pins' axes."""
+"""Mesh as a shape: its top surface by rays along the axes of the pins."""
 
 from __future__ import annotations
 

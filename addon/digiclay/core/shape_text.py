@@ -1,4 +1,4 @@
-"""The heights of a bed as a text: what a scene file, or a property in Blender, keeps of a shape."""
+"""Heights of a bed as text, for scene files and Blender properties."""
 
 from __future__ import annotations
 

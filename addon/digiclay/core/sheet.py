@@ -1,4 +1,4 @@
-"""A skin over formed pins, together with the same skin over the pins as they were before."""
+"""Skin over the formed pins, and the same skin over the former ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a picture or film of a session is to look like, and which recorded rows it shows; no Blender."""
+"""Render settings of a picture or film: appearance and rows shown; no Blender."""
 
 from __future__ import annotations
 

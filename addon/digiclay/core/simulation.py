@@ -1,4 +1,4 @@
-"""One control period after another: the line from fingertip to pins."""
+"""Simulation of control periods: from fingertip to pins."""
 
 from __future__ import annotations
 

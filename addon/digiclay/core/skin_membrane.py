@@ -1,4 +1,4 @@
-"""A stretched skin that lies on the flat ends of the pins: Laplace's equation between them."""
+"""Membrane skin: Laplace's equation between the flat ends of the pins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skins over the pin tops: what the surface is between them.
+"""Skins over the pin tops: interpolation between them.
 
 A skin divides every pitch into the same number of parts, along the rows and across them; between two rows
 that are shifted against each other the points shift along. Every pin top is one of its points. There

@@ -1,4 +1,4 @@
-"""Whether a test holds for some of a few hundred cells, and for how many.
+"""Fast tests for any true value in arrays of a few hundred cells, and their count.
 
 A period asks half a dozen times, and numpy's own functions take twice as long to say it.
 """

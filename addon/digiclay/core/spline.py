@@ -1,4 +1,4 @@
-"""Monotone cubic splines, many at once: they rise where their knots rise, and overshoot nowhere.
+"""Monotone cubic splines, many at once, without overshoot.
 
 The slope at a knot is the weighted harmonic mean of the slopes on both sides, and 0 where these differ in
 sign: F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants,

@@ -1,4 +1,4 @@
-"""What a session is at one instant, as a value: handed in to a step and handed back.
+"""State of a session at one instant, as a value.
 
 All that belongs to a cell is a row of one array, so that a part that is left out owns no
 row. The few cells that take part in a period are taken out of that array and kept out,

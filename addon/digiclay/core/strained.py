@@ -1,4 +1,4 @@
-"""A closed-form step of any size: under loads that decide how a valve flows, or with a finger that jumps.
+"""Closed-form step under extreme loads, and with fingertip jumps.
 
 `closed_form.pressed` holds where every flow is laminar and no exponential overflows. Elsewhere the secant
 conductance is taken at the load of mid step, all is solved on logarithms, and what comes out is held within

@@ -1,4 +1,4 @@
-"""The two reservoirs, and which of them an opening connects to."""
+"""High and low reservoir, selected by the sign of the opening."""
 
 from __future__ import annotations
 

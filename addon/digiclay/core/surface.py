@@ -1,4 +1,4 @@
-"""The formed surface: a skin over the pin tops, and the closed solid under it.
+"""Formed surface: a skin over the pin tops, and the closed solid under it.
 
 The skin is structured. Between two neighbouring rows every four pins, two of each row,
 make a cell of the skin that is cut in two along one of its diagonals. Nothing but the

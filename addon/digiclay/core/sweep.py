@@ -1,4 +1,4 @@
-"""A sweep's folder: what it is, one small file for each finished point, and the table of all."""
+"""Folder of a sweep: its definition, one small file a finished point, and the table of all."""
 
 from __future__ import annotations
 

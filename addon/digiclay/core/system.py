@@ -1,4 +1,4 @@
-"""All that does not change in a session, put together for a bed."""
+"""System of a session: all parts and constants of a bed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A take: the finger's path through a session, kept so that it can be played again bit for bit.
+"""Take: initial state and fingertip path of a session, replayed bit for bit.
 
 The path is a pose at the start and one at the end of every control period, between which the
 finger goes straight; that and the state at the start decide all that follows. The state at

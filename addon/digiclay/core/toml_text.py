@@ -1,4 +1,4 @@
-"""TOML from outside: what would take a reader much more memory than the text has letters is refused first."""
+"""Size check of external TOML text, before parsing."""
 
 from __future__ import annotations
 

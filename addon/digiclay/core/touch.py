@@ -1,4 +1,4 @@
-"""From the finger's pose to the force on each pin (equations 10 to 14)."""
+"""Contact: from the fingertip's pose to the force on each pin (equations 10 to 14)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The last seconds of a live session: total force, set point, and the heights of picked pins."""
+"""Ring buffer of a live session: total force, set point, and heights of picked pins."""
 
 from __future__ import annotations
 

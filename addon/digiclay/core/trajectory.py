@@ -1,4 +1,4 @@
-"""The finger's path: waypoints with times, joined smoothly or by straight lines."""
+"""Fingertip path: waypoints with times, joined smoothly or by straight lines."""
 
 from __future__ import annotations
 

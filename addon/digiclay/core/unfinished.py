@@ -1,4 +1,4 @@
-"""What is being written stands under a name of its own, and is taken away when its process is gone."""
+"""Temporary names of unfinished files, and removal of those of ended processes."""
 
 from __future__ import annotations
 

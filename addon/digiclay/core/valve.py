@@ -1,4 +1,4 @@
-"""The cell's valve: a two-branch orifice law between a reservoir and the cell (equations 3 to 7)."""
+"""Valve of a cell: a two-branch orifice law between a reservoir and the cell (equations 3 to 7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The valve follows its command with a first-order lag (equation 9)."""
+"""Valve lag: first-order response to the command (equation 9)."""
 
 from __future__ import annotations
 

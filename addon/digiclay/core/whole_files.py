@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and small JSON files."""
+"""Atomic file writing, and small JSON files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The device as Blender shows it: bed, pins, fingertip, colours and arrows."""
+"""Device in Blender: bed, pins, fingertip, colours and arrows."""

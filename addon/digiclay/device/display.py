@@ -1,4 +1,4 @@
-"""What is shown of a bed, as properties of the bed: colours, arrows, overlay, picked pins.
+"""Display properties of a bed: colours, arrows, overlay, picked pins.
 
 Colours and arrows are settings of the bed's geometry nodes; these properties read and write
 them there, so that there is one place they stand in.

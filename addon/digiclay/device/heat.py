@@ -1,4 +1,4 @@
-"""The force on a pin as a colour: a dozen levels, told apart by people with any colour vision.
+"""Force colours of pins: a dozen levels, distinct for any colour vision.
 
 Levels rather than a gradient, because a pin wears one of a few materials: that shows in Solid
 view, in Workbench and in Cycles alike. Numpy only, no Blender.

@@ -1,4 +1,4 @@
-"""One recorded instant of a bed: what the view shows and the renderer draws. No Blender in here."""
+"""Recorded instant of a bed, for view and renderer; no Blender."""
 
 from __future__ import annotations
 

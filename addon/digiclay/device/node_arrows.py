@@ -1,4 +1,4 @@
-"""The part of a bed's geometry nodes that draws an arrow on every pin that something presses."""
+"""Geometry nodes of a bed for the force arrows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of a bed's geometry nodes that colours the pins by the force on them."""
+"""Geometry nodes of a bed for the force colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The geometry nodes that draw a bed: a pin on every vertex, stretched down to the deck, and the housing."""
+"""Geometry nodes of a bed: a pin on every vertex, down to the deck, and the housing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small steps with which node trees are built, so that each tree's own file says only what it draws."""
+"""Helpers for node trees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours of the control modes, told apart by people with any colour vision: three sets to choose from."""
+"""Palettes of the modes: three sets, distinct for any colour vision."""
 
 from __future__ import annotations
 

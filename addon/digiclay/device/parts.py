@@ -1,4 +1,4 @@
-"""The objects the device is made of: their shapes, materials and roles."""
+"""Objects of the device: shapes, materials and roles."""
 
 from __future__ import annotations
 

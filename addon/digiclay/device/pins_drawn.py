@@ -1,4 +1,4 @@
-"""Whether the pins a bed shows are those its layout describes."""
+"""Comparison of the pins in a bed's mesh with its layout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shapes the device is drawn with, as vertices and faces. Numpy only, no Blender."""
+"""Primitive shapes of the device, as vertices and faces; numpy only, no Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bed made anew after its settings: other pins, another housing, the same object and fingertip."""
+"""Rebuild of a bed after a change of its settings, with the same object and fingertip."""
 
 from __future__ import annotations
 

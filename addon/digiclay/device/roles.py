@@ -1,4 +1,4 @@
-"""What the objects of a device are marked with; their names are the user's to change."""
+"""Role marks of the objects of a device, independent of their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bed and its fingertip as one: what a copy lacks, what a deleted bed leaves behind, what is hidden along.
+"""Unit of a bed and its fingertip after copy, delete and hide.
 
 Blender copies, deletes and hides the objects that are selected, not those that belong to them. Here is told
 what is missing or left over then, and it is put right; when that happens is up to `unit_watch`.

@@ -1,4 +1,4 @@
-"""When beds and their fingertips are looked after: soon after something was added, deleted, hidden or undone.
+"""Watch of beds and fingertips: after objects are added, deleted, hidden or restored by undo.
 
 What is put right makes an undo step of its own, behind that of what the user did. Undo and redo go past the
 step between the two, in which a part is missing or left over: to the user it is one step. Without a window

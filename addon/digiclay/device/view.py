@@ -1,4 +1,4 @@
-"""The device in Blender: a bed of instanced pins, its housing and the fingertip.
+"""Device in Blender: a bed of instanced pins, its housing and the fingertip.
 
 A bed is one mesh with a vertex a pin. Geometry nodes put a pin on every vertex and pick,
 by the integer attribute ``mode`` or by the force, the one that wears the right material:

@@ -1,1 +1,1 @@
-"""Shapes into the bed, and meshes out of it."""
+"""Shape input and mesh output in Blender."""

@@ -1,4 +1,4 @@
-"""A body of the core as a mesh of Blender, with its values as attributes and its groups as vertex groups."""
+"""Body of the core as a Blender mesh, with attributes and vertex groups."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bed in Blender as a formed surface: its pins now, and as they were when its owner last kept them."""
+"""Bed in Blender as a formed surface: its pins now and at the stored former instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures read by Blender itself, EXR and HDR among them: it has no Pillow."""
+"""Reading of pictures by Blender, EXR and HDR included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A shape onto a bed in Blender: from an object or a file, displayed by driving its pins there."""
+"""Display of a shape on a bed in Blender, from an object or a file."""
 
 from __future__ import annotations
 

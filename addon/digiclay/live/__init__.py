@@ -1,1 +1,1 @@
-"""Sessions that run: the loop, its ticks, and what the .blend keeps of them."""
+"""Live sessions: the loop, its ticks, and their data in the .blend."""

@@ -1,4 +1,4 @@
-"""What a bed's object keeps of its session: properties that copies, appends, undo and files carry along."""
+"""Session data on a bed's object: properties that copies, appends, undo and files include."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Blender tells the running sessions: undo, redo, saving, and that their file or the extension goes.
+"""Blender's handlers for live sessions: undo, redo, save, load, and removal of the extension.
 
 The handlers are there only while a session runs.
 """

@@ -1,4 +1,4 @@
-"""Keys of a running session, to be changed in Blender's preferences like all others."""
+"""Keys of a live session, adjustable in Blender's preferences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one loop that drives all sessions: its timer, and its words in the status bar."""
+"""Loop of all live sessions: its timer, and its text in the status bar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is recorded stands in the file when that is saved, and is left for recovery when the file goes away.
+"""Recovery of recordings: stored with the file, or for recovery when the file is closed.
 
 A recording under way is a value of this Blender, not of the file, until it ends: then it is a take. So a
 file that is saved meanwhile, also by Blender itself, has it as a take for the moment of saving. And a file

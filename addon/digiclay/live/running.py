@@ -1,4 +1,4 @@
-"""Which beds have a session running, and what such a session is at one moment. No Blender in here."""
+"""Live sessions and their beds, as values; no Blender."""
 
 from __future__ import annotations
 

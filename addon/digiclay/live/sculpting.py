@@ -1,4 +1,4 @@
-"""What happens to a running session: it begins, follows the finger, goes back. No Blender in here."""
+"""Start, advance and rewind of a live session; no Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A stroke of the Press tool: the path a hand has drawn over the bed, and the finger that goes along it.
+"""Press stroke: the drawn path, and the fingertip along it.
 
 The hand draws in its own time, and the finger follows later, in the session's: it comes from above,
 presses to its depth where the mouse went down, goes along the whole path, never ahead of the hand and

@@ -1,4 +1,4 @@
-"""The strokes of a session that its finger has not finished: queued, drawn on, taken in turn."""
+"""Queue of unfinished press strokes of a session."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A tick of the running sessions: Blender's objects are read, the sessions go on, the beds are written.
+"""Tick of the live sessions: Blender's objects in, simulation, beds out.
 
 No reference to Blender's data outlives a tick: undo and loading invalidate them all.
 """

@@ -1,4 +1,4 @@
-"""The bed of a session, and what keeps a session from going on, with words that say what to do."""
+"""Bed of a session, and the reason for which a session waits."""
 
 from __future__ import annotations
 

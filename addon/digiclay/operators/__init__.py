@@ -1,4 +1,4 @@
-"""What a user can do in Blender, and the menus it stands in.
+"""Operators and menus.
 
 No module here postpones its annotations: Blender reads an operator's properties from them.
 """

@@ -1,4 +1,4 @@
-"""What the operators share: a poll that says why not, errors that are reported, the file browser."""
+"""Common parts of the operators: polls with a reason, reported errors, file browser."""
 
 # No postponed annotations in this package: Blender reads an operator's properties from them.
 from typing import Any

@@ -1,4 +1,4 @@
-"""Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed after its settings."""
+"""Add > Mesh > Digital Clay: a bed of pins at rest and its fingertip; Rebuild: a bed from its settings."""
 
 from typing import Any
 

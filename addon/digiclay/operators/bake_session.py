@@ -1,4 +1,4 @@
-"""Bake a take, or the session an animated fingertip would make, into the bed; and take a bake away."""
+"""Bake of a take, or of an animated fingertip, into the bed; removal of a bake."""
 
 from collections.abc import Generator
 from typing import Any

@@ -1,4 +1,4 @@
-"""File > Export > Digital Clay: what was formed in a bed as a mesh file."""
+"""File > Export > Digital Clay: the formed surface of a bed as a mesh file."""
 
 from pathlib import Path
 from typing import Any

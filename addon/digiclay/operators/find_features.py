@@ -1,4 +1,4 @@
-"""List the features of a bed in the panel, and choose the surface they are measured from."""
+"""List of a bed's features, and selection of the former surface."""
 
 from typing import Any
 

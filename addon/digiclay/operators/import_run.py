@@ -1,4 +1,4 @@
-"""File > Import > Digital Clay run: one instant of a finished run as a bed."""
+"""File > Import > Digital Clay run: one instant of a run as a bed."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Work that takes a while: in a window it shows its progress and Esc ends it; elsewhere it is just done."""
+"""Long work with progress and Esc in a window, without them elsewhere."""
 
 from __future__ import annotations
 

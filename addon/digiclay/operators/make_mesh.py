@@ -1,4 +1,4 @@
-"""Make Mesh: what was formed in a bed as new mesh objects, to go on with in Blender."""
+"""Make Mesh: the formed surface of a bed as new mesh objects."""
 
 from collections.abc import Iterator
 from typing import Any

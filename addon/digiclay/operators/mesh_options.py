@@ -1,4 +1,4 @@
-"""Properties of the operators that make meshes of a formed surface: what is made, and what is a feature."""
+"""Operator properties of the formed surface: kind of mesh, features."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Scene files and samples as beds: from the Add menu, the file dialog, or dropped into the 3D view."""
+"""Scene files and samples as beds: Add menu, file dialog, drop into the 3D view."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Pick pins in the view, so that the overlay shows their heights."""
+"""Selection of the pins whose heights the overlay shows."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Why an operator cannot run now: each function of the context returns a message, or an empty text.
+"""Reasons for disabled operators: each function returns a message, or an empty text.
 
 `Action.poll_message` joins them by ``or``, so that Blender shows the first that holds.
 """

@@ -1,4 +1,4 @@
-"""Presets of a device: applying one, saving one's own, removing one's own."""
+"""Presets of a device: apply, save, remove."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""The Press tool's operator: what the hand draws while the button is held is queued for the session."""
+"""Operator of the Press tool: path of the mouse while the button is held, queued for the session."""
 
 import time
 from dataclasses import replace

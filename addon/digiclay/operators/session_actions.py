@@ -1,4 +1,4 @@
-"""What can be done to a session that runs: pause, step, stop, rewind, reset; and to a bed at rest: reset."""
+"""Actions on a live session: pause, step, stop, rewind, reset; on a bed at rest: reset."""
 
 from dataclasses import replace
 from typing import Any

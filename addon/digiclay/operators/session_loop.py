@@ -1,4 +1,4 @@
-"""The modal part of a session: it ticks, ends with Esc, and now and then lets Blender save by itself.
+"""Modal operator of the live sessions: ticks, Esc, and Blender's auto save.
 
 Blender postpones its automatic saving for as long as any modal operator runs, so a session of an hour
 would be lost in a crash. The operator therefore ends for a moment every so often, and is started anew.

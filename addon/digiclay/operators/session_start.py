@@ -1,4 +1,4 @@
-"""Start a session: the bed follows its fingertip, however that is moved, until Esc is pressed."""
+"""Start of a live session: the bed follows its fingertip until Esc."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Shapes onto a bed: from an object of the scene, from a file, or one of the samples."""
+"""Shapes for a bed: from an object, a file, or a sample."""
 
 from pathlib import Path
 from typing import Any

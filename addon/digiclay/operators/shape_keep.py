@@ -1,4 +1,4 @@
-"""What is formed becomes the bed's shape; and a bed's shape is taken away again."""
+"""Formed surface as the bed's shape; removal of a bed's shape."""
 
 from dataclasses import replace
 from typing import Any

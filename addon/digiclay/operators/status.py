@@ -1,4 +1,4 @@
-"""What an operator that goes on says in the status bar: in the workspace that is shown, and nowhere after it.
+"""Status bar text of a modal operator, in the visible workspace only.
 
 Blender keeps such words with a workspace, and a modal operator outlives the one it was started in.
 """

@@ -1,4 +1,4 @@
-"""Takes: record one in a session, keep it, write it as a scene file for `digiclay run`, remove it."""
+"""Actions on takes: record, keep, write as a scene file for `digiclay run`, remove."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Play a take again: the finger and the pins go through it once more, and the end is compared bit for bit."""
+"""Replay of a take, with a comparison of its end state bit for bit."""
 
 import time
 from typing import Any

@@ -1,1 +1,1 @@
-"""The overlay of a running session: force, heights, modes, speed and error."""
+"""Overlay of a live session: force, heights, modes, speed and error."""

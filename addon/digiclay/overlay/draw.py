@@ -1,4 +1,4 @@
-"""The overlay's marks, and the patch under the Press tool's cursor, drawn by Blender's gpu module."""
+"""Drawing of the overlay, and of the patch under the Press tool's cursor, by Blender's gpu module."""
 
 from __future__ import annotations
 

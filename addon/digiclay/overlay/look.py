@@ -1,4 +1,4 @@
-"""The overlay's colours: whatever the theme, letters and curves stand out from what is behind them.
+"""Colours of the overlay, with contrast in any theme.
 
 Numpy only, no Blender.
 """

@@ -1,4 +1,4 @@
-"""What the overlay draws, as plain marks in pixels: boxes, lines, dots and words. No Blender in here."""
+"""Overlay as plain marks in pixels: boxes, lines, dots and text; no Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the overlay stands in a view, and which of its sections there is room for. No Blender in here."""
+"""Placement of the overlay in a view, and of its sections; no Blender."""
 
 from __future__ import annotations
 

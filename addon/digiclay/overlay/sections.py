@@ -1,4 +1,4 @@
-"""The sections of the overlay: head, force against set point, colours, heights of picked pins, modes.
+"""Sections of the overlay: head, force and set point, colours, heights of picked pins, modes.
 
 Each says how tall it is and draws itself. No Blender in here.
 """

@@ -1,4 +1,4 @@
-"""The overlay in the 3D views: what the paper's tool shows of a running session, drawn while one runs.
+"""Overlay in the 3D views during live sessions.
 
 The draw handler is there only while a session runs whose bed wants it: an overlay that is off
 costs nothing. Whoever starts or ends a session calls `follow`.

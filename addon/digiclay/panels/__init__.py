@@ -1,4 +1,4 @@
-"""The tab "Digital Clay" in the 3D view's sidebar: its panels draw only."""
+"""Panels of the tab "Digital Clay" in the 3D view's sidebar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sub-panel Display: colours, arrows, and what the overlay shows."""
+"""Sub-panel Display: colours, arrows, and content of the overlay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the panels share: where they stand, and which bed they are about."""
+"""Common parts of the panels: location and bed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels Session and Takes: start and stop, how the session fares, and what was recorded in it."""
+"""Panels Session and Takes: start and stop, speed and error, recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels Device, Finger and Control: presets, the method, and a sub-panel of parameters for each part."""
+"""Panels Device, Finger and Control: presets, method, and a sub-panel of parameters for each part."""
 
 from __future__ import annotations
 

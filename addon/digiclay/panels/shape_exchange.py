@@ -1,4 +1,4 @@
-"""Panels Shapes and Export: what the bed displays to begin with, and how what was formed leaves it."""
+"""Panels Shapes and Export: initial shape of the bed, export of the formed surface."""
 
 from __future__ import annotations
 

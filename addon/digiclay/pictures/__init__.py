@@ -1,1 +1,1 @@
-"""Stills, turntables and films, drawn from recorded states."""
+"""Stills, turntables and films from recorded states."""

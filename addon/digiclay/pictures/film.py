@@ -1,4 +1,4 @@
-"""Films from recorded states: a session with its force strip, or a formed bed that turns once about itself.
+"""Films from recorded states: a session with its force plot, or a rotating formed bed.
 
 Nothing is simulated here. Every frame is drawn into a picture of its own, and Blender's
 sequencer makes the film of them: so a stop between two frames loses nothing but the film.

@@ -1,4 +1,4 @@
-"""A film's file: the frames it is made of, and the MP4 that Blender's sequencer makes of them."""
+"""Film file: its frames, and the MP4 from Blender's sequencer."""
 
 from __future__ import annotations
 

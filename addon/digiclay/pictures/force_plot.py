@@ -1,4 +1,4 @@
-"""The strip at a film's lower edge: total force over time, its set point, and where the film is."""
+"""Force plot at a film's lower edge: total force over time, set point, current instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written in a picture before the device: the plane for it, and the legend of the colours."""
+"""Legend of the colours in a picture, on a plane in front of the device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything about a picture but the device: camera, lights, floor; and the legend before it."""
+"""Stage of a picture: camera, lights, floor, legend."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A still of one instant, drawn in the background without touching the user's scene."""
+"""Still of one instant, drawn in the background beside the user's Blender scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bed in a plot: its final heights from above and in relief, and the finger's path over it."""
+"""Plots of the bed: final heights from above and in relief, with the fingertip path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metrics of several methods side by side."""
+"""Plot of the metrics of several methods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all plots share: an empty figure in one style, its colours, its legend, a picture written whole.
+"""Common parts of all plots: style, colours, legend, writing.
 
 matplotlib is imported where it is used, and drawn with its Agg canvas only: no window, no
 global state. Colours are Okabe and Ito's palette and cividis, told apart by people with

@@ -1,4 +1,4 @@
-"""Where the numbers and names on the axes of a relief stand, so that none hides another."""
+"""Axis labels of a relief plot, placed without overlap."""
 
 from __future__ import annotations
 

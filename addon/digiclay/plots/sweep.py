@@ -1,4 +1,4 @@
-"""Pictures of a sweep: a line with markers over one axis, a heat map over two."""
+"""Plots of a sweep: a line with markers over one axis, a heat map over two."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The Press tool: the fingertip under the mouse."""
+"""Press tool: the fingertip under the mouse."""

@@ -1,4 +1,4 @@
-"""What the mouse points at: which bed of a view, and where on its pins."""
+"""Aim of the mouse: the bed of a view, and the point on its pins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Press tool in the 3D view's toolbar, and the patch it shows under the mouse."""
+"""Press tool in the 3D view's toolbar, and its patch under the mouse."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Takes and bakes: what is kept of a session besides its state."""
+"""Takes and bakes."""

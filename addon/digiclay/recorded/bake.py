@@ -1,4 +1,4 @@
-"""Baking a session into the bed: ordinary animation that plays and renders without the simulation."""
+"""Bake of a session into the bed: ordinary animation, played and rendered without the simulation."""
 
 from __future__ import annotations
 

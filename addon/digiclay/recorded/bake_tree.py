@@ -1,4 +1,4 @@
-"""The geometry nodes that play a bake: every pin takes the height, mode and force it had at a moment.
+"""Geometry nodes that play a bake: height, mode and force of every pin at a moment.
 
 A bake is one mesh with a vertex for every pin at every moment, moment after moment. It is
 ordinary Blender data: it is saved in the file, and plays and renders without this extension.

@@ -1,4 +1,4 @@
-"""The takes of a bed, kept in the .blend with it: copies, appends and undo carry them along."""
+"""Takes of a bed in the .blend: properties that copies, appends and undo include."""
 
 from __future__ import annotations
 

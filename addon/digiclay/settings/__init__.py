@@ -1,1 +1,1 @@
-"""The settings of a bed: every parameter of the core, as Blender's properties."""
+"""Settings of a bed: every parameter of the core as a Blender property."""

@@ -1,4 +1,4 @@
-"""Blender's properties, made from the one declaration each parameter of the core has.
+"""Blender properties from the declarations of the core's parameters.
 
 A property shows its parameter in the unit a person reads, with the unit in its label, the bounds
 as its range, and meaning, symbol, bounds and default in its tooltip.

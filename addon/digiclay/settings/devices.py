@@ -1,4 +1,4 @@
-"""Which device a new bed is: a preset, a bed's plan and a method, as one valid scene."""
+"""Device of a new bed: preset, layout and method as one valid scene."""
 
 from __future__ import annotations
 

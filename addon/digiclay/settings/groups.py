@@ -1,4 +1,4 @@
-"""The property groups of a bed's settings, and what choosing a preset, a method or a layout sets along."""
+"""Property groups of a bed's settings, and the effects of presets, methods and layouts on them."""
 
 from __future__ import annotations
 

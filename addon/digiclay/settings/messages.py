@@ -1,4 +1,4 @@
-"""A parameter's error, in the words of the panels: labels for names, and the units a person reads."""
+"""Parameter errors in the terms of the panels: labels and display units."""
 
 from __future__ import annotations
 

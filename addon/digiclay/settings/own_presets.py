@@ -1,4 +1,4 @@
-"""The presets a user has saved: scene files in the extension's own folder, which hold data and no code."""
+"""User presets: scene files in the extension's folder, data only."""
 
 from __future__ import annotations
 

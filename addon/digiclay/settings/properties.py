@@ -1,4 +1,4 @@
-"""The settings of a bed: every parameter of its scene, kept in the .blend as `Object.digiclay`.
+"""Settings of a bed: every parameter of its scene, in the .blend as `Object.digiclay`.
 
 A scene is made of them and of nothing else, so what the panels show is what is simulated.
 """

@@ -1,4 +1,4 @@
-"""Between SI, which the core computes in, and the units a person reads: mm, ms, bar."""
+"""Conversion between SI and display units: mm, ms, bar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between a part's parameters in SI and its property group in Blender, without losing a digit.
+"""Conversion between a part's parameters in SI and its property group, without loss of digits.
 
 Blender keeps numbers in 32 bits and within their range. Where that is not all of an adopted value, the
 value itself is noted down, and holds for as long as the property stays as it was written.

@@ -1,1 +1,1 @@
-"""Controllers: strategies that turn measurements into valve commands."""
+"""Control methods: from measurements to valve commands."""

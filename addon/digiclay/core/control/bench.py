@@ -1,4 +1,4 @@
-"""What a controller may know of the device it controls."""
+"""Data of the device that a controller may use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The blister: the bump or dent under the finger, between the virtual master and the surface around it."""
+"""Blister: heights between the virtual master and the surrounding surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Method II: every cell decides by its own force what it is (Fig. 5 of the paper).
+"""Method II: a state machine in every cell, driven by its own force (Fig. 5 of the paper).
 
 No coordinator: a cell pressed hard enough follows the force, its neighbours become a blister
 around it, those of them that feel the finger follow the force in turn, and so the contact

@@ -1,4 +1,4 @@
-"""Moving a pin at a wanted speed, to a wanted height, or as a force asks: what the behaviours share.
+"""Pin motion by speed, height or force: common part of the behaviours.
 
 A valve's flow goes with the square of its opening, so a height control that is proportional in the
 opening comes in like 1/t. Here the opening is worked out from the wanted speed instead, by the flow law

@@ -1,4 +1,4 @@
-"""Elastic: a pressed pin gives way like a spring, and springs back."""
+"""Elastic behaviour: a pressed pin yields like a spring and returns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Force display: every cell under the finger presses back with the force a field asks of it."""
+"""Force display: a commanded field of forces under the fingertip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a shape to the finger: the bed displays a shape, then the scene's own method takes over."""
+"""Handover from the display of a shape to the control method of the scene."""
 
 from __future__ import annotations
 

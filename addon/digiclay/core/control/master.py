@@ -1,4 +1,4 @@
-"""The virtual master of Method I: its gains and thresholds, and what it remembers."""
+"""Virtual master of Method I: gains, thresholds and memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VM Model: the virtual master's cylinder and valve, like a real cell's, without load."""
+"""Cylinder and valve of the virtual master: a cell without load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cells are neighbours, and what flows between them."""
+"""Neighbouring cells, and the exchange between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the sensors' noise hides from a controller: thresholds that follow it, and set points it would hide.
+"""Noise floor of the sensors: thresholds above it, refusal of set points below it.
 
 The floor is the force from which on one reading is no noise, five standard deviations of a cell's sensor
 (`sensors.Sensing.force_floor`); 0 with sensors without noise. Touch is told cell by cell: a sum of n readings

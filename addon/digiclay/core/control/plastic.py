@@ -1,4 +1,4 @@
-"""Plastic: a pin pressed harder than it yields gives way, and stays at the deepest press."""
+"""Plastic behaviour: a pin above its yield force gives way and keeps its lowest height."""
 
 from __future__ import annotations
 

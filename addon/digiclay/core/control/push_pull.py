@@ -1,4 +1,4 @@
-"""Pin push and pull: a touch shows in commanded less measured height; no force is ever read.
+"""Push and pull: contact from commanded less measured height, without a force sensor.
 
 A shut valve locks its pin, and a locked pin does not give: nothing would show. So the pins near the hand
 listen: their valves open a little to the high and to the low reservoir in turn. A free pin ends every such

@@ -1,4 +1,4 @@
-"""Recorded commands, played again: what is left is the integration."""
+"""Replay of recorded commands, without a controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shape display: all cells go to given heights, in one of three ways of refreshing the surface."""
+"""Shape display: given heights for all cells, with three methods of refresh."""
 
 from __future__ import annotations
 

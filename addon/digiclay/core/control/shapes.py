@@ -1,4 +1,4 @@
-"""Shapes by name, or from a file: what a bed displays, as heights or as forces."""
+"""Named shapes and shape files, as heights or forces of a display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What both tracking methods share: how cells follow their height, and when the finger has a direction."""
+"""Common part of the tracking methods: height control of cells, direction of the fingertip."""
 
 from __future__ import annotations
 

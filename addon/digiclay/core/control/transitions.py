@@ -1,4 +1,4 @@
-"""Method II's states and the arrows between them: Fig. 5 of the paper as a table.
+"""States of Method II and their transitions: Fig. 5 of the paper as a table.
 
 The paper's *virtual spring* state is a cell at rest, one that holds a formed height, one
 pressed a little, or one at the edge: all four obey the same spring.

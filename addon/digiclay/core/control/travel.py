@@ -1,4 +1,4 @@
-"""Which way the finger travels, and which cells it leaves behind (Fig. 6 of the paper).
+"""Direction of the fingertip, and the cells behind it (Fig. 6 of the paper).
 
 The direction is settled by distance travelled, not by speed: a finger that slows down or
 rests keeps its direction, and what it has formed is not called back.

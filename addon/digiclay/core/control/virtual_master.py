@@ -1,4 +1,4 @@
-"""Method I: a virtual master cell under the finger leads the blister (Fig. 3 of the paper).
+"""Method I: a virtual master cell under the fingertip that leads the blister (Fig. 3 of the paper).
 
 Locate, control, model, create: where the finger presses; a virtual spring until the force
 reaches its set point, then force control; a cylinder and valve like a real one turns the

@@ -1,4 +1,4 @@
-"""Viscous: a pressed pin sinks slowly, draws its neighbours along, and recovers slowly.
+"""Viscous behaviour: a pressed pin sinks slowly, displaces its neighbours, and recovers slowly.
 
 What Materiable calls viscosity: every cell a spring and a damper, and neighbours evened out.
 """

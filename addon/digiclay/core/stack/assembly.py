@@ -1,4 +1,4 @@
-"""From scenes to the stack that simulates them, and which scenes can stand in one stack."""
+"""Assembly of a batch from scenes, and their compatibility."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The beds of many runs at one instant."""
+"""State of a batch at one instant."""
 
 from __future__ import annotations
 

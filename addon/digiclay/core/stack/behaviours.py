@@ -1,4 +1,4 @@
-"""The elastic and the plastic behaviour for many runs at once: `control.elastic` and `control.plastic`.
+"""Elastic and plastic behaviour of a batch: `control.elastic` and `control.plastic`.
 
 See there for what they do and why.
 """

@@ -1,4 +1,4 @@
-"""Parts of many runs as one part, whose numbers are arrays: one value a run; and linear maps likewise."""
+"""Parts of a batch as one part, with one value a run; and linear maps likewise."""
 
 from __future__ import annotations
 

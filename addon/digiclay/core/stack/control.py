@@ -1,4 +1,4 @@
-"""Controllers of many runs: what a stack asks of them, and one for methods that know single runs only."""
+"""Controllers of a batch, and the adapter of controllers for single runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The fingers of many runs: how they come, their undersides, and which cells they pass over."""
+"""Fingertips of a batch: paths, undersides, and the cells below them."""
 
 from __future__ import annotations
 

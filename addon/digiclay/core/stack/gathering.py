@@ -1,4 +1,4 @@
-"""Which cells take part in a period, in many beds at once: `core.gathering` with an axis for the runs.
+"""Active set of a batch: `core.gathering` with an axis for the runs.
 
 The set is made anew for all runs together, as soon as it no longer does for one of them.
 """

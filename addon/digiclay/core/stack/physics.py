@@ -1,4 +1,4 @@
-"""The cells of many runs as one cell, and how a stepper that knows single runs moves them."""
+"""Cells of a batch as one set of cells, and their stepper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The histories many sessions leave behind.
+"""Histories of a batch.
 
 A history of all cells of all runs would fill the memory long before the stack is large enough: only the
 cells that take part are kept, until a history is asked for.

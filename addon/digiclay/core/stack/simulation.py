@@ -1,4 +1,4 @@
-"""One control period after another, of many runs at once: `core.simulation` with an axis for the runs."""
+"""Simulation of a batch's control periods: `core.simulation` with an axis for the runs."""
 
 from __future__ import annotations
 

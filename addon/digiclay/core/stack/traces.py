@@ -1,4 +1,4 @@
-"""What the metrics take of many sessions, row by row: they are judged without their histories."""
+"""Traces of a batch: sums of each row for the metrics, without histories."""
 
 from __future__ import annotations
 

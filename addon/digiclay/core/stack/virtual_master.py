@@ -1,4 +1,4 @@
-"""Method I for many runs at once: `control.virtual_master` with an axis for the runs.
+"""Method I for a batch: `control.virtual_master` with an axis for the runs.
 
 See there for what it does and why. Where a single run asks "if", here all runs go both ways, and
 `np.where` or a mask takes what holds.

@@ -1,4 +1,4 @@
-"""Sub-steps chosen cell by cell, so that heights keep within a tolerance.
+"""Adaptive stepper: sub-steps chosen cell by cell within a height tolerance.
 
 Each control period is done with whole steps and with half steps. Where the two differ by
 more than a cell may add to its error, that cell alone is done again with quarter steps, and

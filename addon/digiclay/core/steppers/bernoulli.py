@@ -1,4 +1,4 @@
-"""The closed-form step: exact for an exponential spring behind a linear flow resistance.
+"""Closed-form stepper: exact for an exponential spring behind a linear flow resistance.
 
 The valve's opening is known in closed form all through a period. Over a physics step its
 conductance, the force lost to relaxation and the finger's speed are frozen at their means, and

@@ -1,4 +1,4 @@
-"""What the closed-form step works out once: its maps from openings, finger and filters."""
+"""Constants of the closed-form step: maps from openings, fingertip and filters."""
 
 from __future__ import annotations
 

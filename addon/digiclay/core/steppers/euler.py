@@ -1,4 +1,4 @@
-"""The explicit method of Euler: the least one can do, and what others are measured by."""
+"""Euler's explicit method."""
 
 from __future__ import annotations
 

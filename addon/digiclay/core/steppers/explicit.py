@@ -1,4 +1,4 @@
-"""What the explicit methods share: they march through the segments on the rates as they stand."""
+"""Common part of the explicit steppers: march through the segments of a step."""
 
 from __future__ import annotations
 

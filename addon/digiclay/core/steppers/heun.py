@@ -1,4 +1,4 @@
-"""The trapezoidal predictor-corrector of Heun."""
+"""Heun's trapezoidal predictor-corrector method."""
 
 from __future__ import annotations
 

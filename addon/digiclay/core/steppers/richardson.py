@@ -1,4 +1,4 @@
-"""Richardson extrapolation of the closed-form step: one step against two halves.
+"""Richardson extrapolation of the closed-form step: one step and two halves.
 
 The closed-form step's error falls with the square of its length, so
 ``(4 fine - coarse) / 3`` is free of its leading term, and ``(fine - coarse) / 3`` is what the

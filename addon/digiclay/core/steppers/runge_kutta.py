@@ -1,4 +1,4 @@
-"""The classical fourth-order Runge-Kutta method."""
+"""Classical fourth-order Runge-Kutta method."""
 
 from __future__ import annotations
 
