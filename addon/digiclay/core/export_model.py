@@ -58,6 +58,12 @@ class Model(Parameters):
 def sheet(formed: Formed, model: Model) -> Sheet:
     """Return the skin a model asks for.
 
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+        Its skin and resolution.
+
     Raises
     ------
     ParameterError
@@ -72,7 +78,15 @@ def sheet(formed: Formed, model: Model) -> Sheet:
 
 
 def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
-    """Return the features of the skin a model asks for."""
+    """Return the features of the skin a model asks for.
+
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+        Its skin and resolution.
+    finding : Finding
+    """
     return find(sheet(formed, model), finding)
 
 

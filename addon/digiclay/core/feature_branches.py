@@ -61,7 +61,19 @@ class Network:
 
 
 def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
-    """Return the network of a skeleton: pins with three neighbours or more are junctions."""
+    """Return the network of a skeleton: pins with three neighbours or more are junctions.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours within the feature; -1 where there is none.
+    pins : ndarray of int (m,)
+        Those of the skeleton.
+    place : ndarray (k, 2)
+        Places of all pins of the feature, m.
+    half : ndarray (m,)
+        Half the feature's width at the pins of the skeleton, m.
+    """
     wide = dict(zip(pins.tolist(), half.tolist(), strict=True))
     around = _neighbours(beside, pins)
     cluster: dict[int, int] = {}

@@ -59,6 +59,12 @@ class Lattice:
         """Return what has a value at each pin, (n,), at places (..., 2), m; NaN beyond the bed.
 
         It is straight along each row, and then between two rows.
+
+        Parameters
+        ----------
+        values : ndarray (n,)
+        place : ndarray (..., 2)
+            m.
         """
         bed = self.formed
         first = bed.position[:: bed.columns]

@@ -46,7 +46,17 @@ class Field:
         return np.nan_to_num(self.lattice.at(self.off, place))
 
     def falls(self, place: Floats, way: Floats, level: Floats) -> Floats:
-        """Return how far it is to where the feature falls to a level, m."""
+        """Return how far it is to where the feature falls to a level, m.
+
+        Parameters
+        ----------
+        place : ndarray (k, 2)
+            Where to start, m.
+        way : ndarray (k, 2)
+            Unit vectors.
+        level : ndarray (k,)
+            m.
+        """
         return distance_to_level(self.lattice, self.off, place, way, level, self.most)
 
     def half_widths(self, place: Floats) -> Floats:
@@ -109,7 +119,15 @@ class Field:
         return line + shift[:, None] * aside
 
     def half_width(self, line: Floats, closed: bool) -> float:
-        """Return half the width at half the height, the median along a line."""
+        """Return half the width at half the height, the median along a line.
+
+        Parameters
+        ----------
+        line : ndarray (m, 2)
+            m.
+        closed : bool
+            Whether its ends are joined.
+        """
         _, left, right = self._sections(line, closed, 0.5)
         # Along the edge of the bed a feature has one flank only.
         half = np.where(np.isfinite(left + right), 0.5 * (left + right), np.minimum(left, right))
@@ -173,7 +191,15 @@ class Field:
 
 
 def even(points: Floats, step: float) -> Floats | None:
-    """Return points along a line at even steps, `step` apart at most; none of a line without length."""
+    """Return points along a line at even steps, `step` apart at most; none of a line without length.
+
+    Parameters
+    ----------
+    points : ndarray (m, 2)
+        m.
+    step : float
+        m.
+    """
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     if run[-1] < 1e-9:
         return None
@@ -186,6 +212,14 @@ def smoothed(line: Floats, times: int, closed: bool) -> Floats:
 
     Each point goes towards the middle of those beside it and a little further back again, so that an arc does
     not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
+
+    Parameters
+    ----------
+    line : ndarray (m, 2)
+        m.
+    times : int
+    closed : bool
+        Whether its ends are joined.
     """
     if len(line) < 4:
         return line

@@ -77,7 +77,17 @@ def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) 
 
 
 def reaches_out(points: Floats, half: float, pitch: float) -> bool:
-    """Tell whether a free branch is longer than the flank of the line it stands on."""
+    """Tell whether a free branch is longer than the flank of the line it stands on.
+
+    Parameters
+    ----------
+    points : ndarray (m, 2)
+        Of the branch, m.
+    half : float
+        Half the width of the line it stands on, m.
+    pitch : float
+        m.
+    """
     return length_of(points) > FLANK * half + 0.5 * pitch
 
 

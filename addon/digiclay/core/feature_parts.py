@@ -90,7 +90,14 @@ def parts(ridge: Ridge, least: float) -> tuple[Part, ...]:
 
 
 def nearest(places: Floats, every: tuple[Part, ...] | list[Part]) -> Floats:
-    """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k)."""
+    """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k).
+
+    Parameters
+    ----------
+    places : ndarray (k, 2)
+        m.
+    every : sequence of Part
+    """
     found = np.empty((len(every), len(places)))
     for number, part in enumerate(every):
         rows = max(1, CHUNK // len(part.core))

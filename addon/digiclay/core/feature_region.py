@@ -65,7 +65,14 @@ class Region:
 
 
 def components(count: int, edges: Indices) -> Indices:
-    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2)."""
+    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2).
+
+    Parameters
+    ----------
+    count : int
+    edges : ndarray of int (e, 2)
+        Pairs of points.
+    """
     label = np.arange(count, dtype=np.int32)
     while True:
         a, b = label[edges[:, 0]], label[edges[:, 1]]
@@ -98,6 +105,12 @@ def divided(region: Region, nearer: Floats) -> tuple[Region | None, Region | Non
     """Return the two parts of a region where a value at its points is above 0, and where it is not.
 
     Together they are the region; one may have nothing.
+
+    Parameters
+    ----------
+    region : Region
+    nearer : ndarray (k,)
+        The value at its points.
     """
     values = np.column_stack([region.place, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.

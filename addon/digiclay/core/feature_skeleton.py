@@ -29,7 +29,15 @@ AHEAD = 1.25
 
 
 def half_width(beside: Pins, on_bed: Flags) -> int:
-    """Return how many rings of pins can be taken off a feature, one at least; arguments as `skeleton`."""
+    """Return how many rings of pins can be taken off a feature, one at least; arguments as `skeleton`.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours within the feature; -1 where there is none.
+    on_bed : ndarray of bool (k, 8 or 6)
+        Where the bed goes on.
+    """
     inner, count = np.ones(len(beside), bool), 0
     while inner.any():
         # Where the bed ends the feature might go on.
@@ -41,7 +49,18 @@ def half_width(beside: Pins, on_bed: Flags) -> int:
 
 
 def rounded(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
-    """Return heights averaged with those of the neighbours, the ground's included, some times."""
+    """Return heights averaged with those of the neighbours, the ground's included, some times.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours within the feature; -1 where there is none.
+    on_bed : ndarray of bool (k, 8 or 6)
+        Where the bed goes on.
+    off : ndarray (k,)
+        Heights over the ground, m.
+    times : int
+    """
     count = on_bed.sum(axis=1)
     for _ in range(times):
         heights = np.where(beside >= 0, off[beside], 0.0)

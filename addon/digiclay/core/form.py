@@ -60,14 +60,31 @@ def display_time(display: ShapeDisplayControl) -> float:
 
 
 def summit(grid: Grid, heights: Floats) -> tuple[float, float]:
-    """Return the place of the highest cells that is nearest to the bed's middle, m."""
+    """Return the place of the highest cells that is nearest to the bed's middle, m.
+
+    Parameters
+    ----------
+    grid : Grid
+    heights : ndarray (n,)
+        m.
+    """
     high = np.flatnonzero(heights >= heights.max() - NEARLY * np.ptp(heights))
     cell = int(high[np.argmin(np.hypot(grid.x[high], grid.y[high]))])
     return float(grid.x[cell]), float(grid.y[cell])
 
 
 def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
-    """Return the height at which a level finger that comes down over a place first touches, m."""
+    """Return the height at which a level finger that comes down over a place first touches, m.
+
+    Parameters
+    ----------
+    grid : Grid
+    heights : ndarray (n,)
+        Pin tops, m.
+    finger : Fingertip
+    x, y : float
+        The place, m.
+    """
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
     under = underside(*forms(outline), grid.place(np.arange(grid.count)))
     return float(np.max(heights - under[0]))

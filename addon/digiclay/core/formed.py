@@ -55,7 +55,21 @@ class Formed:
     def of(
         cls, position: ArrayLike, height: ArrayLike, former: ArrayLike, force: ArrayLike, mode: ArrayLike
     ) -> Formed:
-        """Check and take the arrays."""
+        """Check and take the arrays.
+
+        Parameters
+        ----------
+        position : array_like (n, 2)
+            Axes of the pins, row by row, m.
+        height : array_like (n,)
+            Pin tops, m.
+        former : array_like (n,) or float
+            The same before the surface was formed, m.
+        force : array_like (n,) or float
+            N.
+        mode : array_like of int (n,) or int
+            Codes of `modes.Mode`.
+        """
         rows, columns = grid_shape(position)
         place, top = check_heights(position, height, rows, columns)
         _, before = check_heights(place, np.broadcast_to(former, top.shape), rows, columns, "former")

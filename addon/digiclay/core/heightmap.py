@@ -53,7 +53,13 @@ class HeightMap:
         return 0.0, 0.0, float(self.pixels[1]), float(self.pixels[0])
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return the heights at the pins: bilinear, of the means over a pin's own square of pixels."""
+        """Return the heights at the pins: bilinear, of the means over a pin's own square of pixels.
+
+        Parameters
+        ----------
+        grid : Grid
+        at : Placement
+        """
         across, along = (grid.x - at.x) / at.factor_x, (grid.y - at.y) / at.factor_y
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
@@ -67,6 +73,14 @@ class HeightMap:
 
 def height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
     """Make a map of an array of numbers, the first row at the lowest y.
+
+    Parameters
+    ----------
+    name : str
+        What messages call it.
+    values : ndarray (r, c)
+    value_length : float, optional
+        Metres in the unit of the values; by default they are no lengths.
 
     Raises
     ------
@@ -94,7 +108,13 @@ def height_map(name: str, values: NDArray[np.generic], value_length: float | Non
 
 
 def averaged(values: NDArray[np.generic], block: int) -> Floats:
-    """Return the means over squares of `block` x `block` values; those at the end may be smaller."""
+    """Return the means over squares of `block` x `block` values; those at the end may be smaller.
+
+    Parameters
+    ----------
+    values : ndarray (r, c)
+    block : int
+    """
     if block == 1:
         return np.asarray(values, np.float64)
     rows, columns = values.shape

@@ -85,12 +85,26 @@ def _refuse_by_head(path: Path) -> None:
 
 
 def refuse_too_many(path: Path, width: int, height: int) -> None:
-    """Refuse a picture too large to be read."""
+    """Refuse a picture too large to be read.
+
+    Parameters
+    ----------
+    path : Path
+    width, height : int
+        Pixels.
+    """
     if width * height > MOST:
         raise too_large(path, f"{width} x {height}")
 
 
 def too_large(path: Path, size: str) -> ParameterError:
-    """Return what is said of a picture too large to be read."""
+    """Return what is said of a picture too large to be read.
+
+    Parameters
+    ----------
+    path : Path
+    size : str
+        What it has.
+    """
     rule = f"must have at most {MOST // 1_000_000} million pixels"
     return ParameterError("shape", "file", rule, f"{path}: {size}", "Make it smaller first.")

@@ -23,6 +23,12 @@ LARGEST = 2**32 - 1
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write the bodies; `factor` is not used, since the unit is given.
 
+    Parameters
+    ----------
+    file : binary file
+    bodies : sequence of Body
+    factor : float
+
     Raises
     ------
     OutputError

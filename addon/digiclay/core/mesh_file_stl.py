@@ -19,7 +19,15 @@ TEXT += "endloop\nendfacet\n"
 
 
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write all bodies as one list of triangles, lengths in 1 / `factor` m."""
+    """Write all bodies as one list of triangles, lengths in 1 / `factor` m.
+
+    Parameters
+    ----------
+    file : binary file
+    bodies : sequence of Body
+    factor : float
+        Units of the file in a metre.
+    """
     # The first word must not be "solid": by it readers know the text form.
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
     file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
@@ -32,7 +40,15 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was."""
+    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was.
+
+    Parameters
+    ----------
+    file : binary file
+    bodies : sequence of Body
+    factor : float
+        Units of the file in a metre.
+    """
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())
         for some in pieces(len(body.faces)):

@@ -27,7 +27,15 @@ def stl_is_text(data: bytes) -> bool:
 
 
 def check_stl(data: bytes, name: str) -> None:
-    """Refuse an STL that holds fewer triangles than its head says, or ends inside of one."""
+    """Refuse an STL that holds fewer triangles than its head says, or ends inside of one.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What the message calls it.
+    """
     if stl_is_text(data):
         lower = data.lower()
         begun, ended = lower.count(b"facet normal"), lower.count(b"endfacet")
@@ -45,7 +53,15 @@ def check_stl(data: bytes, name: str) -> None:
 
 
 def check_ply(data: bytes, name: str) -> None:
-    """Refuse a PLY whose elements need more bytes than there are."""
+    """Refuse a PLY whose elements need more bytes than there are.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What the message calls it.
+    """
     end = re.search(rb"^end_header[ \t]*\r?$\n?", data[:LONGEST_HEAD], re.MULTILINE)
     if not data.startswith(b"ply") or end is None:
         raise refusal("must be a PLY file that can be read", name, "no head, or no end of it")
@@ -80,7 +96,15 @@ def check_ply(data: bytes, name: str) -> None:
 
 
 def check_off(data: bytes, name: str) -> None:
-    """Refuse an OFF that has fewer lines than vertices and faces."""
+    """Refuse an OFF that has fewer lines than vertices and faces.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What the message calls it.
+    """
     lines = [line for line in (part.partition(b"#")[0].strip() for part in data.splitlines()) if line]
     head = b" ".join(lines[:2]).split()
     head = head[1:] if head and head[0].upper() in (b"OFF", b"COFF") else head

@@ -39,6 +39,12 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
     """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie.
 
+    Parameters
+    ----------
+    path : Path
+        Files that it refers to are looked for beside it.
+    data : bytes
+
     Raises
     ------
     OSError

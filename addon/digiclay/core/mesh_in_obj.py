@@ -34,6 +34,13 @@ VERTEX, FACE = (b"v ", b"v\t"), (b"f ", b"f\t")
 def read(data: bytes, name: str) -> tuple[Floats, Indices]:
     """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans.
 
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What messages call it.
+
     Raises
     ------
     ParameterError

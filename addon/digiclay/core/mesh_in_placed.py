@@ -19,7 +19,13 @@ IDENTITY: Floats = np.vstack([np.eye(3), np.zeros(3)])
 
 
 def nested(inner: Floats, outer: Floats) -> Floats:
-    """Return the placement, (4, 3), of what is placed in something that is placed itself."""
+    """Return the placement, (4, 3), of what is placed in something that is placed itself.
+
+    Parameters
+    ----------
+    inner, outer : ndarray (4, 3)
+        Three rows of the linear part, and one of the offset.
+    """
     placement: Floats = inner @ outer[:3]
     placement[3] += outer[3]
     return placement
@@ -29,6 +35,13 @@ def joined(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple
     """Return all vertices (v, 3) and triangles (f, 3) of meshes, each given with its placement.
 
     Triangles of a mesh that is mirrored are turned, so that outside stays outside.
+
+    Parameters
+    ----------
+    meshes : iterable of (ndarray (v, 3), ndarray of int (f, 3), ndarray (4, 3))
+        Vertices, triangles, placement of each.
+    name : str
+        What the message calls the file.
 
     Raises
     ------

@@ -40,6 +40,12 @@ class Head(NamedTuple):
 def heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
     """Return what arrays of a file .npz are.
 
+    Parameters
+    ----------
+    archive : ZipFile
+    names : sequence of str
+        Of the arrays.
+
     Raises
     ------
     KeyError
@@ -78,7 +84,14 @@ def _head(file: IO[bytes], name: str) -> Head:
 
 
 def array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Read an array whose head has been looked at."""
+    """Read an array whose head has been looked at.
+
+    Parameters
+    ----------
+    archive : ZipFile
+    name : str
+        Of the array.
+    """
     with archive.open(f"{name}.npy") as file:
         read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         return read

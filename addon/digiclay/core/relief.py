@@ -73,5 +73,11 @@ class Relief(Protocol):
         ...
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return its top surface at the pins."""
+        """Return its top surface at the pins.
+
+        Parameters
+        ----------
+        grid : Grid
+        at : Placement
+        """
         ...

@@ -46,7 +46,15 @@ def find_shape(word: str) -> Path:
 
 
 def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
-    """Return the shape of a scene, laid onto its bed; errors as `read` and `shape_fit.fitted`."""
+    """Return the shape of a scene, laid onto its bed; errors as `read` and `shape_fit.fitted`.
+
+    Parameters
+    ----------
+    shape : Shape
+    grid : Grid
+    actuator : Actuator
+        Its stroke limits the heights.
+    """
     if shape.heights:
         return given(shape, grid, actuator)
     return fitted(shape, read(shape), grid, actuator)

@@ -81,6 +81,13 @@ def _cells(count: int) -> str:
 def given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     """Return the shape whose heights stand in the scene itself.
 
+    Parameters
+    ----------
+    shape : Shape
+    grid : Grid
+    actuator : Actuator
+        Its stroke limits the heights.
+
     Raises
     ------
     ParameterError

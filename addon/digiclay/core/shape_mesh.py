@@ -88,6 +88,11 @@ class ShapeMesh:
 
         A closed mesh is passed through once, from its top to its underside; an open one is hit once.
         Small holes of an open one are filled from around.
+
+        Parameters
+        ----------
+        grid : Grid
+        at : Placement
         """
         none = np.empty(0, np.bool_)
         hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]

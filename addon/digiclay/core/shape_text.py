@@ -27,6 +27,12 @@ def packed(heights: Floats) -> str:
 def unpacked(text: str, grid: Grid) -> Floats:
     """Return the heights of the cells of a bed, shape (n,), m.
 
+    Parameters
+    ----------
+    text : str
+        From `packed`.
+    grid : Grid
+
     Raises
     ------
     ParameterError

@@ -35,7 +35,14 @@ SKINS: dict[str, str] = {
 
 
 def places(formed: Formed, parts: int) -> Floats:
-    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch."""
+    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch.
+
+    Parameters
+    ----------
+    formed : Formed
+    parts : int
+        Points of the skin in a pitch.
+    """
     grid = formed.position.reshape(formed.rows, formed.columns, 2)
     across = _linear(grid, parts)
     fine = _linear(np.swapaxes(across, 0, 1), parts)
@@ -72,7 +79,14 @@ def over(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> F
 
 
 def nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
-    """Return the pin whose row and column each point of a skin is nearest to, row by row."""
+    """Return the pin whose row and column each point of a skin is nearest to, row by row.
+
+    Parameters
+    ----------
+    formed : Formed
+    parts : int
+        Points of the skin in a pitch.
+    """
     row, column = (np.arange((count - 1) * parts + 1) for count in (formed.rows, formed.columns))
     nearest = ((row + parts // 2) // parts)[:, None] * formed.columns + (column + parts // 2) // parts
     pins: NDArray[np.int32] = nearest.ravel().astype(np.int32)

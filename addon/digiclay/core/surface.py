@@ -172,6 +172,15 @@ def base_level(
 ) -> float:
     """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest pin top.
 
+    Parameters
+    ----------
+    height : array_like
+        Pin tops, m.
+    base : float, optional
+        m; by default `base_thickness` counts.
+    base_thickness : float
+        m.
+
     Raises
     ------
     ParameterError
@@ -204,6 +213,16 @@ def check_heights(
     position: ArrayLike, height: ArrayLike, rows: int, columns: int, name: str = "height"
 ) -> tuple[Floats, Floats]:
     """Return positions and one value a pin as arrays, or refuse what cannot carry a skin.
+
+    Parameters
+    ----------
+    position : array_like (n, 2)
+        Axes of the pins, row by row, m.
+    height : array_like (n,)
+        One value a pin.
+    rows, columns : int
+    name : str
+        What the message calls the values.
 
     Raises
     ------

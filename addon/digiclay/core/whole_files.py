@@ -17,6 +17,11 @@ __all__ = ["as_json", "open_whole", "read_json", "write_whole"]
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file whole or not at all: to a temporary name beside it, then renamed.
 
+    Parameters
+    ----------
+    path : Path
+    content : bytes
+
     Raises
     ------
     OutputError
