@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.tables import table
-from digiclay.core.assembly import assemble
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin, periods
-from digiclay.core.state import State
-from digiclay.core.system import System
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
 from digiclay.plots.figure import empty
 
 from .plots import STYLE, write

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.tables import table
-from digiclay.core.export import FORMATS, suffix, write
-from digiclay.core.export_model import Model, bodies
-from digiclay.core.features import Finding
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
+from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.features import Finding
+from digiclay.core.surface.formed import Formed
 
 from .report import add_kind, kept, made_with, progress
 

@@ -18,11 +18,11 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from digiclay.core import simulation
-from digiclay.core.assembly import assemble
-from digiclay.core.scene import Scene
-from digiclay.core.system import System
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.engine import simulation
+from digiclay.core.engine.system import System
+from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
 
 from .report import table
 

@@ -15,10 +15,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from digiclay.core.errors import DigiclayError
-from digiclay.core.fingertip import JOIN
-from digiclay.core.simulation import begin
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.fingertip import JOIN
+from digiclay.core.model.trajectory import Trajectory
 from numpy.typing import NDArray
 
 from .problems import Measured, Problem, replaying, solved

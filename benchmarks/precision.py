@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.tables import table
-from digiclay.core.assembly import assemble
-from digiclay.core.simulation import begin, periods
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
 from numpy.typing import NDArray
 
 from . import peers, plots, whole_bed

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from digiclay.core.assembly import assemble
 from digiclay.core.control.replay import Replay
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin, periods
-from digiclay.core.system import System
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.system import System
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
 from numpy.typing import NDArray
 
 from .work_precision import Work

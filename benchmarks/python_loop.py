@@ -6,10 +6,10 @@ import math
 import time
 
 import numpy as np
-from digiclay.core.closed_form import TINY, crossed
-from digiclay.core.fingertip import JOIN
-from digiclay.core.simulation import begin
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.fingertip import JOIN
 from digiclay.core.steppers.bernoulli_plan import POINTS
+from digiclay.core.steppers.closed_form import TINY, crossed
 
 from .peers import ROOT, Line
 from .problems import PERIOD, Measured, Problem

@@ -18,7 +18,7 @@ from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import Steps
 from digiclay.commands.refusals import refuse_unwritable
 from digiclay.commands.tables import table
-from digiclay.core.errors import OutputError
+from digiclay.core.base.errors import OutputError
 
 __all__ = ["add_kind", "kept", "made_with", "progress", "table"]
 

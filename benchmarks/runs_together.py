@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from digiclay.commands.arguments import add_scene, scene_of
-from digiclay.core.evaluation import evaluate
-from digiclay.core.scene import Scene
-from digiclay.core.session import run
-from digiclay.core.stack.session import judge_together, run_together
+from digiclay.core.batch.run_together import judge_together, run_together
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.evaluation import evaluate
 from digiclay.plots.figure import empty
 
 from .plots import STYLE, write

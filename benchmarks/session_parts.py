@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 from digiclay import core
 from digiclay.commands.arguments import add_scene, scene_of
 from digiclay.commands.progress import Bar
-from digiclay.core import simulation
-from digiclay.core.assembly import assemble
-from digiclay.core.recorder import Recorder, Recording
-from digiclay.core.scene import Scene
-from digiclay.core.session import fits
+from digiclay.core.engine import simulation
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.recorder import Recorder, Recording
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import fits
 
 from .report import made_with
 
@@ -123,7 +123,7 @@ def _table(scene: Scene, plain: list[Took], split: list[dict[str, float]]) -> It
 
 
 def measured(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
-    """Run a session as `core.session.run` does and return how long it took.
+    """Run a session as `core.session.run_scene.run` does and return how long it took.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from digiclay.commands.tables import table
-from digiclay.core.errors import DivergenceError
-from digiclay.core.scene import STEPPERS
+from digiclay.core.base.errors import DivergenceError
+from digiclay.core.scene.schema import STEPPERS
 
 from .report import add_kind, kept, made_with, progress
 from .stiff_cases import CASES, Case

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
 
 __all__ = ["ALL", "CASES", "EASY", "HOLD", "Case", "scene"]
 

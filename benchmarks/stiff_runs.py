@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
-from digiclay.core.accuracy import SHARE, reference_settings
-from digiclay.core.assembly import assemble
+from digiclay.core.base.errors import DivergenceError
 from digiclay.core.control.replay import Replay
-from digiclay.core.errors import DivergenceError
-from digiclay.core.fingertip import forms, underside
-from digiclay.core.physics import speeds
-from digiclay.core.simulation import begin, periods
-from digiclay.core.system import System
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.system import System
+from digiclay.core.model.fingertip import forms, underside
+from digiclay.core.model.physics import speeds
+from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.session.accuracy import SHARE, reference_settings
 from numpy.typing import NDArray
 
 from .numpy_calls import period_calls
@@ -50,7 +50,7 @@ class Outcome:
     error : float
         Largest height error, m; NaN when it stopped.
     estimate : float
-        What the run itself says of its error (see `core.accuracy`), m; NaN where it was not asked.
+        What the run itself says of its error (see `core.session.accuracy`), m; NaN where it was not asked.
     stopped : str
         Why it did, else empty.
     """

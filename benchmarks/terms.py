@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from digiclay.commands.arguments import add_scene, scene_of
 from digiclay.commands.tables import table
-from digiclay.core.assembly import assemble
 from digiclay.core.control.replay import Replay
-from digiclay.core.scene import Scene
-from digiclay.core.simulation import begin, periods
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
 from numpy.typing import NDArray
 
 from .numpy_calls import period_calls

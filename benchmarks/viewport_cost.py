@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from digiclay import bridge
 from digiclay.compat import bpy, scratch
-from digiclay.core.layout import Layout
+from digiclay.core.model.layout import Layout
 from digiclay.device import display, view
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.waiting import blocking_reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from digiclay.core.metrics_speed import Criterion, Follows
+from digiclay.core.studies.speed_limits import Criterion, Follows
 
 from . import scenes
 from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict

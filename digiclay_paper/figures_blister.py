@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.modes import Mode
+from digiclay.core.base.modes import Mode
+from digiclay.core.studies.trials import Trial
 from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 
 from .results import Results

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from digiclay.core.metrics import in_contact
+from digiclay.core.metrics.summary import in_contact
 from digiclay.plots.bed import draw_map, draw_path, draw_relief
 from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
 from digiclay.plots.run import LETTERS, session_cells

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from digiclay.core.base.modes import MEANINGS, Mode
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
-from digiclay.core.modes import MEANINGS, Mode
 
 from .claim import Claim
 from .results import Results

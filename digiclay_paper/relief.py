@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
-from digiclay.core.metrics import cell_area, in_contact
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.modes import Mode
-from digiclay.core.scene import Scene
+from digiclay.core.metrics.summary import cell_area, in_contact
+from digiclay.core.scene.schema import Scene
+from digiclay.core.studies.trials import Trial
 from numpy.typing import NDArray
 
 from .results import Session

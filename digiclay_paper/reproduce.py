@@ -12,7 +12,7 @@ from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import Line
 from digiclay.commands.refusals import refuse_without
 from digiclay.commands.stop import Stop
-from digiclay.core.run_folder import may_be_written, written
+from digiclay.core.base.run_folder import may_be_written, written
 
 __all__ = ["add"]
 

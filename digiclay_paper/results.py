@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from digiclay.core.metrics_speed import Criterion, Drag, Follows
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.scene import Scene
+from digiclay.core.scene.schema import Scene
+from digiclay.core.studies.speed_limits import Criterion, Drag, Follows
+from digiclay.core.studies.trials import Trial
 from numpy.typing import NDArray
 
 from .scenes import SINK, TALL

@@ -8,10 +8,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from digiclay.core.assembly import assemble
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.scene import Path, Scene
-from digiclay.core.scene_table import resolve
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Path, Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.trials import Trial
 
 __all__ = [
     "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "at_rest", "blister", "fastest_lift",

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from digiclay.core.metrics_signal import amplitude, frequency, settling_time
-from digiclay.core.metrics_speed import Drag, Follows, Lift, followed, largest_speed
-from digiclay.core.metrics_trial import Trial, trial
-from digiclay.core.modes import Mode
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.set_point import asked
+from digiclay.core.base.modes import Mode
+from digiclay.core.metrics.signal import amplitude, frequency, settling_time
+from digiclay.core.model.set_point import asked
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.studies.speed_limits import Drag, Follows, Lift, followed, largest_speed
+from digiclay.core.studies.trials import Trial, trial
 
 from . import scenes
 from .results import AS_IT_IS, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing

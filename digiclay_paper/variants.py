@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from digiclay.core.assembly import assemble
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.master import Master, Phase, VirtualMaster
-from digiclay.core.metrics_speed import Drag, followed
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.modes import Mode
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.simulation import begin, periods
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.studies.speed_limits import Drag, followed
+from digiclay.core.studies.trials import Trial
 
 from . import scenes
 from .results import AHEAD, PAPER_SPEED, SESSION, WAYS, Dragged, Extent, Located, Results

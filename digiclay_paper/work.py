@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.core.whole_files import write_whole
+from digiclay.core.base.whole_files import write_whole
 from digiclay.plots.figure import save
 
 from . import figures_blister, figures_limits, figures_session, figures_variants
@@ -120,7 +120,7 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
 
 
 def _numbers(results: Results) -> dict[str, Any]:
-    """Return what was measured, as it is written to ``metrics.json``; SI units."""
+    """Return what was measured, as it is written to ``summary.json``; SI units."""
     return {
         "criterion": {"lag": results.criterion.lag, "rfd": results.criterion.deviation},
         "slow": results.slow,

@@ -7,30 +7,30 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from digiclay.core.actuator import Actuator
-from digiclay.core.assembly import assemble
-from digiclay.core.conduit import Conduit
-from digiclay.core.contact import Contact
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.travel import Heading
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
-from digiclay.core.delay import Delay
-from digiclay.core.fingertip import LEVEL, Fingertip, forms, underside
-from digiclay.core.fluid import Fluid
-from digiclay.core.keeping import packed
-from digiclay.core.layout import Layout
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement, Orders
-from digiclay.core.relaxation import Relaxation
-from digiclay.core.scene import Path, Scene, Simulation
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.simulation import System, begin, periods
-from digiclay.core.state import State
-from digiclay.core.supply import Supply
-from digiclay.core.take import Take, states
-from digiclay.core.trajectory import Trajectory, level
-from digiclay.core.valve import Valve
-from digiclay.core.valve_lag import ValveLag
+from digiclay.core.engine.simulation import System, begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.conduit import Conduit
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.delay import Delay
+from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, underside
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.lag import ValveLag
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.relaxation import Relaxation
+from digiclay.core.model.supply import Supply
+from digiclay.core.model.trajectory import Trajectory, level
+from digiclay.core.model.valve import Valve
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Path, Scene, Simulation
+from digiclay.core.session.snapshot import packed
+from digiclay.core.session.take import Take, states
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from digiclay.core.fingertip import LEVEL
-from digiclay.core.scene_table import resolve
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.scene.toml_table import resolve
 from digiclay.live import sculpting
 from digiclay.live.running import Running
 from numpy.typing import NDArray

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.surface import base_level, skin
+from digiclay.core.surface.skin_mesh import base_level, skin
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -19,18 +19,18 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import DigiclayError
-from digiclay.core.keeping import START, carried, packed, unpacked
-from digiclay.core.methods import METHODS
-from digiclay.core.quantity import quantities
-from digiclay.core.scene import OPTIONAL, SECTIONS, STEPPERS, UNASKED, Path, Waypoint, parameters
-from digiclay.core.scene_table import ABSENT, PRESETS, resolve, text
-from digiclay.core.session import run
-from digiclay.core.simulation import advance, approaches, begin, periods
-from digiclay.core.system import System
-from digiclay.core.toml_text import tables
-from digiclay.core.trajectory import along
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.base.quantity import quantities
+from digiclay.core.base.toml_text import tables
+from digiclay.core.control.methods import METHODS
+from digiclay.core.engine.simulation import advance, approaches, begin, periods
+from digiclay.core.engine.system import System
+from digiclay.core.model.trajectory import along
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, STEPPERS, UNASKED, Path, Waypoint, parameters
+from digiclay.core.scene.toml_table import ABSENT, PRESETS, resolve, text
+from digiclay.core.session.run_scene import run
+from digiclay.core.session.snapshot import START, carried, packed, unpacked
 
 __all__ = ["CASES", "failure", "main"]
 
@@ -127,7 +127,7 @@ def scene(chance: np.random.Generator) -> None:
     if chance.random() < 0.2:
         try:
             made = tables(spoilt(chance))
-        except (ValueError, RecursionError):  # said with file and line by `scene_file.read_table`
+        except (ValueError, RecursionError):  # said with file and line by `scene_source.read_table`
             return
     else:
         made = table(chance)

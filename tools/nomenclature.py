@@ -13,9 +13,9 @@ PAGE = ROOT / "docs" / "nomenclature.md"
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT / "addon"))
 
-from digiclay.core.methods import METHODS  # noqa: E402
-from digiclay.core.quantity import EXTENTS, Parameters, Quantity, quantities  # noqa: E402
-from digiclay.core.scene import SECTIONS, parameters  # noqa: E402
+from digiclay.core.base.quantity import EXTENTS, Parameters, Quantity, quantities  # noqa: E402
+from digiclay.core.control.methods import METHODS  # noqa: E402
+from digiclay.core.scene.schema import SECTIONS, parameters  # noqa: E402
 
 INTRODUCTION = """\
 # Nomenclature

@@ -84,10 +84,10 @@ def write(folder: Path) -> list[Path]:
 def picture(path: Path) -> None:
     """Draw every sample shape as a bed of 49 x 49 pins shows it."""
     import matplotlib.pyplot as plt
-    from digiclay.core.actuator import Actuator
-    from digiclay.core.layout import Layout, grid
-    from digiclay.core.shape import Shape
-    from digiclay.core.shape_file import fitted_to, sample_shapes
+    from digiclay.core.model.actuator import Actuator
+    from digiclay.core.model.layout import Layout, grid
+    from digiclay.core.shapes.request import Shape
+    from digiclay.core.shapes.source_file import fitted_to, sample_shapes
     from matplotlib.colors import LightSource
 
     bed = grid(Layout(rows=49, columns=49, pitch=2e-3))

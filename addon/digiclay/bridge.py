@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compat import bpy
-from .core.errors import DigiclayError
-from .core.fingertip import Fingertip
+from .core.base.errors import DigiclayError
+from .core.model.fingertip import Fingertip
 from .device.primitives import Shape
 from .device.roles import ELLIPSOID, ROLE
 

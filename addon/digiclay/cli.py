@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from .commands.exit_codes import STOPPED, WRONG
 from .commands.stop import undisturbed
-from .core.errors import DigiclayError, one_line
+from .core.base.errors import DigiclayError, one_line
 
 __all__ = ["carry_out", "console", "main", "run_as_program"]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from .core.errors import DigiclayError
+from .core.base.errors import DigiclayError
 
 try:
     import bpy

@@ -8,9 +8,9 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay.core import live
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import Mode
+from digiclay.core.base.modes import Mode
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.session import live_periods
 from digiclay.device import unit_watch
 from digiclay.device.instant import Instant
 
@@ -26,7 +26,7 @@ def factory_file() -> None:
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live, "SHARE", 1e9)
+    monkeypatch.setattr(live_periods, "SHARE", 1e9)
 
 
 @pytest.fixture

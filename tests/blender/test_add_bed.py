@@ -13,8 +13,8 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.methods import METHODS
-from digiclay.core.scene_table import PRESETS, resolve
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
 

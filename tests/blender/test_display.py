@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.accuracy import Errors
-from digiclay.core.errors import DigiclayError
-from digiclay.core.modes import Mode
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.base.modes import Mode
+from digiclay.core.session.accuracy import Errors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views

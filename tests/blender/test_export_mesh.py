@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.export import FORMATS, suffix
-from digiclay.core.keeping import packed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.simulation import begin, step
+from digiclay.core.engine.simulation import begin, step
+from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.session.snapshot import packed
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.exchange import formed_bed

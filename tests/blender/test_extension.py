@@ -14,9 +14,9 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import bridge, command_line
-from digiclay.core.errors import OutputError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import Mode
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.modes import Mode
+from digiclay.core.model.layout import Layout, grid
 from digiclay.device import view
 from digiclay.device.instant import Instant
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay import preferences
 from digiclay.bridge import linear
-from digiclay.core.modes import Mode
+from digiclay.core.base.modes import Mode
 from digiclay.device import palettes
 from digiclay.device.parts import ROLE
 

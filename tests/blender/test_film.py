@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.compat import scratch, strips
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.fingertip import LEVEL
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import COLOURS, Mode
-from digiclay.core.shots import Film, Turntable
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.session.render_settings import Film, Turntable
 from digiclay.device.instant import Instant
 from digiclay.pictures import film as films
 from digiclay.pictures import film_file, still

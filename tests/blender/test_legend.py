@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.compat import scratch
-from digiclay.core.modes import Mode
+from digiclay.core.base.modes import Mode
 from digiclay.pictures.force_plot import SHARE, strip
 from digiclay.pictures.legend import READ, READ_BESIDE, Front, of_forces, of_modes
 from digiclay.pictures.stage import MARGINS, half_frame

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.keeping import unpacked
-from digiclay.core.scene_file import load
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import load
+from digiclay.core.session.snapshot import unpacked
 from digiclay.device import view
 from digiclay.exchange import formed_bed
 from digiclay.live import bed_state, running, tick

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.scene_file import SAMPLES, find, load, sample_names
-from digiclay.core.shape_file import sample_shapes
+from digiclay.core.scene.scene_source import SAMPLES, find, load, sample_names
+from digiclay.core.shapes.source_file import sample_shapes
 from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
 from digiclay.recorded import takes

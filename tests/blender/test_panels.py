@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 import pytest
 from digiclay import panels
-from digiclay.core.methods import METHODS
-from digiclay.core.scene import SECTIONS
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import SECTIONS
 from digiclay.device import view
 from digiclay.panels.base import CATEGORY, bed_of
 from digiclay.panels.parameters import in_use

@@ -10,9 +10,9 @@ from typing import Any
 
 import bpy
 import pytest
-from digiclay.core.errors import OutputError
-from digiclay.core.scene_file import load
-from digiclay.core.scene_table import PRESETS, resolve
+from digiclay.core.base.errors import OutputError
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.settings import own_presets, properties
 
 pytestmark = pytest.mark.usefixtures("extension")

@@ -10,8 +10,8 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.errors import DigiclayError
-from digiclay.core.layout import grid
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.model.layout import grid
 from digiclay.device import view
 from digiclay.press import aim, tool
 from digiclay.settings import properties

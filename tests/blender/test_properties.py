@@ -9,13 +9,13 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.methods import METHODS
-from digiclay.core.quantity import quantities
-from digiclay.core.scene import OPTIONAL, SECTIONS, Scene, parameters
-from digiclay.core.scene_file import find, load, sample_names
-from digiclay.core.scene_table import PRESETS, resolve
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.quantity import quantities
+from digiclay.core.control.methods import METHODS
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.scene_source import find, load, sample_names
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, parameters
+from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.settings import properties
 from digiclay.settings.shown_units import unit_of
 from digiclay.settings.table import read

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import grid
-from digiclay.core.modes import Mode
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.modes import Mode
+from digiclay.core.model.layout import grid
 from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.settings import properties

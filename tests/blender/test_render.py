@@ -11,9 +11,9 @@ import bpy
 import digiclay
 import numpy as np
 import pytest
-from digiclay.core.errors import DigiclayError, OutputError
-from digiclay.core.layout import Layout
-from digiclay.core.modes import COLOURS, Mode
+from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.model.layout import Layout
 from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import stage, still
@@ -143,7 +143,7 @@ def test_every_bed_falls_inside_the_frame_and_touches_its_margins(
 def test_rendering_without_blender_says_in_one_line_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "bpy.py").write_text("raise ModuleNotFoundError(\"No module named 'bpy'\", name='bpy')\n")
     code = (
-        "from digiclay.core.errors import DigiclayError\n"
+        "from digiclay.core.base.errors import DigiclayError\n"
         "try:\n    import digiclay.pictures.still\n"
         "except DigiclayError as error:\n    print(error)\n"
     )

@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import ParameterError
-from digiclay.core.keeping import unpacked
-from digiclay.core.layout import Layout, grid
-from digiclay.core.shape_file import sample_shapes
-from digiclay.core.shape_text import unpacked as heights_of
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.session.snapshot import unpacked
+from digiclay.core.shapes.height_text import unpacked as heights_of
+from digiclay.core.shapes.source_file import sample_shapes
 from digiclay.device import view
 from digiclay.exchange import image_reader
 from digiclay.live import bed_state
@@ -278,7 +278,7 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path: Path) -> None:
 
 def test_the_sample_pictures_are_the_same_to_blender_and_to_pillow() -> None:
     pillow = pytest.importorskip("PIL.Image")
-    from digiclay.core.shape_file import find_shape
+    from digiclay.core.shapes.source_file import find_shape
 
     for name in ("crater", "face"):
         path = find_shape(name)

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.scene_file import load
-from digiclay.core.set_point import SetPoint
+from digiclay.core.model.set_point import SetPoint
+from digiclay.core.scene.scene_source import load
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.recorded import bake, takes

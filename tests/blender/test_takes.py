@@ -11,16 +11,16 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import DigiclayError
-from digiclay.core.fingertip import LEVEL, Fingertip
-from digiclay.core.keeping import packed
-from digiclay.core.layout import Layout
-from digiclay.core.live import lived
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin
-from digiclay.core.take import Take
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.layout import Layout
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.live_periods import lived
+from digiclay.core.session.snapshot import packed
+from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.recorded import bake, takes

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.fingertip import Fingertip
+from digiclay.core.model.fingertip import Fingertip
 from digiclay.device import view
 from digiclay.device.roles import BALL, ROLE
 from digiclay.live import running, tick

@@ -8,13 +8,13 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import DigiclayError
-from digiclay.core.fingertip import Fingertip
-from digiclay.core.layout import Layout
-from digiclay.core.modes import COLOURS, Mode
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.layout import Layout
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
 from digiclay.device import heat, view
 from digiclay.device.instant import Instant
 

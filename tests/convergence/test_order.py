@@ -11,11 +11,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from digiclay.core.fluid import Fluid
-from digiclay.core.physics import rates
-from digiclay.core.simulation import begin
-from digiclay.core.system import System
-from digiclay.core.valve import Valve
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.system import System
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.physics import rates
+from digiclay.core.model.valve import Valve
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.fingertip import JOIN, Fingertip, reach, reaches
-from digiclay.core.layout import Layout, grid
-from digiclay.core.touch import approach, reached
+from digiclay.core.model.fingertip import JOIN, Fingertip, reach, reaches
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.touch import approach, reached
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray

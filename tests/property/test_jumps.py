@@ -7,16 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
-from digiclay.core.assembly import assemble
-from digiclay.core.contact import Contact
-from digiclay.core.fluid import Fluid
-from digiclay.core.layout import Layout
-from digiclay.core.physics import speeds
-from digiclay.core.scene import Path, Scene, Waypoint
-from digiclay.core.stack.session import run_together
-from digiclay.core.system import System
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.batch.run_together import run_together
+from digiclay.core.engine.system import System
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.physics import speeds
+from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Path, Scene, Waypoint
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray

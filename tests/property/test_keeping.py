@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import StateError
-from digiclay.core.keeping import carried, packed, unpacked
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import advance, approaches, begin, periods
-from digiclay.core.state import State
-from digiclay.core.trajectory import along
+from digiclay.core.base.errors import StateError
+from digiclay.core.engine.simulation import advance, approaches, begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.model.trajectory import along
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.snapshot import carried, packed, unpacked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.layout import Layout, grid
+from digiclay.core.model.layout import Layout, grid
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from digiclay.core.errors import DigiclayError, SceneError
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.errors import DigiclayError, SceneError
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.toml_table import resolve
 
 FILE = Path(__file__).parents[2] / "tools" / "fuzz.py"
 

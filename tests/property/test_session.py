@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.fluid import Fluid
-from digiclay.core.layout import Layout
-from digiclay.core.simulation import begin, step
-from digiclay.core.system import System
-from digiclay.core.trajectory import Trajectory, level
-from digiclay.core.valve import Valve
+from digiclay.core.engine.simulation import begin, step
+from digiclay.core.engine.system import System
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.trajectory import Trajectory, level
+from digiclay.core.model.valve import Valve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

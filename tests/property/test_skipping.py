@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.layout import Layout
-from digiclay.core.places import Controller, Measurement, Orders
-from digiclay.core.trajectory import level
+from digiclay.core.model.interfaces import Controller, Measurement, Orders
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.trajectory import level
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.layout import Layout, grid
-from digiclay.core.surface import solid
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.skin_mesh import solid
 from hypothesis import example, given
 from hypothesis import strategies as st
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.layout import Layout
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.trajectory import Trajectory
 from numpy.typing import NDArray
 
 from tests.assemble import make_system, record

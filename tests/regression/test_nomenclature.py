@@ -8,9 +8,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from digiclay.core.methods import METHODS
-from digiclay.core.quantity import quantities
-from digiclay.core.scene import SECTIONS, parameters
+from digiclay.core.base.quantity import quantities
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import SECTIONS, parameters
 
 ROOT = Path(__file__).parents[2]
 EQUATIONS = ROOT / "docs" / "equations.md"

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.keeping import carried, unpacked
-from digiclay.core.scene import SECTIONS, Scene
-from digiclay.core.scene_file import load
-from digiclay.core.scene_table import ABSENT, text
-from digiclay.core.simulation import periods
-from digiclay.core.take import from_bytes, states
+from digiclay.core.engine.simulation import periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.schema import SECTIONS, Scene
+from digiclay.core.scene.toml_table import ABSENT, text
+from digiclay.core.session.snapshot import carried, unpacked
+from digiclay.core.session.take import from_bytes, states
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 #: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README

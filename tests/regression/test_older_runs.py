@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.accuracy import estimate_errors
-from digiclay.core.metrics import compute_metrics
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import load
-from digiclay.core.session import run, save
+from digiclay.core.metrics.summary import compute_metrics
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.accuracy import estimate_errors
+from digiclay.core.session.run_scene import run, save
 
 RUNS = Path(__file__).parents[1] / "samples" / "runs"
 RECORDED = ("virtual_master", "cell_states_every_7")

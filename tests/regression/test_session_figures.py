@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.modes import Mode
-from digiclay.core.system import System
+from digiclay.core.base.modes import Mode
+from digiclay.core.engine.system import System
+from digiclay.core.scene.assembly import assemble
 from numpy.typing import NDArray
 
 from tests.assemble import Record, record, sample

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.modes import Mode
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import SAMPLES, find, load
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import Result, run
-from digiclay.core.simulation import begin, periods
-from digiclay.core.system import System
+from digiclay.core.base.modes import Mode
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.system import System
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import SAMPLES, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result, run
 
 TOUCHING = ("elastic", "plastic", "viscous", "push_pull", "force_display")
 BEHAVIOURS = (*TOUCHING, "shape_display")

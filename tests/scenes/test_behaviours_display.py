@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import Result, run
-from digiclay.core.simulation import begin, periods
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result, run
 
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
 AWAY = ((0.0, 0, 0, 90), (12.0, 0, 0, 90))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.core.errors import DivergenceError
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.session import run
+from digiclay.core.base.errors import DivergenceError
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import run
 
 
 def coarse(stepper: str) -> Scene:

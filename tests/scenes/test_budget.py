@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.assembly import assemble
-from digiclay.core.budget import Fitted, fitted, omissions
-from digiclay.core.errors import ParameterError
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import SAMPLES
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import SAMPLES
+from digiclay.core.scene.schema import Scene
+from digiclay.core.studies.omissions import Fitted, fitted, omissions
 from numpy.typing import NDArray
 
 from tests.assemble import record, sample

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.modes import Mode
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin, periods
-from digiclay.core.state import State
+from digiclay.core.base.modes import Mode
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
 
 METHODS = ("virtual_master", "cell_states")
 RESTING = {int(Mode.REST), int(Mode.HOLD)}

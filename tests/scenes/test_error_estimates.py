@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from digiclay.core.accuracy import SHARE, Errors, estimate_errors, has_every_command
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.session import History, run
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.accuracy import SHARE, Errors, estimate_errors, has_every_command
+from digiclay.core.session.run_scene import History, run
 
 #: Shorter than the longest session, but with a press and a lift in it.
 LASTS = 0.9

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.features import Feature, find
-from digiclay.core.formed import of_history
-from digiclay.core.scene_file import find as sample
-from digiclay.core.scene_file import load
-from digiclay.core.session import run
-from digiclay.core.sheet import stretched
+from digiclay.core.scene.scene_source import find as sample
+from digiclay.core.scene.scene_source import load
+from digiclay.core.session.run_scene import run
+from digiclay.core.surface.features import Feature, find
+from digiclay.core.surface.formed import of_history
+from digiclay.core.surface.sheet import stretched
 
 
 @pytest.fixture(scope="module")

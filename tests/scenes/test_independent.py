@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.system import System
-from digiclay.core.trajectory import Trajectory
+from digiclay.core.engine.system import System
+from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.scene.assembly import assemble
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator

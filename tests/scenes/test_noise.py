@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.modes import Mode
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import Result, run
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.modes import Mode
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result, run
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

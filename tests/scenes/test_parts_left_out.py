@@ -15,8 +15,8 @@ ADDON = Path(__file__).parents[2] / "addon"
 
 RUN = """
 import sys
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.session import run
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.session.run_scene import run
 settings = [Setting(name, "absent") for name in sys.argv[1:]]
 result = run(load(find("tap"), settings))
 assert result.periods == 100

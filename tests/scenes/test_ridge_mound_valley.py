@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.scene_file import find, load
-from digiclay.core.session import Result, run
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.session.run_scene import Result, run
 from numpy.typing import NDArray
 
 MM = 1e-3

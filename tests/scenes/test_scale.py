@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from digiclay.core.assembly import assemble
-from digiclay.core.simulation import begin
+from digiclay.core.engine.simulation import begin
+from digiclay.core.scene.assembly import assemble
 
 from benchmarks.bed_size import bytes_of, gathered_cells, scene
 from benchmarks.numpy_calls import period_calls

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.keeping import packed, unpacked
-from digiclay.core.methods import METHODS
-from digiclay.core.modes import Mode
-from digiclay.core.scene_file import find, load
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import Result, run
-from digiclay.core.simulation import begin, periods
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.methods import METHODS
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.snapshot import packed, unpacked
 
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
 #: Within this time a shape of 10 mm has come up; then the finger comes down.

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.errors import DivergenceError, ParameterError
-from digiclay.core.methods import METHODS
-from digiclay.core.scene import Scene, Waypoint
-from digiclay.core.session import Result, run
-from digiclay.core.stack.assembly import STACKED, structure, why_not
-from digiclay.core.stack.session import run_together
+from digiclay.core.base.errors import DivergenceError, ParameterError
+from digiclay.core.batch.packing import STACKED, structure, why_not
+from digiclay.core.batch.run_together import run_together
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import Scene, Waypoint
+from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, sample
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import pytest
-from digiclay.core.accuracy import estimate_errors
-from digiclay.core.scene import Scene
-from digiclay.core.session import Result, run
-from digiclay.core.stack.assembly import STACKED, structure
-from digiclay.core.stack.session import judge_of, judge_together
+from digiclay.core.batch.packing import STACKED, structure
+from digiclay.core.batch.run_together import judge_of, judge_together
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.accuracy import estimate_errors
+from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, sample
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from digiclay.core.errors import DivergenceError
-from digiclay.core.metrics import METRICS
-from digiclay.core.scene import Scene
-from digiclay.core.session import run
-from digiclay.core.stack.assembly import STACKED
-from digiclay.core.stack.session import judge_together
+from digiclay.core.base.errors import DivergenceError
+from digiclay.core.batch.packing import STACKED
+from digiclay.core.batch.run_together import judge_together
+from digiclay.core.metrics.summary import METRICS
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import STACKABLE, sample
 

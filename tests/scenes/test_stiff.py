@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core.errors import DivergenceError
+from digiclay.core.base.errors import DivergenceError
 from numpy.typing import NDArray
 
 from benchmarks import stiff_runs as stiff

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.accuracy import estimate_errors
-from digiclay.core.fluid import Fluid
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.session import run
-from digiclay.core.valve import Valve
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.valve import Valve
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.accuracy import estimate_errors
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import AWAY, one_cell, record, scripted
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
-from digiclay.core.contact import Contact
-from digiclay.core.errors import ParameterError
-from digiclay.core.valve import Valve
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.valve import Valve
 from scipy.integrate import quad
 
 from tests.assemble import AWAY, one_cell, path, record, scripted

@@ -15,8 +15,8 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.batch import JobProcess
 from digiclay.commands.batch_folder import opened
-from digiclay.core.errors import OutputError
-from digiclay.core.jobs import batch
+from digiclay.core.base.errors import OutputError
+from digiclay.core.studies.job_table import batch
 
 from tests.other_process import dead
 from tests.patience import HANGS, until

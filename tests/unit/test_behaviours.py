@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement, Orders
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.modes import Mode
+from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
 
 BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 REST = 40e-3

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.control.shapes import SHAPES
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.named_shapes import SHAPES
+from digiclay.core.model.interfaces import Measurement
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
 
 
 def control(**known: Any) -> Any:

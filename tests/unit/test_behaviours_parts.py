@@ -6,12 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
 from digiclay.core.control.drive import Drive
+from digiclay.core.control.named_shapes import SHAPES, named
 from digiclay.core.control.neighbours import cells_at, exchange
-from digiclay.core.control.shapes import SHAPES, named
-from digiclay.core.layout import Grid, Layout, grid
-from digiclay.core.scene_table import resolve
+from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import ParameterError
-from digiclay.core.methods import METHODS
-from digiclay.core.scene_table import resolve, text
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve, text
 
 BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 

@@ -12,9 +12,9 @@ from types import FrameType
 import numpy as np
 import pytest
 from digiclay.commands.tables import table
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import OutputError
-from digiclay.core.simulation import begin, periods
+from digiclay.core.base.errors import OutputError
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.scene.assembly import assemble
 
 from benchmarks import peers as peers
 from benchmarks.__main__ import main

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.axes import Point
-from digiclay.core.evaluation import LEAST, make_bundles
-from digiclay.core.scene_file import find, load
-from digiclay.core.stack.assembly import structure
+from digiclay.core.batch.packing import structure
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.studies.axes import Point
+from digiclay.core.studies.evaluation import LEAST, make_bundles
 
 from benchmarks import runs_together
 from benchmarks.__main__ import main

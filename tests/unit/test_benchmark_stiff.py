@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
-from digiclay.core.errors import DivergenceError
+from digiclay.core.base.errors import DivergenceError
 
 from benchmarks import stiff_runs as stiff
 from benchmarks.stiff_cases import CASES, EASY

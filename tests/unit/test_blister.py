@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.blister import Blister
-from digiclay.core.errors import ParameterError
 
 CONE, BELL = Blister(), Blister(profile="gaussian")
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.cell_states import CellStates, CellStatesControl, Patch
 from digiclay.core.control.travel import Heading
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Grid, Layout, grid
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement, Orders
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.layout import Grid, Layout, grid
 
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 from digiclay.cli import main
-from digiclay.core.errors import OutputError
-from digiclay.core.processes import host
-from digiclay.core.run_folder import claimed, claimed_files, inside, lock_beside, written
-from digiclay.core.unfinished import remove_abandoned
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.processes import host
+from digiclay.core.base.run_folder import claimed, claimed_files, inside, lock_beside, written
+from digiclay.core.base.unfinished import remove_abandoned
 
 from tests.other_process import dead
 from tests.patience import HANGS, until
@@ -192,7 +192,7 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends() -> None:
     script = (
         "import sys, time\n"
         "from pathlib import Path\n"
-        "from digiclay.core.run_folder import claimed\n"
+        "from digiclay.core.base.run_folder import claimed\n"
         "with claimed(Path('o'), overwrite=False):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"

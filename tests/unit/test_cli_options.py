@@ -14,7 +14,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import describe, export
 from digiclay.commands.describe import size
-from digiclay.core.errors import BEGINNING, END, one_line
+from digiclay.core.base.errors import BEGINNING, END, one_line
 
 from tests.patience import HANGS
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.closed_form import LARGE, TINY, careful, crossed, not_zero, pressed
-from digiclay.core.contact import Contact
+from digiclay.core.model.contact import Contact
+from digiclay.core.steppers.closed_form import LARGE, TINY, careful, crossed, not_zero, pressed
 
 COUNT = 4000
 

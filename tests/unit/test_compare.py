@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands.compare import table
-from digiclay.core.metrics_trial import TRIAL_METRICS
+from digiclay.core.studies.trials import TRIAL_METRICS
 from digiclay.plots.comparison import PANELS, comparison
 
 from tests.scene_files import folder_with, scene_text

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.conduit import Conduit, OrificeAndConduit, in_series
-from digiclay.core.fluid import Fluid
-from digiclay.core.valve import Valve, orifice
+from digiclay.core.model.conduit import Conduit, OrificeAndConduit, in_series
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.valve import Valve, orifice
 from scipy.integrate import quad
 
 THIN = Fluid(density=760.0, viscosity=0.65e-6)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.contact import LARGEST_EXPONENT, Contact
-from digiclay.core.errors import ParameterError
-from digiclay.core.fingertip import LEVEL, Fingertip
-from digiclay.core.layout import Layout, grid
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.contact import LARGEST_EXPONENT, Contact
+from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.layout import Layout, grid
 
 from tests.assemble import under
 

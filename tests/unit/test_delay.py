@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.delay import Delay, Queue, queue
-from digiclay.core.errors import ParameterError
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.engine.system import System, segments
+from digiclay.core.model.delay import Delay, Queue, queue
+from digiclay.core.model.lag import ValveLag
 from digiclay.core.steppers.bernoulli import BernoulliExponential
 from digiclay.core.steppers.runge_kutta import RungeKutta4
-from digiclay.core.system import System, segments
-from digiclay.core.valve_lag import ValveLag
 from scipy.integrate import quad
 
 from tests.assemble import AWAY, one_cell, record, scripted

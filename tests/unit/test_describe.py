@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.actuator import Actuator
-from digiclay.core.supply import Supply
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.supply import Supply
 
 from tests.assemble import AWAY, one_cell, record, scripted
 

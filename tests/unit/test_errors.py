@@ -7,8 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from digiclay.core.contact import Contact
-from digiclay.core.errors import DigiclayError, DivergenceError, OutputError, ParameterError, SceneError
+from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError, ParameterError, SceneError
+from digiclay.core.model.contact import Contact
 
 from tests.assemble import Record, one_cell, path, record, scripted
 from tests.patience import HANGS

@@ -12,12 +12,12 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core import export
-from digiclay.core.body import Body, volume
-from digiclay.core.export_model import Model, bodies
-from digiclay.core.features import Finding
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
+from digiclay.core.mesh_io import mesh_writer
+from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.body import Body, volume
+from digiclay.core.surface.features import Finding
+from digiclay.core.surface.formed import Formed
 
 BED = Layout(rows=7, columns=5, arrangement="hexagonal")
 #: mm: files hold float32 or 6 decimals; half a unit in the last place at 50 mm is 2e-6 mm.
@@ -40,7 +40,7 @@ def solid(formed: Formed) -> list[Body]:
 
 
 def path_for(folder: Path, kind: str) -> Path:
-    return folder / f"surface{export.suffix(kind)}"
+    return folder / f"surface{mesh_writer.suffix(kind)}"
 
 
 def corners(body: Body) -> np.ndarray:
@@ -50,14 +50,14 @@ def corners(body: Body) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_meshio_reads_back_the_triangles_in_millimetres(solid, tmp_path, kind):
-    read = meshio.read(export.write(solid, path_for(tmp_path, kind), kind=kind))
+    read = meshio.read(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind))
     found = read.points[read.cells_dict["triangle"]]
     np.testing.assert_allclose(found, corners(solid[0]) * 1e3, rtol=0.0, atol=WRITTEN)
 
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_trimesh_reads_back_a_watertight_solid_in_millimetres(solid, tmp_path, kind):
-    read = trimesh.load_mesh(export.write(solid, path_for(tmp_path, kind), kind=kind))
+    read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind))
     assert read.is_watertight
     assert read.is_winding_consistent
     # 1e-6: each vertex is off by 1e-7 of its coordinates at most.
@@ -66,13 +66,13 @@ def test_trimesh_reads_back_a_watertight_solid_in_millimetres(solid, tmp_path, k
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_metres_are_written_when_asked_for(solid, tmp_path, kind):
-    read = trimesh.load_mesh(export.write(solid, path_for(tmp_path, kind), unit="m", kind=kind))
+    read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), unit="m", kind=kind))
     np.testing.assert_allclose(read.bounds[1], solid[0].vertices.max(axis=0), rtol=0.0, atol=5e-9)  # float32
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
 def test_a_glb_is_in_metres_and_y_up_whatever_the_unit(solid, tmp_path, unit):
-    content = export.write(solid, tmp_path / "surface.glb", unit=unit).read_bytes()
+    content = mesh_writer.write(solid, tmp_path / "surface.glb", unit=unit).read_bytes()
     assert content[:4] == b"glTF"
     description = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
     position = description["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
@@ -84,14 +84,14 @@ def test_a_glb_is_in_metres_and_y_up_whatever_the_unit(solid, tmp_path, unit):
 
 
 def test_a_glb_keeps_its_outside_outside(solid, tmp_path):
-    read = trimesh.load_mesh(export.write(solid, tmp_path / "surface.glb"))
+    read = trimesh.load_mesh(mesh_writer.write(solid, tmp_path / "surface.glb"))
     assert read.is_watertight
     assert read.volume == pytest.approx(volume(solid[0]), rel=1e-6)  # float32; a mirrored one is negative
 
 
 def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
     made = bodies(formed, Model(kind="features"), Finding(smallest=1))
-    scene = trimesh.load_scene(export.write(made, tmp_path / "features.glb"))
+    scene = trimesh.load_scene(mesh_writer.write(made, tmp_path / "features.glb"))
     assert len(made) > 2
     assert set(scene.graph.nodes_geometry) == {body.name for body in made}
 
@@ -99,7 +99,7 @@ def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
 def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_path):
     made = bodies(formed, Model(kind="features"), Finding(smallest=1))
     for unit, factor in (("mm", 1e3), ("m", 1.0)):
-        path = export.write(made, tmp_path / "features.3mf", unit=unit)
+        path = mesh_writer.write(made, tmp_path / "features.3mf", unit=unit)
         model = lib3mf.Wrapper().CreateModel()
         reader = model.QueryReader("3mf")
         reader.SetStrictModeActive(True)
@@ -119,14 +119,14 @@ def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_pat
 
 
 def test_a_3mf_says_of_an_open_skin_that_it_is_a_surface(formed, tmp_path):
-    path = export.write(bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
+    path = mesh_writer.write(bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
     with zipfile.ZipFile(path) as archive:
         assert b'type="surface"' in archive.read("3D/3dmodel.model")
 
 
 def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
     made = bodies(formed, Model(), Finding(smallest=1))
-    path = export.write(made, tmp_path / "surface.obj")
+    path = mesh_writer.write(made, tmp_path / "surface.obj")
     groups = [line.split()[1] for line in path.read_text().splitlines() if line.startswith("g ")]
     assert groups == ["rest", *made[0].groups]
     scene = trimesh.load_scene(path, split_groups=True, group_material=False)
@@ -135,7 +135,7 @@ def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
 
 
 def test_a_ply_tells_height_force_and_mode_of_each_vertex(formed, solid, tmp_path):
-    read = meshio.read(export.write(solid, tmp_path / "surface.ply")).point_data
+    read = meshio.read(mesh_writer.write(solid, tmp_path / "surface.ply")).point_data
     n = len(formed.height)
     np.testing.assert_allclose(read["height"][:n], formed.height * 1e3, rtol=1e-7)  # float32
     np.testing.assert_allclose(read["force"][:n], formed.force, rtol=1e-7)
@@ -144,50 +144,54 @@ def test_a_ply_tells_height_force_and_mode_of_each_vertex(formed, solid, tmp_pat
 
 
 def test_a_binary_stl_has_50_bytes_a_triangle(solid, tmp_path):
-    path = export.write(solid, tmp_path / "surface.stl")
+    path = mesh_writer.write(solid, tmp_path / "surface.stl")
     assert path.stat().st_size == 84 + 50 * len(solid[0].faces)
 
 
 def test_a_text_stl_and_a_binary_one_do_not_share_a_name(solid, tmp_path):
     for kind in ("stl", "stl_ascii"):
-        export.write(solid, path_for(tmp_path, kind), kind=kind)
+        mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["surface.ascii.stl", "surface.stl"]
     assert (tmp_path / "surface.ascii.stl").read_text().startswith("solid clay\nfacet normal ")
 
 
-@pytest.mark.parametrize("kind", export.FORMATS)
+@pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_the_same_mesh_gives_the_same_bytes(solid, tmp_path, kind):
-    one, other = (export.write(solid, tmp_path / f"{name}.x", kind=kind).read_bytes() for name in "ab")
+    one, other = (mesh_writer.write(solid, tmp_path / f"{name}.x", kind=kind).read_bytes() for name in "ab")
     assert one == other
 
 
-@pytest.mark.parametrize("kind", export.FORMATS)
+@pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_pieces_of_a_body_are_written_like_the_whole(solid, tmp_path, kind, monkeypatch):
-    whole = export.write(solid, tmp_path / "whole", kind=kind).read_bytes()
-    monkeypatch.setattr("digiclay.core.body.PIECE", 7)
-    assert export.write(solid, tmp_path / "pieces", kind=kind).read_bytes() == whole
+    whole = mesh_writer.write(solid, tmp_path / "whole", kind=kind).read_bytes()
+    monkeypatch.setattr("digiclay.core.surface.body.PIECE", 7)
+    assert mesh_writer.write(solid, tmp_path / "pieces", kind=kind).read_bytes() == whole
 
 
 def test_writing_leaves_the_bodies_as_they_were(solid, tmp_path):
     before = solid[0].vertices.copy()
-    for kind in export.FORMATS:
-        export.write(solid, path_for(tmp_path, kind), kind=kind)
+    for kind in mesh_writer.FORMATS:
+        mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind)
     np.testing.assert_array_equal(solid[0].vertices, before)
 
 
 def test_the_extension_may_be_in_capitals(solid, tmp_path):
-    assert export.write(solid, tmp_path / "SURFACE.STL").stat().st_size > 84
+    assert mesh_writer.write(solid, tmp_path / "SURFACE.STL").stat().st_size > 84
 
 
-@pytest.mark.parametrize("kind", export.FORMATS)
+@pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_a_path_may_have_blanks_and_umlauts(solid, tmp_path, kind):
     folder = tmp_path / "für später 粘土"
     folder.mkdir()
-    assert export.write(solid, folder / f"gewölbte Fläche 1{export.suffix(kind)}", kind=kind).stat().st_size
+    assert (
+        mesh_writer.write(solid, folder / f"gewölbte Fläche 1{mesh_writer.suffix(kind)}", kind=kind)
+        .stat()
+        .st_size
+    )
 
 
 def test_an_older_file_is_replaced_and_nothing_else_is_left(solid, tmp_path):
     (tmp_path / "surface.stl").write_text("older")
-    export.write(solid, tmp_path / "surface.stl")
+    mesh_writer.write(solid, tmp_path / "surface.stl")
     assert [path.name for path in tmp_path.iterdir()] == ["surface.stl"]
     assert trimesh.load_mesh(tmp_path / "surface.stl").is_watertight

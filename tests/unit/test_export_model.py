@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.body import NO_PIN, Body, volume
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.export_model import KINDS, Model, bodies
-from digiclay.core.features import Finding
-from digiclay.core.formed import Formed, of_history
-from digiclay.core.layout import Layout, grid
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.mesh_io.export_model import KINDS, Model, bodies
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.body import NO_PIN, Body, volume
+from digiclay.core.surface.features import Finding
+from digiclay.core.surface.formed import Formed, of_history
 
 from tests.prisms import prism_volume
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core import export
-from digiclay.core.body import Body
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.export_model import Model, bodies
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.mesh_io import mesh_writer
+from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.body import Body
+from digiclay.core.surface.formed import Formed
 
 from tests.patience import HANGS
 
@@ -31,18 +31,18 @@ def solid() -> list[Body]:
 def test_an_unknown_format_is_refused_with_the_known_ones(solid, tmp_path, name):
     said = r"^Unknown mesh format '(step|)': known are stl, stl_ascii, obj, ply, glb, 3mf\.$"
     with pytest.raises(OutputError, match=said):
-        export.write(solid, tmp_path / name)
+        mesh_writer.write(solid, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
 def test_an_unknown_unit_is_refused(solid, tmp_path):
     with pytest.raises(ParameterError, match=r"^Export\.unit must be one of mm, m \(got 'inch'\)\.$"):
-        export.write(solid, tmp_path / "surface.stl", unit="inch")
+        mesh_writer.write(solid, tmp_path / "surface.stl", unit="inch")
 
 
 def test_nothing_is_not_written(tmp_path):
     with pytest.raises(OutputError, match=r"^There is nothing to write to \S+surface\.stl\.$"):
-        export.write([], tmp_path / "surface.stl")
+        mesh_writer.write([], tmp_path / "surface.stl")
     assert not list(tmp_path.iterdir())
 
 
@@ -70,35 +70,35 @@ def read_only() -> Iterator[Path]:
 @pytest.mark.usefixtures("without_root")
 def test_a_folder_that_cannot_be_written_is_one_line(solid, read_only):
     with pytest.raises(OutputError, match=r"^Cannot write \S+surface\.stl: Permission denied\.$"):
-        export.write(solid, read_only / "surface.stl")
+        mesh_writer.write(solid, read_only / "surface.stl")
 
 
 def test_a_folder_that_is_not_there_is_one_line(solid, tmp_path):
     with pytest.raises(OutputError, match=r"^Cannot write \S+surface\.stl: No such file or directory\.$"):
-        export.write(solid, tmp_path / "missing" / "surface.stl")
+        mesh_writer.write(solid, tmp_path / "missing" / "surface.stl")
 
 
 def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match=r"^Cannot write \S+taken: "):
-        export.write_whole(tmp_path / "taken", b"content")
+        mesh_writer.write_whole(tmp_path / "taken", b"content")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can make a small disk")
-@pytest.mark.parametrize("kind", export.FORMATS)
+@pytest.mark.parametrize("kind", mesh_writer.FORMATS)
 def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     disk = tmp_path / "disk"
     disk.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=HANGS)
     try:
-        path = disk / f"surface{export.suffix(kind)}"
+        path = disk / f"surface{mesh_writer.suffix(kind)}"
         path.write_bytes(b"older")
         bed = grid(Layout(rows=60, columns=60))
         random = np.random.default_rng(1).uniform(0.03, 0.06, 3600)  # does not deflate into 64 kB
         made = bodies(Formed.of(bed.positions, random, 0.04, 0.0, 0), Model())
         with pytest.raises(OutputError, match=r"^Cannot write .*: No space left on device\.$"):
-            export.write(made, path, kind=kind)
+            mesh_writer.write(made, path, kind=kind)
         assert [one.name for one in disk.iterdir()] == [path.name]
         assert path.read_bytes() == b"older"
     finally:
@@ -109,16 +109,16 @@ def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("digiclay.core.mesh_file_stl._normals", stop)
+    monkeypatch.setattr("digiclay.core.mesh_io.stl_writer._normals", stop)
     with pytest.raises(KeyboardInterrupt):
-        export.write(solid, tmp_path / "surface.stl")
+        mesh_writer.write(solid, tmp_path / "surface.stl")
     assert not list(tmp_path.iterdir())
 
 
 def test_exporting_needs_numpy_alone():
     script = (
         "import sys; sys.modules['trimesh'] = None\n"
-        "from digiclay.core import export, export_model, formed\n"
+        "from digiclay.core import mesh_writer, export_model, formed\n"
         "bed = formed.Formed.of([[0, 0], [1, 0], [0, 1], [1, 1]], [1, 1, 1, 2], 1, 0, 0)\n"
         "print(len(export_model.bodies(bed, export_model.Model())[0].faces))\n"
     )

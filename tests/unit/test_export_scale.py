@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.core.body import PIECE
-from digiclay.core.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.surface.body import PIECE
 
 from benchmarks.__main__ import main
 from benchmarks.mesh_export import Export, formed, measured
@@ -28,7 +28,7 @@ def test_memory_grows_no_faster_than_the_bed():
 
 
 def test_the_benchmarks_bed_has_bosses_and_creases_to_be_found():
-    from digiclay.core.features import Finding
+    from digiclay.core.surface.features import Finding
 
     names = {body.name.split("_")[0] for body in bodies(formed(60), Model(kind="features"), Finding())}
     assert names == {"boss", "crease"}

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.features import Feature, Finding, find
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.sheet import stretched
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.features import Feature, Finding, find
+from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.sheet import stretched
 
 #: Pitch in mm; three of a kind that no ridge here fits to.
 BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))

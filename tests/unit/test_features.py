@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.errors import ParameterError
-from digiclay.core.feature_solids import solid
-from digiclay.core.features import Feature, Finding, find, summary, table
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.sheet import stretched
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.feature_solids import solid
+from digiclay.core.surface.features import Feature, Finding, find, summary, table
+from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.sheet import stretched
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 LEVEL = 0.04

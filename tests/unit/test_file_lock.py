@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 import pytest
-from digiclay.core.errors import OutputError
-from digiclay.core.file_lock import held, held_by_record
-from digiclay.core.processes import host, may_have_made, running_since
-from digiclay.core.unfinished import is_unfinished, remove_abandoned, unfinished
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.file_lock import held, held_by_record
+from digiclay.core.base.processes import host, may_have_made, running_since
+from digiclay.core.base.unfinished import is_unfinished, remove_abandoned, unfinished
 
 from tests.other_process import dead
 from tests.patience import HANGS, until
@@ -110,7 +110,7 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
     script = (
         "import os\n"
         "from pathlib import Path\n"
-        "from digiclay.core.file_lock import held\n"
+        "from digiclay.core.base.file_lock import held\n"
         "for _ in range(60):\n"
         "    with held(Path('d/lock'), 'no', 100.0):\n"
         "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
@@ -135,7 +135,7 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from digiclay.core.file_lock import held\n"
+        "from digiclay.core.base.file_lock import held\n"
         "with held(Path('lock'), 'no'):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"

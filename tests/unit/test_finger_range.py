@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
-from digiclay.core.finger_range import MOST_FORCE, MOST_INDENTATION, beyond_words, largest_indentation
-from digiclay.core.fingertip import Fingertip
-from digiclay.core.scene import Path, Scene, Waypoint
-from digiclay.core.session import Result, run
+from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, beyond_words, largest_indentation
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.scene.schema import Path, Scene, Waypoint
+from digiclay.core.session.run_scene import Result, run
 from digiclay.overlay.sections import force_words
 
 from tests.assemble import sample, under

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.fingertip import JOIN, LEVEL, Fingertip
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.fingertip import JOIN, LEVEL, Fingertip
 from scipy.spatial.transform import Rotation
 
 from tests.assemble import under

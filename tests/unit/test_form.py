@@ -10,16 +10,16 @@ import pytest
 import trimesh
 from digiclay.cli import main
 from digiclay.commands.exit_codes import WRONG
-from digiclay.core.actuator import Actuator
-from digiclay.core.assembly import assemble
-from digiclay.core.fingertip import Fingertip
-from digiclay.core.form import display_of, display_time, shaped, summit, touch_height
-from digiclay.core.layout import Layout, grid
-from digiclay.core.scene_file import load
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import run
-from digiclay.core.shape import Shape
-from digiclay.core.shape_file import fitted_to, sample_shapes
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.forming import display_of, display_time, shaped, summit, touch_height
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import run
+from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.source_file import fitted_to, sample_shapes
 from PIL import Image
 
 SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]

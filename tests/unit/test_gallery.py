@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from digiclay.commands.gallery import Card, page
 from digiclay.commands.thumbnail import height_map
-from digiclay.core.png import png
+from digiclay.core.base.png import png
 
 
 class Reader(HTMLParser):

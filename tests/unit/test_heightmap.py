@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core import heightmap
-from digiclay.core.errors import ParameterError
-from digiclay.core.heightmap import averaged, height_map
-from digiclay.core.heightmap_picture import pixels
-from digiclay.core.layout import Layout, grid
-from digiclay.core.relief import Placement
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.shapes import heightmap
+from digiclay.core.shapes.heightmap import averaged, height_map
+from digiclay.core.shapes.picture_heights import pixels
+from digiclay.core.shapes.relief import Placement
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.errors import SceneError
-from digiclay.core.job_outputs import Outputs, outputs
-from digiclay.core.jobs import batch, job_outputs
-from digiclay.core.layout import grid
-from digiclay.core.scene_file import SAMPLES, load
-from digiclay.core.scene_table import text
-from digiclay.core.shape_file import fitted_to
-from digiclay.core.shots import Film, Still, Turntable
+from digiclay.core.base.errors import SceneError
+from digiclay.core.model.layout import grid
+from digiclay.core.scene.scene_source import SAMPLES, load
+from digiclay.core.scene.toml_table import text
+from digiclay.core.session.render_settings import Film, Still, Turntable
+from digiclay.core.shapes.source_file import fitted_to
+from digiclay.core.studies.job_outputs import Outputs, outputs
+from digiclay.core.studies.job_table import batch, job_outputs
 
 
 def jobs_file(folder: Path, said: str) -> Path:

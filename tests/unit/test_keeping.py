@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import StateError
-from digiclay.core.keeping import START, carried, packed, unpacked
-from digiclay.core.methods import METHODS
-from digiclay.core.modes import Mode
-from digiclay.core.scene_table import resolve
-from digiclay.core.simulation import begin, periods
-from digiclay.core.state import State
-from digiclay.core.system import System
+from digiclay.core.base.errors import StateError
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.methods import METHODS
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.snapshot import START, carried, packed, unpacked
 
 from tests.assemble import path
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from digiclay.core.errors import StateError
-from digiclay.core.keeping_memory import rebuilt, written
+from digiclay.core.base.errors import StateError
+from digiclay.core.session.snapshot_memory import rebuilt, written
 from numpy.typing import NDArray
 
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Layout, grid
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
 
 ARRANGEMENTS = ["aligned", "staggered", "hexagonal"]
 

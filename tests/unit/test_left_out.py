@@ -15,7 +15,7 @@ from digiclay.cli import main
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
 from digiclay.commands.extras import as_typed
-from digiclay.core import mesh_in
+from digiclay.core.mesh_io import mesh_reader
 
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
 
@@ -169,8 +169,8 @@ def test_a_command_is_written_as_a_shell_takes_it() -> None:
 
 def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) -> None:
     from digiclay.commands.extras import meshes
-    from digiclay.core.finished import row_at
-    from digiclay.core.scene_file import load
+    from digiclay.core.scene.scene_source import load
+    from digiclay.core.session.finished_run import row_at
 
     times = np.arange(2000) * 0.005
     for row in (1, 777, 1999):
@@ -180,6 +180,6 @@ def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) ->
 
 def test_libraries_that_read_are_imported_where_a_stop_does_no_harm() -> None:
     # trimesh reads three formats, which are imported within `undisturbed`; all others need no library.
-    assert {kind: mesh_in.reader(kind) for kind in mesh_in.MESHES if mesh_in.reader(kind)} == dict.fromkeys(
-        (".stl", ".ply", ".off"), "trimesh"
-    )
+    assert {
+        kind: mesh_reader.reader(kind) for kind in mesh_reader.MESHES if mesh_reader.reader(kind)
+    } == dict.fromkeys((".stl", ".ply", ".off"), "trimesh")

@@ -6,18 +6,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core import accuracy
-from digiclay.core.accuracy import PAUSE, STRETCH, Errors
-from digiclay.core.assembly import assemble
-from digiclay.core.fingertip import LEVEL
-from digiclay.core.keeping import packed
-from digiclay.core.live import Clock, due, lived, reachable, spent, way
-from digiclay.core.modes import Mode
-from digiclay.core.scene_table import resolve
-from digiclay.core.set_point import SetPoint
-from digiclay.core.simulation import begin, periods
-from digiclay.core.trace import ROWS, begun, extended, felt, picked, row
-from digiclay.core.trajectory import along, between
+from digiclay.core.base.modes import Mode
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.set_point import SetPoint
+from digiclay.core.model.trajectory import along, between
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import accuracy
+from digiclay.core.session.accuracy import PAUSE, STRETCH, Errors
+from digiclay.core.session.live_periods import Clock, due, lived, reachable, spent, way
+from digiclay.core.session.recent_trace import ROWS, begun, extended, felt, picked, row
+from digiclay.core.session.snapshot import packed
 from numpy.typing import NDArray
 
 from tests.assemble import path

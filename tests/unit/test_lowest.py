@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from digiclay.core.mesh_in import read
+from digiclay.core.mesh_io.mesh_reader import read
 
 from tests.patience import HANGS
 
@@ -24,7 +24,7 @@ SCRIPT = """
 import json, sys
 from pathlib import Path
 import trimesh
-from digiclay.core.mesh_in import read
+from digiclay.core.mesh_io.mesh_reader import read
 found = {name: [read(Path(name)).vertices.tolist(), read(Path(name)).faces.tolist()] for name in sys.argv[1:]}
 print(json.dumps({"version": trimesh.__version__, "where": trimesh.__file__, "found": found}))
 """

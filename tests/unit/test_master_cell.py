@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.conduit import Conduit
 from digiclay.core.control.master import Master, Phase
 from digiclay.core.control.master_cell import master_cell
 from digiclay.core.control.travel import Heading
-from digiclay.core.fluid import Fluid
-from digiclay.core.physics import Cell
-from digiclay.core.valve import Valve
+from digiclay.core.model.conduit import Conduit
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.physics import Cell
+from digiclay.core.model.valve import Valve
 
 from tests.assemble import make_system
 

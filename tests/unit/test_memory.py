@@ -6,11 +6,11 @@ import tracemalloc
 from typing import Any
 
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.recorder import Recorder, bytes_needed
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import busy_cells, run
-from digiclay.core.state import Rows
+from digiclay.core.engine.state import Rows
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.recorder import Recorder, bytes_needed
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import busy_cells, run
 
 #: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.
 SIDES, MORE = (100, 150), 150**2 - 100**2

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core import export, mesh_in_limits
-from digiclay.core.body import Body
-from digiclay.core.errors import ParameterError
-from digiclay.core.mesh_in import read
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.mesh_io import mesh_limits, mesh_writer
+from digiclay.core.mesh_io.mesh_reader import read
+from digiclay.core.surface.body import Body
 
 KINDS = ("gltf", "stl", "stl_ascii", "obj", "ply", "ply_ascii", "off", "glb", "3mf")
 HEAD = bytes(80) + struct.pack("<I", 4_000_000_000)
@@ -25,7 +25,7 @@ def written(folder: Path, kind: str) -> Path:
     ball = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
     path = folder / f"ball.{kind.split('_')[0]}"
     if kind == "3mf":
-        export.write(
+        mesh_writer.write(
             [Body("ball", ball.vertices * 1e-3, ball.faces.astype(np.int32), closed=True)], path, "mm"
         )
     elif kind == "gltf":
@@ -69,7 +69,7 @@ def test_whatever_way_an_obj_is_written_it_is_the_same_square(tmp_path: Path, te
 
 def test_an_obj_of_many_blocks_is_read_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = read(written(tmp_path, "obj"))
-    monkeypatch.setattr("digiclay.core.mesh_in_obj.BLOCK", 100)
+    monkeypatch.setattr("digiclay.core.mesh_io.obj_reader.BLOCK", 100)
     parts = read(tmp_path / "ball.obj")
     np.testing.assert_array_equal(whole.vertices, parts.vertices)
     np.testing.assert_array_equal(whole.faces, parts.faces)
@@ -174,6 +174,6 @@ def test_a_head_that_promises_more_than_there_is_is_refused(
 
 def test_a_file_beyond_all_sizes_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "hole.stl").open("wb") as file:
-        file.truncate(mesh_in_limits.MOST_BYTES + 1)  # takes no room on the disk
+        file.truncate(mesh_limits.MOST_BYTES + 1)  # takes no room on the disk
     with pytest.raises(ParameterError, match=r"must have at most 2 GB .got hole.stl: 2 GB"):
         read(tmp_path / "hole.stl")

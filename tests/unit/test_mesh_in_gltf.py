@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.errors import ParameterError
-from digiclay.core.mesh_in import read
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.mesh_io.mesh_reader import read
 
 #: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
 PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])

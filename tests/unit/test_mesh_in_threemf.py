@@ -11,11 +11,11 @@ from pathlib import Path
 import lib3mf
 import numpy as np
 import pytest
-from digiclay.core import export, mesh_in_limits, mesh_in_threemf
-from digiclay.core.body import Body
-from digiclay.core.errors import ParameterError
-from digiclay.core.mesh_file_threemf import CORE, HEAD, RELATIONS, TYPES
-from digiclay.core.mesh_in import read
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.mesh_io import mesh_limits, mesh_writer, threemf_reader
+from digiclay.core.mesh_io.mesh_reader import read
+from digiclay.core.mesh_io.threemf_writer import CORE, HEAD, RELATIONS, TYPES
+from digiclay.core.surface.body import Body
 
 #: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
 PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
@@ -62,7 +62,7 @@ def placement(*rows: tuple[float, float, float]) -> lib3mf.Transform:
 @pytest.mark.parametrize("unit", ["mm", "m"])
 def test_the_3mf_that_is_written_is_read_back(tmp_path: Path, unit: str) -> None:
     body = Body("tetrahedron", PLACES * 1e-3, FACES.astype(np.int32), closed=True)
-    export.write([body], tmp_path / "own.3mf", unit)
+    mesh_writer.write([body], tmp_path / "own.3mf", unit)
     back = read(tmp_path / "own.3mf")
     assert back.length == {"mm": 1e-3, "m": 1.0}[unit]
     np.testing.assert_allclose(back.vertices * back.length, PLACES * 1e-3, rtol=0.0, atol=1e-9)
@@ -196,7 +196,7 @@ def test_a_zip_that_unpacks_to_more_than_is_allowed_is_not_unpacked(
     path = packed(tmp_path / "bomb.3mf", OBJECT + 3_000_000 * " ", ITEM)
     assert path.stat().st_size < 20_000
     read(path)
-    monkeypatch.setattr(mesh_in_limits, "MOST_BYTES", 2_000_000)
+    monkeypatch.setattr(mesh_limits, "MOST_BYTES", 2_000_000)
     with pytest.raises(ParameterError, match=r"at most 0.002 GB unpacked .got bomb.3mf: 3D/3dmodel"):
         read(path)
 
@@ -236,7 +236,7 @@ def test_a_damaged_zip_is_refused(tmp_path: Path, spoil: Callable[[bytes], bytes
 
 
 def test_more_parts_than_allowed_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_in_threemf, "MOST_PARTS", 999)
+    monkeypatch.setattr(threemf_reader, "MOST_PARTS", 999)
     # 111 objects, components and items make 1000 meshes.
     with pytest.raises(ParameterError, match=r"must place at most 999 meshes .got x.3mf: 1,000"):
         read(packed(tmp_path / "x.3mf", cube_of(3), '<item objectid="3"/>'))

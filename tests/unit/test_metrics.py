@@ -6,9 +6,10 @@ import json
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.metrics import (
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.modes import Mode
+from digiclay.core.metrics.finger_path import sum_cells
+from digiclay.core.metrics.summary import (
     METRICS,
     cell_area,
     compute_metrics,
@@ -18,9 +19,8 @@ from digiclay.core.metrics import (
     rfd,
     weights,
 )
-from digiclay.core.metrics_path import sum_cells
-from digiclay.core.modes import Mode
-from digiclay.core.set_point import SetPoint
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.set_point import SetPoint
 
 TIME = np.linspace(0.0, 10.0, 2001)
 #: Rounding of sums over 2001 rows.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.metrics_path import ridge_errors, sum_cells, surface_under
-from digiclay.core.modes import Mode
+from digiclay.core.base.modes import Mode
+from digiclay.core.metrics.finger_path import ridge_errors, sum_cells, surface_under
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

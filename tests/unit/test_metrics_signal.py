@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.metrics_signal import amplitude, deviation, frequency, mean, overshoot, settling_time
+from digiclay.core.metrics.signal import amplitude, deviation, frequency, mean, overshoot, settling_time
 
 TIME = np.linspace(0.0, 10.0, 10001)
 #: A second-order step response with damping 0.5 and 1 rad/s.

@@ -6,11 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.metrics_speed import Criterion, Drag, Follows, Lift, followed, largest, largest_speed
-from digiclay.core.metrics_trial import TRIAL_METRICS, Trial, trial
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.speed_limits import (
+    Criterion,
+    Drag,
+    Follows,
+    Lift,
+    followed,
+    largest,
+    largest_speed,
+)
+from digiclay.core.studies.trials import TRIAL_METRICS, Trial, trial
 
 
 def device(method: str = "virtual_master", **layout: object) -> Scene:
@@ -117,7 +125,7 @@ def test_a_trial_gives_every_metric(press: Trial) -> None:
 
 
 def test_a_trial_is_the_session_bit_for_bit(press: Trial) -> None:
-    from digiclay.core.session import run
+    from digiclay.core.session.run_scene import run
 
     history = run(press.scene).history
     assert history is not None

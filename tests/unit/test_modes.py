@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from digiclay.core.modes import COLOURS, MEANINGS, Mode
+from digiclay.core.base.modes import COLOURS, MEANINGS, Mode
 
 
 def test_the_stored_codes_never_change() -> None:

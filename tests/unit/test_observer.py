@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.places import Truth
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import run
-from digiclay.core.simulation import begin, periods
-from digiclay.core.state import State
-from digiclay.core.system import System
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.interfaces import Truth
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
 from tests.assemble import scripted

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.modes import COLOURS, Mode
+from digiclay.core.base.modes import COLOURS, Mode
 from digiclay.device import heat
 from digiclay.overlay.look import LETTERS, LINES, contrast, look
 from digiclay.overlay.picture import Box, Picture, axis, scaled

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.base.modes import MEANINGS
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE
-from digiclay.core.metrics_speed import Follows
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.modes import MEANINGS
-from digiclay.core.scene_file import find, load
-from digiclay.core.scene_table import resolve
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.speed_limits import Follows
+from digiclay.core.studies.trials import Trial
 
 from digiclay_paper import scenes
 from digiclay_paper.claim import Claim, verdict

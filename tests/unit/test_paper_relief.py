@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.metrics_trial import Trial
-from digiclay.core.modes import Mode
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.modes import Mode
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.trials import Trial
 from numpy.typing import NDArray
 
 from digiclay_paper.claims_relief import relief

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.metrics_speed import Follows
-from digiclay.core.scene_table import resolve
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.speed_limits import Follows
 from digiclay.plots.figure import canvas, save
 
 from digiclay_paper.claims_variants import ahead, escape, gaussian, radius, rise, staggered

@@ -6,9 +6,9 @@ import struct
 from pathlib import Path
 
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.heightmap_picture import pixels
-from digiclay.core.picture_size import told_size
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.picture_size import told_size
+from digiclay.core.shapes.picture_heights import pixels
 from PIL import Image
 
 

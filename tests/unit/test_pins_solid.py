@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.errors import ParameterError
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.pins_solid import BRIDGE, parts, pins_solid
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.pins_solid import BRIDGE, parts, pins_solid
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -9,10 +9,10 @@ import sys
 
 import numpy as np
 import pytest
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import Mode
-from digiclay.core.set_point import SetPoint
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.base.modes import Mode
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.set_point import SetPoint
 from digiclay.plots import run as plots
 from digiclay.plots.relief import hidden
 
@@ -242,7 +242,7 @@ def test_matplotlib_is_not_imported_before_it_is_needed():
 def test_without_matplotlib_it_says_what_to_install():
     script = (
         "import sys; sys.modules['matplotlib'] = None\n"
-        "from digiclay.plots import run\nfrom digiclay.core.errors import OutputError\n"
+        "from digiclay.plots import run\nfrom digiclay.core.base.errors import OutputError\n"
         "case = {'position': [[0, 0]], 'time': [0], 'total_force': [0], 'height': [[0]]}\n"
         "try:\n    run.session(case, 'session.png', None)\n"
         "except OutputError as error:\n    print(error)\n"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.fingertip import LEVEL, Fingertip, forms, matrices, underside
-from digiclay.core.layout import Grid, Layout, grid
-from digiclay.core.pointing import ground, meeting, patch, ray
+from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, matrices, underside
+from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.surface.pointing import ground, meeting, patch, ray
 from hypothesis import given
 from hypothesis import strategies as st
 

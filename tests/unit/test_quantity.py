@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.quantity import UNITS, Parameters, nearest, parse, quantities, quantity
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.quantity import UNITS, Parameters, nearest, parse, quantities, quantity
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import ParameterError
-from digiclay.core.recorder import (
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.state import Rows, State, at_rest
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.recorder import (
     Recorder,
     Recording,
     available_memory,
@@ -16,8 +18,6 @@ from digiclay.core.recorder import (
     refuse_what_cannot_fit,
     write,
 )
-from digiclay.core.simulation import begin, periods
-from digiclay.core.state import Rows, State, at_rest
 
 from tests.assemble import sample
 

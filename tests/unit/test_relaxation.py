@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from digiclay.core.absent import Unrelaxed
-from digiclay.core.contact import Contact
-from digiclay.core.errors import ParameterError
-from digiclay.core.relaxation import Relaxation
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.null_parts import Unrelaxed
+from digiclay.core.model.relaxation import Relaxation
 from scipy.integrate import quad
 
 from tests.assemble import Motion, one_cell, record

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.commands.batch_folder import opened
-from digiclay.core.errors import OutputError
-from digiclay.core.finished import is_whole
-from digiclay.core.jobs import batch
-from digiclay.core.safe_names import LONGEST, alike, name_of, safe_name, unique_names
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.safe_names import LONGEST, alike, name_of, safe_name, unique_names
+from digiclay.core.session.finished_run import is_whole
+from digiclay.core.studies.job_table import batch
 from hypothesis import example, given
 from hypothesis import strategies as st
 

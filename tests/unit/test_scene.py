@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.scene import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene, Simulation
-from digiclay.core.scene_table import PRESETS, resolve, text
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.scene.schema import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene, Simulation
+from digiclay.core.scene.toml_table import PRESETS, resolve, text
 
 
 def section(name: str, **values: Any) -> Scene:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from digiclay.core.errors import SceneError
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import SAMPLES, Setting, find, load, sample_names
+from digiclay.core.base.errors import SceneError
+from digiclay.core.scene.scene_source import SAMPLES, Setting, find, load, sample_names
+from digiclay.core.scene.schema import Scene
 
 
 def scene(folder: Path, text: str, **settings: str) -> Scene:

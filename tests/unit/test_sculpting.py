@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core import live
-from digiclay.core.errors import DigiclayError
-from digiclay.core.keeping import packed
-from digiclay.core.scene_table import resolve
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import live_periods
+from digiclay.core.session.snapshot import packed
 from digiclay.live import running, sculpting
 
 from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
@@ -19,7 +19,7 @@ from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live, "SHARE", 1e9)
+    monkeypatch.setattr(live_periods, "SHARE", 1e9)
 
 
 def test_a_press_forms_the_bed_as_it_goes_on() -> None:

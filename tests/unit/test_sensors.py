@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.absent import PerfectSensors
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import ParameterError, SceneError
-from digiclay.core.places import Sensors, Truth
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.scene_table import resolve, text
-from digiclay.core.sensors import Delayed, Noisy, Quantised, Sensing, normals
-from digiclay.core.session import run
-from digiclay.core.simulation import begin, periods
+from digiclay.core.base.errors import ParameterError, SceneError
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.interfaces import Sensors, Truth
+from digiclay.core.model.null_parts import PerfectSensors
+from digiclay.core.model.sensors import Delayed, Noisy, Quantised, Sensing, normals
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
 from tests.patience import HANGS
@@ -249,8 +249,8 @@ def test_sensors_are_absent_by_default_and_cost_no_row() -> None:
 def test_only_the_sensor_models_asked_for_are_imported(setting: str, modules: str) -> None:
     script = (
         "import sys\n"
-        "from digiclay.core.scene_file import Setting, find, load\n"
-        "from digiclay.core.session import run\n"
+        "from digiclay.core.scene.scene_source import Setting, find, load\n"
+        "from digiclay.core.session.run_scene import run\n"
         "run(load(find('slow_press'), [Setting(*one.split('=', 1)) for one in sys.argv[1:]]))\n"
         "print(*sorted({'observer', 'sensors'} & {m.removeprefix('digiclay.core.') for m in sys.modules}))\n"
     )

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 from digiclay.cli import main
-from digiclay.core.errors import OutputError
-from digiclay.core.processes import host
-from digiclay.core.series import Kind, open_series
-from digiclay.core.whole_files import read_json
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.processes import host
+from digiclay.core.base.whole_files import read_json
+from digiclay.core.studies.series import Kind, open_series
 
 from tests.other_process import dead
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text

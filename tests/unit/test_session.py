@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.run_folder import MARK, may_be_written, written
-from digiclay.core.scene import Scene
-from digiclay.core.scene_table import resolve
-from digiclay.core.session import Result, run, save
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.base.run_folder import MARK, may_be_written, written
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result, run, save
 
 WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}

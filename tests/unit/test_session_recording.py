@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core import live
-from digiclay.core.keeping import packed, unpacked
-from digiclay.core.live import lived
+from digiclay.core.session import live_periods
+from digiclay.core.session.live_periods import lived
+from digiclay.core.session.snapshot import packed, unpacked
 from digiclay.live import sculpting
 
 from tests.hand import Hand, started
@@ -15,7 +15,7 @@ from tests.hand import Hand, started
 @pytest.fixture(autouse=True)
 def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
-    monkeypatch.setattr(live, "SHARE", 1e9)
+    monkeypatch.setattr(live_periods, "SHARE", 1e9)
 
 
 def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:

@@ -10,15 +10,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core import export
-from digiclay.core.actuator import Actuator
-from digiclay.core.body import Body
-from digiclay.core.errors import DigiclayError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.scene_file import load
-from digiclay.core.shape import Shape
-from digiclay.core.shape_file import SAMPLES, find_shape, fitted_to, read, sample_shapes
-from digiclay.core.shape_mesh import ShapeMesh
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.mesh_io import mesh_writer
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.scene_source import load
+from digiclay.core.shapes.mesh_relief import ShapeMesh
+from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.source_file import SAMPLES, find_shape, fitted_to, read, sample_shapes
+from digiclay.core.surface.body import Body
 
 ROOT = Path(__file__).parents[2]
 BED = grid(Layout(13, 13, 3e-3))
@@ -89,7 +89,7 @@ def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> 
     unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in metres, y up
     turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind == "glb" else solid.vertices
     if kind == "3mf":
-        export.write([Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path)
+        mesh_writer.write([Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path)
     else:
         trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
     bare = read(Shape(file=str(path)))

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.actuator import Actuator
-from digiclay.core.errors import ParameterError
-from digiclay.core.heightmap import height_map
-from digiclay.core.layout import Layout, grid
-from digiclay.core.shape import Shape
-from digiclay.core.shape_fit import Fitted, fitted, given
-from digiclay.core.shape_mesh import shape_mesh
-from digiclay.core.shape_text import packed, unpacked
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.shapes.fitting import Fitted, fitted, given
+from digiclay.core.shapes.height_text import packed, unpacked
+from digiclay.core.shapes.heightmap import height_map
+from digiclay.core.shapes.mesh_relief import shape_mesh
+from digiclay.core.shapes.request import Shape
 
 REST, STROKE = Actuator().rest_height, Actuator().stroke
 BED = grid(Layout(13, 25, 3e-3))

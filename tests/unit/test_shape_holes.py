@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.actuator import Actuator
-from digiclay.core.layout import Layout, grid
-from digiclay.core.relief import Placement
-from digiclay.core.shape import Shape
-from digiclay.core.shape_file import fitted_to
-from digiclay.core.shape_holes import SMALL, fill_holes
-from digiclay.core.shape_mesh import ShapeMesh, shape_mesh
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.shapes.holes import SMALL, fill_holes
+from digiclay.core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from digiclay.core.shapes.relief import Placement
+from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.source_file import fitted_to
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 #: Meshes here are in mm and stand where they are.

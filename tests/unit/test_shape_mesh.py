@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.relief import Placement, Tops
-from digiclay.core.shape_mesh import ShapeMesh, shape_mesh
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from digiclay.core.shapes.relief import Placement, Tops
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import LinearNDInterpolator

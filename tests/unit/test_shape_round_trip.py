@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
-from digiclay.core.export import FORMATS, suffix, write
-from digiclay.core.export_model import Model, bodies
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Grid, Layout, grid
-from digiclay.core.relief import Placement
-from digiclay.core.shape import Shape
-from digiclay.core.shape_file import read
-from digiclay.core.shape_fit import Fitted, fitted
-from digiclay.core.shape_mesh import shape_mesh
+from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.shapes.fitting import Fitted, fitted
+from digiclay.core.shapes.mesh_relief import shape_mesh
+from digiclay.core.shapes.relief import Placement
+from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.source_file import read
+from digiclay.core.surface.formed import Formed
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 #: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in decimals.

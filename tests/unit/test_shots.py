@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.shots import Film, Turntable
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.session.render_settings import Film, Turntable
 
 #: One second in periods of 5 ms.
 TIME = np.arange(201) * 5e-3

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse
-from digiclay.core.formed import Formed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.sheet import Sheet, stretched
-from digiclay.core.skins import SKINS
-from digiclay.core.spline import monotone
+from digiclay.core.base.spline import monotone
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.sheet import Sheet, stretched
+from digiclay.core.surface.skins import SKINS
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay

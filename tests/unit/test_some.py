@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.some import how_many, some
+from digiclay.core.base.counting import how_many, some
 
 CASES = {
     "no cell": np.zeros(0, np.bool_),

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.actuator import Actuator
-from digiclay.core.fluid import Fluid
-from digiclay.core.layout import Layout
-from digiclay.core.physics import Speeds, speeds
-from digiclay.core.supply import Supply
+from digiclay.core.model.actuator import Actuator
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.physics import Speeds, speeds
+from digiclay.core.model.supply import Supply
 
 from tests.assemble import AWAY, make_system, one_cell, path, record, scripted
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.physics import speeds
-from digiclay.core.scene_file import find, load
-from digiclay.core.stack.columns import Floats
-from digiclay.core.stack.physics import Extrapolated
+from digiclay.core.batch.alike import Extrapolated
+from digiclay.core.batch.broadcasting import Floats
+from digiclay.core.model.physics import speeds
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import find, load
 
 CELL = assemble(load(find("tap"))).cell
 

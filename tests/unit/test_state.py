@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.layout import Layout
-from digiclay.core.modes import Mode
-from digiclay.core.simulation import begin
-from digiclay.core.state import Rows, State, at_rest
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import Rows, State, at_rest
+from digiclay.core.model.layout import Layout
 
 from tests.assemble import make_system, one_cell, path, record
 

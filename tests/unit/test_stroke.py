@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core.fingertip import LEVEL, Fingertip
-from digiclay.core.layout import Layout, grid
+from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.layout import Layout, grid
 from digiclay.live.stroke import (
     APPROACH,
     DEEPEST,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.physics import rates
-from digiclay.core.supply import Supply
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.physics import rates
+from digiclay.core.model.supply import Supply
 
 from tests.assemble import one_cell
 

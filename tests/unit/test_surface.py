@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.layout import Layout, grid
-from digiclay.core.surface import BASE_THICKNESS, base_level, grid_shape, skin, solid
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.surface.skin_mesh import BASE_THICKNESS, base_level, grid_shape, skin, solid
 
 from tests.prisms import prism_volume
 

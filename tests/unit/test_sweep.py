@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 from digiclay.cli import main
-from digiclay.core.accuracy import estimate_errors
-from digiclay.core.axes import Axis, make_points, read_axis
-from digiclay.core.errors import ParameterError
-from digiclay.core.evaluation import FIGURES, find_figure
-from digiclay.core.metrics import METRICS
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.session import run
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.metrics.summary import METRICS
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.session.accuracy import estimate_errors
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.axes import Axis, make_points, read_axis
+from digiclay.core.studies.evaluation import FIGURES, find_figure
 
 from tests.scene_files import folder_with, scene_text
 

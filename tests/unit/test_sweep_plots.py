@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.axes import Column, make_columns, make_points, read_axis
-from digiclay.core.scene_file import Setting, find
+from digiclay.core.scene.scene_source import Setting, find
+from digiclay.core.studies.axes import Column, make_columns, make_points, read_axis
 from digiclay.plots.sweep import sweep_figure
 
 

@@ -17,11 +17,11 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere
 from digiclay.commands.worker import Processes
-from digiclay.core.axes import Point, make_points, read_axis
-from digiclay.core.errors import DigiclayError, OutputError
-from digiclay.core.evaluation import Record, evaluate, evaluate_bundle
-from digiclay.core.scene_file import Setting, find
-from digiclay.core.series import finish
+from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.scene.scene_source import Setting, find
+from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.evaluation import Record, evaluate, evaluate_bundle
+from digiclay.core.studies.series import finish
 
 from tests.patience import HANGS, until
 
@@ -101,7 +101,7 @@ def test_a_fault_in_one_point_is_recorded_by_its_name(monkeypatch: pytest.Monkey
     def faulty(*given: Any, **known: Any) -> None:
         raise ZeroDivisionError("one line\nand another")
 
-    monkeypatch.setattr("digiclay.core.evaluation.run", faulty)
+    monkeypatch.setattr("digiclay.core.studies.evaluation.run", faulty)
     scene = some()[0].scene
     assert scene is not None
     assert evaluate(scene) == {"error": "ZeroDivisionError: one line and another"}
@@ -167,7 +167,7 @@ def interrupted(out: Path, number: int) -> tuple[int, str]:
     """Run a sweep that gets a signal as soon as it has kept its second point; return exit code and stderr."""
     script = (
         "import os\n"
-        "from digiclay.core.sweep import Folder\n"
+        "from digiclay.core.studies.sweep_plan import Folder\n"
         "keep, kept = Folder.keep, []\n"
         "def told(*given):\n"
         "    keep(*given)\n"

@@ -10,10 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.core.assembly import assemble
-from digiclay.core.axes import Point, make_points, read_axis
-from digiclay.core.contact import Contact
-from digiclay.core.evaluation import (
+from digiclay.core.batch.advance import advance, begin
+from digiclay.core.batch.broadcasting import kind, together
+from digiclay.core.batch.fingers import fingers
+from digiclay.core.batch.packing import put_together
+from digiclay.core.batch.padding import reach
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.supply import Supply
+from digiclay.core.model.touch import approach
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.evaluation import (
     RUNS,
     StackWarning,
     evaluate,
@@ -21,14 +29,6 @@ from digiclay.core.evaluation import (
     explain_failed_stacks,
     make_bundles,
 )
-from digiclay.core.scene_file import Setting, find, load
-from digiclay.core.stack.assembly import put_together
-from digiclay.core.stack.columns import kind, together
-from digiclay.core.stack.fingers import fingers
-from digiclay.core.stack.gathering import reach
-from digiclay.core.stack.simulation import advance, begin
-from digiclay.core.supply import Supply
-from digiclay.core.touch import approach
 
 SHORT = [Setting("simulation.duration", "0.1")]
 
@@ -70,8 +70,8 @@ def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
 
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
-    from digiclay.core.fingertip import Fingertip
-    from digiclay.core.fingertip import reach as alone
+    from digiclay.core.model.fingertip import Fingertip
+    from digiclay.core.model.fingertip import reach as alone
 
     poses = np.zeros((3, 2, 7))
     poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
@@ -197,7 +197,7 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def faulty(*given: Any, **known: Any) -> Any:
         raise error
 
-    monkeypatch.setattr("digiclay.core.evaluation.judge_together", faulty)
+    monkeypatch.setattr("digiclay.core.studies.evaluation.judge_together", faulty)
 
 
 def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.errors import OutputError, ParameterError
-from digiclay.core.fingertip import LEVEL
-from digiclay.core.keeping import packed
-from digiclay.core.layout import Layout
-from digiclay.core.live import lived
-from digiclay.core.scene import Scene
-from digiclay.core.scene_file import load
-from digiclay.core.scene_table import text
-from digiclay.core.simulation import begin
-from digiclay.core.state import State
-from digiclay.core.system import System
-from digiclay.core.take import Take, as_scene, finer, from_bytes, states, to_bytes
+from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import text
+from digiclay.core.session.live_periods import lived
+from digiclay.core.session.snapshot import packed
+from digiclay.core.session.take import Take, as_scene, finer, from_bytes, states, to_bytes
 from numpy.typing import NDArray
 
 from tests.assemble import record, replayed, sample

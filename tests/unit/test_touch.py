@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.absent import Unrelaxed
-from digiclay.core.contact import Contact
-from digiclay.core.fingertip import LEVEL, Fingertip
-from digiclay.core.layout import Layout, grid
-from digiclay.core.relaxation import Relaxation
-from digiclay.core.simulation import begin, step
-from digiclay.core.touch import MOST, Touch, approach, force, reached
+from digiclay.core.engine.simulation import begin, step
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.null_parts import Unrelaxed
+from digiclay.core.model.relaxation import Relaxation
+from digiclay.core.model.touch import MOST, Touch, approach, force, reached
 
 from tests.assemble import AWAY, make_system, path, record
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.trajectory import Trajectory, between, level
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.trajectory import Trajectory, between, level
 from scipy.spatial.transform import Rotation
 
 RANDOM = np.random.default_rng(3)

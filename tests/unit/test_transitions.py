@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, changed
-from digiclay.core.modes import Mode
 
 #: Fig. 5, written down from the paper: from, to, when. VS is any cell on a virtual spring.
 FIGURE_5 = [

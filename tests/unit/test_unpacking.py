@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.assembly import assemble
-from digiclay.core.control.shapes import from_file
-from digiclay.core.errors import DigiclayError, OutputError, ParameterError, SceneError
-from digiclay.core.finished import read
-from digiclay.core.heightmap import height_map
-from digiclay.core.keeping import packed
-from digiclay.core.layout import Layout, grid
-from digiclay.core.recorder import available_memory
-from digiclay.core.scene_file import Setting, find, load, read_table
-from digiclay.core.scene_table import resolve, text
-from digiclay.core.shape import Shape
-from digiclay.core.shape_file import read as read_shape
-from digiclay.core.simulation import begin
-from digiclay.core.take import Take, from_bytes, to_bytes
-from digiclay.core.toml_text import LARGEST
+from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
+from digiclay.core.base.toml_text import LARGEST
+from digiclay.core.control.named_shapes import from_file
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.layout import Layout, grid
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.recorder import available_memory
+from digiclay.core.scene.scene_source import Setting, find, load, read_table
+from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.session.finished_run import read
+from digiclay.core.session.snapshot import packed
+from digiclay.core.session.take import Take, from_bytes, to_bytes
+from digiclay.core.shapes.heightmap import height_map
+from digiclay.core.shapes.request import Shape
+from digiclay.core.shapes.source_file import read as read_shape
 
 #: What refusing may take, bytes.
 LITTLE = 4_000_000

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.errors import ParameterError
-from digiclay.core.fluid import Fluid
-from digiclay.core.valve import Orifice, Valve, orifice
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.fluid import Fluid
+from digiclay.core.model.valve import Orifice, Valve, orifice
 
 OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.

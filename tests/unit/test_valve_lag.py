@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.absent import InstantValve
-from digiclay.core.delay import Delay, Queue, queue
-from digiclay.core.valve_lag import SHUT, ValveLag
+from digiclay.core.model.delay import Delay, Queue, queue
+from digiclay.core.model.lag import SHUT, ValveLag
+from digiclay.core.model.null_parts import InstantValve
 
 START, COMMAND = np.array([0.0, 1.0, -0.7, 0.3]), np.array([1.0, -1.0, 0.2, 0.3])
 NEXT = np.array([-1.0, 0.5, 0.5, -0.3])

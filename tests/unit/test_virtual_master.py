@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster, VirtualMasterControl
-from digiclay.core.layout import Layout
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement
+from digiclay.core.model.interfaces import Measurement
+from digiclay.core.model.layout import Layout
 
 from tests.assemble import make_system, master, place
 

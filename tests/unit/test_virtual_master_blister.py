@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
-from digiclay.core.layout import Layout, grid
-from digiclay.core.modes import Mode
-from digiclay.core.places import Measurement, Orders
+from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.layout import Layout, grid
 
 from tests.assemble import make_system, master, path, record
 

@@ -44,7 +44,7 @@ def test_the_wheel_has_the_package_and_the_paper_and_no_benchmark(wheel: Path) -
     paper = {f"digiclay_paper/{path.name}" for path in (ROOT / "digiclay_paper").glob("*.py")}
     assert len(paper) > 15
     assert paper - names == set()
-    assert {"digiclay/core/scene.py", "digiclay/sample_shapes/sessions/tap.toml"} <= names
+    assert {"digiclay/core/scene/schema.py", "digiclay/sample_shapes/sessions/tap.toml"} <= names
 
 
 def test_the_paper_is_reproduced_from_the_wheel(wheel: Path, tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ class Events:
 
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
-    running, keeping = blender.part("live.running"), blender.part("core.keeping")
+    running, keeping = blender.part("live.running"), blender.part("core.session.snapshot")
     for session in running.all():
         state = keeping.unpacked(session.system, session.kept)
         height = state.row(0)

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import OutputError, ParameterError
-from ..core.quantity import parse
-from ..core.scene import Scene
-from ..core.scene_file import Setting, find, load
+from ..core.base.errors import OutputError, ParameterError
+from ..core.base.quantity import parse
+from ..core.scene.scene_source import Setting, find, load
+from ..core.scene.schema import Scene
 
 __all__ = [
     "Help", "add_command", "add_run", "add_scene", "length", "millimetres", "scene_of", "seconds",

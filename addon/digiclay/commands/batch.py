@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import DigiclayError, one_line
-from ..core.jobs import Job, batch, find_jobs
+from ..core.base.errors import DigiclayError, one_line
+from ..core.studies.job_table import Job, batch, find_jobs
 from .arguments import add_command
 from .batch_folder import Folder, opened
 from .exit_codes import FAILED, STOPPED

@@ -10,14 +10,14 @@ from statistics import median
 from typing import Any
 
 from .. import __version__
-from ..core.errors import OutputError
-from ..core.finished import is_whole
-from ..core.jobs import JOB, SCENE, Batch, Job
-from ..core.run_folder import inside
-from ..core.scene_table import text
-from ..core.series import Kind, open_series
-from ..core.unfinished import remove_abandoned
-from ..core.whole_files import read_json, write_whole
+from ..core.base.errors import OutputError
+from ..core.base.run_folder import inside
+from ..core.base.unfinished import remove_abandoned
+from ..core.base.whole_files import read_json, write_whole
+from ..core.scene.toml_table import text
+from ..core.session.finished_run import is_whole
+from ..core.studies.job_table import JOB, SCENE, Batch, Job
+from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
 from .job import FILES, RUNS, TIMING
 from .progress import duration

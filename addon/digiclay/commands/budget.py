@@ -7,8 +7,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from ..core.budget import Fitted, fitted
-from ..core.scene import Scene
+from ..core.scene.schema import Scene
+from ..core.studies.omissions import Fitted, fitted
 from .arguments import told_as_options
 from .progress import Line
 from .tables import table
@@ -28,7 +28,7 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
 
 
 def noted(found: Fitted) -> dict[str, Any]:
-    """Return what ``metrics.json`` holds of it."""
+    """Return what ``summary.json`` holds of it."""
     return {
         "allowed": found.budget,
         "measured": found.error,

@@ -9,18 +9,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import ParameterError, SceneError
-from ..core.finger_range import beyond_words, largest_indentation
-from ..core.methods import METHODS
-from ..core.metrics_path import sum_cells
-from ..core.metrics_speed import Criterion, Drag, Lift, largest_speed
-from ..core.metrics_trial import TRIAL_METRICS, Trial, trial
-from ..core.quantity import nearest
-from ..core.run_folder import may_be_written, written
-from ..core.safe_names import name_of
-from ..core.scene import Scene
-from ..core.scene_file import Setting, find, load
-from ..core.set_point import asked
+from ..core.base.errors import ParameterError, SceneError
+from ..core.base.quantity import nearest
+from ..core.base.run_folder import may_be_written, written
+from ..core.base.safe_names import name_of
+from ..core.control.methods import METHODS
+from ..core.metrics.finger_path import sum_cells
+from ..core.model.finger_range import beyond_words, largest_indentation
+from ..core.model.set_point import asked
+from ..core.scene.scene_source import Setting, find, load
+from ..core.scene.schema import Scene
+from ..core.studies.speed_limits import Criterion, Drag, Lift, largest_speed
+from ..core.studies.trials import TRIAL_METRICS, Trial, trial
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without

@@ -8,14 +8,14 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from ..core.assembly import assemble
+from ..core.base.quantity import Parameters, quantities
 from ..core.control.master_cell import master_cell
-from ..core.quantity import Parameters, quantities
-from ..core.recorder import available_memory, bytes_needed
-from ..core.scene import Scene
-from ..core.session import busy_cells
-from ..core.shape_file import fitted_to
-from ..core.simulation import System
+from ..core.engine.simulation import System
+from ..core.scene.assembly import assemble
+from ..core.scene.recorder import available_memory, bytes_needed
+from ..core.scene.schema import Scene
+from ..core.session.run_scene import busy_cells
+from ..core.shapes.source_file import fitted_to
 from .arguments import add_command, add_scene, scene_of
 
 __all__ = ["add", "description"]

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from queue import SimpleQueue
 from typing import Any
 
-from ..core.axes import Point
-from ..core.errors import DigiclayError
-from ..core.evaluation import Record, evaluate_bundle
+from ..core.base.errors import DigiclayError
+from ..core.studies.axes import Point
+from ..core.studies.evaluation import Record, evaluate_bundle
 from .worker import Process, Processes
 
 __all__ = ["Evaluator", "evaluate_elsewhere", "serve"]

@@ -9,15 +9,15 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.body import Body
-from ..core.errors import OutputError
-from ..core.export import FORMATS, UNITS, known_format, suffix, write
-from ..core.export_model import KINDS, Model, bodies
-from ..core.features import Finding
-from ..core.finished import read
-from ..core.formed import of_history
-from ..core.run_folder import claimed_files
-from ..core.scene import Scene
+from ..core.base.errors import OutputError
+from ..core.base.run_folder import claimed_files
+from ..core.mesh_io.export_model import KINDS, Model, bodies
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, known_format, suffix, write
+from ..core.scene.schema import Scene
+from ..core.session.finished_run import read
+from ..core.surface.body import Body
+from ..core.surface.features import Finding
+from ..core.surface.formed import of_history
 from .arguments import add_run, millimetres, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of

@@ -13,9 +13,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.errors import DigiclayError
-from ..core.finished import last_touch
-from ..core.scene import Scene
+from ..core.base.errors import DigiclayError
+from ..core.scene.schema import Scene
+from ..core.session.finished_run import last_touch
 from .export import exported, file_names
 from .plot import PLOTS, plotted
 from .render import PICTURE, picture

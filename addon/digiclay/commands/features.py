@@ -6,10 +6,10 @@ import argparse
 import json
 from typing import Any
 
-from ..core.export_model import features
-from ..core.features import summary, table
-from ..core.finished import read
-from ..core.formed import of_history
+from ..core.mesh_io.export_model import features
+from ..core.session.finished_run import read
+from ..core.surface.features import summary, table
+from ..core.surface.formed import of_history
 from .arguments import add_run, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of

@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..core.assembly import assemble
-from ..core.errors import OutputError
-from ..core.form import GESTURES, shaped
-from ..core.layout import grid
-from ..core.run_folder import claimed, may_be_written
-from ..core.safe_names import name_of
-from ..core.scene import Scene
-from ..core.scene_file import Setting
-from ..core.session import Result, run, save
-from ..core.shape_file import Fitted, find_shape, fitted_to, import_reader, sample_shapes
-from ..core.shape_text import packed
+from ..core.base.errors import OutputError
+from ..core.base.run_folder import claimed, may_be_written
+from ..core.base.safe_names import name_of
+from ..core.model.layout import grid
+from ..core.scene.assembly import assemble
+from ..core.scene.forming import GESTURES, shaped
+from ..core.scene.scene_source import Setting
+from ..core.scene.schema import Scene
+from ..core.session.run_scene import Result, run, save
+from ..core.shapes.height_text import packed
+from ..core.shapes.source_file import Fitted, find_shape, fitted_to, import_reader, sample_shapes
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
 from .export import formats

@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.accuracy import estimate_errors, has_every_command
-from ..core.errors import DigiclayError, OutputError, one_line
-from ..core.job_outputs import Outputs
-from ..core.jobs import JOB, SCENE, job_outputs
-from ..core.run_folder import written
-from ..core.scene import Scene
-from ..core.scene_file import load
-from ..core.session import Result, run, save
-from ..core.whole_files import as_json, write_whole
+from ..core.base.errors import DigiclayError, OutputError, one_line
+from ..core.base.run_folder import written
+from ..core.base.whole_files import as_json, write_whole
+from ..core.scene.scene_source import load
+from ..core.scene.schema import Scene
+from ..core.session.accuracy import estimate_errors, has_every_command
+from ..core.session.run_scene import Result, run, save
+from ..core.studies.job_outputs import Outputs
+from ..core.studies.job_table import JOB, SCENE, job_outputs
 from .arguments import add_command
 from .exit_codes import STOPPED, WRONG
 from .export import exported, formats

@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, NoReturn
 
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 
 __all__ = ["add"]
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .. import __version__
-from ..core.errors import one_line
-from ..core.quantity import nearest
+from ..core.base.errors import one_line
+from ..core.base.quantity import nearest
 from . import (
     batch,
     compare,

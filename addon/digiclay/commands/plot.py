@@ -9,9 +9,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.finished import SHAPES, read
-from ..core.run_folder import claimed_files
-from ..core.scene import Scene
+from ..core.base.run_folder import claimed_files
+from ..core.scene.schema import Scene
+from ..core.session.finished_run import SHAPES, read
 from .arguments import add_run
 from .refusals import refuse_unwritable, refuse_what_has_no_surface, refuse_without
 

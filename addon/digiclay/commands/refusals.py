@@ -7,8 +7,8 @@ import importlib.util
 import os
 from pathlib import Path
 
-from ..core.errors import OutputError
-from ..core.scene import Scene
+from ..core.base.errors import OutputError
+from ..core.scene.schema import Scene
 from .stop import undisturbed
 
 __all__ = [

@@ -10,13 +10,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.errors import DigiclayError
-from ..core.fingertip import Fingertip
-from ..core.finished import last_touch, read, row_at
-from ..core.metrics import compute_metrics
-from ..core.run_folder import claimed_files
-from ..core.scene import Scene
-from ..core.shots import COLOURS, ENGINES, Film, Still, Turntable
+from ..core.base.errors import DigiclayError
+from ..core.base.run_folder import claimed_files
+from ..core.metrics.summary import compute_metrics
+from ..core.model.fingertip import Fingertip
+from ..core.scene.schema import Scene
+from ..core.session.finished_run import last_touch, read, row_at
+from ..core.session.render_settings import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
 from .exit_codes import STOPPED
 from .progress import Counted

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.accuracy import estimate_errors, has_every_command
-from ..core.errors import OutputError, ParameterError, SceneError
-from ..core.run_folder import claimed
-from ..core.safe_names import name_of
-from ..core.scene import Scene
-from ..core.session import Result, run, save
+from ..core.base.errors import OutputError, ParameterError, SceneError
+from ..core.base.run_folder import claimed
+from ..core.base.safe_names import name_of
+from ..core.scene.schema import Scene
+from ..core.session.accuracy import estimate_errors, has_every_command
+from ..core.session.run_scene import Result, run, save
 from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
 from .exit_codes import STOPPED

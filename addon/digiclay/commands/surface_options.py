@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..core.errors import OutputError
-from ..core.export_model import Model
-from ..core.features import Finding
-from ..core.finished import Run, row_at
-from ..core.scene import Scene
-from ..core.skins import SKINS
+from ..core.base.errors import OutputError
+from ..core.mesh_io.export_model import Model
+from ..core.scene.schema import Scene
+from ..core.session.finished_run import Run, row_at
+from ..core.surface.features import Finding
+from ..core.surface.skins import SKINS
 from .arguments import millimetres, seconds, told_as_options
 
 __all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.axes import Axis, Column, Point, make_columns, make_points, read_axis
-from ..core.errors import DigiclayError, OutputError, ParameterError
-from ..core.evaluation import (
+from ..core.base.errors import DigiclayError, OutputError, ParameterError
+from ..core.base.whole_files import write_whole
+from ..core.scene.scene_source import Setting, find
+from ..core.studies.axes import Axis, Column, Point, make_columns, make_points, read_axis
+from ..core.studies.evaluation import (
     ERRORS,
     Bundles,
     Record,
@@ -21,9 +23,7 @@ from ..core.evaluation import (
     find_figure,
     make_bundles,
 )
-from ..core.scene_file import Setting, find
-from ..core.sweep import Folder, format_table, make_grid, open_sweep
-from ..core.whole_files import write_whole
+from ..core.studies.sweep_plan import Folder, format_table, make_grid, open_sweep
 from .arguments import add_scene, settings_of
 from .evaluator import Evaluator, evaluate_elsewhere
 from .exit_codes import STOPPED

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import OutputError
-from ..core.png import png
-from ..core.whole_files import write_whole
+from ..core.base.errors import OutputError
+from ..core.base.png import png
+from ..core.base.whole_files import write_whole
 from ..device.heat import COLOURS
 
 __all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]

@@ -18,8 +18,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..core.errors import DigiclayError
-from ..core.series import finish
+from ..core.base.errors import DigiclayError
+from ..core.studies.series import finish
 
 __all__ = ["Process", "Processes", "count_cores", "finish_here", "in_blender"]
 

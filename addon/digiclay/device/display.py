@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..compat import bpy
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError
-from ..core.keeping import unpacked
-from ..core.trace import PICKED, SPAN
+from ..core.base.errors import DigiclayError
+from ..core.scene.assembly import assemble
+from ..core.session.recent_trace import PICKED, SPAN
+from ..core.session.snapshot import unpacked
 from ..live import bed_state, running
 from ..overlay import views
 from ..settings import properties

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import finished
-from ..core.actuator import Actuator
-from ..core.errors import OutputError
-from ..core.fingertip import LEVEL, Fingertip
-from ..core.layout import Layout, grid
-from ..core.modes import Mode
+from ..core.base.errors import OutputError
+from ..core.base.modes import Mode
+from ..core.model.actuator import Actuator
+from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.model.layout import Layout, grid
+from ..core.session import finished_run
 
 __all__ = ["CLEARANCE", "Instant", "read"]
 
@@ -39,7 +39,7 @@ class Instant:
     height : ndarray (n,)
         Pin tops above the bed's floor, m.
     mode : ndarray of int (n,)
-        Codes of `core.modes.Mode`.
+        Codes of `core.base.modes.Mode`.
     force : ndarray (n,)
         Force on each pin, N, pressing down is positive.
     fingertip : ndarray (7,)
@@ -126,12 +126,12 @@ class Instant:
 
 
 def read(path: Path, index: int = -1) -> Instant:
-    """Read an instant of a finished run.
+    """Read an instant of a finished_run run.
 
     Parameters
     ----------
     path : Path
-        The ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it.
+        The ``history.npz`` in a run's folder; sizes come from the ``schema.toml`` beside it.
     index : int, optional
         The row; negative rows count from the last one.
 
@@ -142,7 +142,7 @@ def read(path: Path, index: int = -1) -> Instant:
     """
     if path.name != "history.npz":
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
-    run = finished.read(path.parent, *ARRAYS)
+    run = finished_run.read(path.parent, *ARRAYS)
     scene = run.scene
     return Instant.of(
         run.history,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..core.modes import Mode
+from ..core.base.modes import Mode
 from . import node_arrows, node_heat
 from .nodes import attribute, node, number, switch
 from .parts import Sources

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
-from ..core.modes import COLOURS, Mode
+from ..core.base.modes import COLOURS, Mode
 from .parts import ROLE
 
 __all__ = ["DEFAULT", "PALETTES", "WORDS", "shown", "wear", "worn"]

@@ -9,7 +9,7 @@ import numpy as np
 from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
-from ..core.modes import COLOURS, Mode
+from ..core.base.modes import COLOURS, Mode
 from . import heat, primitives
 from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import bridge
-from ..core.layout import Layout, grid
+from ..core.model.layout import Layout, grid
 
 __all__ = ["differs"]
 

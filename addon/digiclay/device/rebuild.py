@@ -7,8 +7,8 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.fingertip import Fingertip
-from ..core.scene import Scene
+from ..core.model.fingertip import Fingertip
+from ..core.scene.schema import Scene
 from ..live import bed_state
 from ..settings import properties
 from . import view

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from .. import bridge
 from ..compat import bpy, own_curves
-from ..core.errors import DigiclayError
-from ..core.fingertip import Fingertip
-from ..core.scene import Scene
+from ..core.base.errors import DigiclayError
+from ..core.model.fingertip import Fingertip
+from ..core.scene.schema import Scene
 from ..settings import properties
 from . import parts, view
 from .instant import Instant

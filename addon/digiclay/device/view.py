@@ -17,9 +17,9 @@ import numpy as np
 from .. import bridge
 from ..bridge import SCALE
 from ..compat import node_setting, set_node_setting
-from ..core.errors import DigiclayError
-from ..core.state import State
-from ..core.system import System
+from ..core.base.errors import DigiclayError
+from ..core.engine.state import State
+from ..core.engine.system import System
 from . import parts
 from .instant import Instant
 from .node_arrows import ARROW_LENGTH, ARROWS

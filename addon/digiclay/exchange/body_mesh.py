@@ -8,7 +8,7 @@ import numpy as np
 
 from ..bridge import SCALE
 from ..compat import bpy
-from ..core.body import NO_PIN, Body
+from ..core.surface.body import NO_PIN, Body
 
 __all__ = ["thing"]
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from .. import bridge
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError, OutputError
-from ..core.export_model import Model
-from ..core.formed import Formed
-from ..core.keeping import unpacked
-from ..core.scene import Scene
-from ..core.state import State
-from ..core.system import System
+from ..core.base.errors import DigiclayError, OutputError
+from ..core.engine.state import State
+from ..core.engine.system import System
+from ..core.mesh_io.export_model import Model
+from ..core.scene.assembly import assemble
+from ..core.scene.schema import Scene
+from ..core.session.snapshot import unpacked
+from ..core.surface.formed import Formed
 from ..live import bed_state, running
 from ..settings import properties
 

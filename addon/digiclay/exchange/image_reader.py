@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compat import bpy
-from ..core.errors import ParameterError
-from ..core.heightmap_picture import READERS, refuse_too_many
+from ..core.base.errors import ParameterError
+from ..core.shapes.picture_heights import READERS, refuse_too_many
 
 __all__ = ["pixels", "register", "unregister"]
 

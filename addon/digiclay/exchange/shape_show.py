@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 
 from .. import bridge
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError, ParameterError
-from ..core.fingertip import LEVEL, Fingertip
-from ..core.form import display_of, display_time, touch_height
-from ..core.keeping import packed as kept_bytes
-from ..core.layout import grid
-from ..core.relief import Relief
-from ..core.scene import Scene
-from ..core.shape import Shape
-from ..core.shape_file import Fitted, fitted, fitted_to
-from ..core.shape_mesh import ShapeMesh, shape_mesh
-from ..core.shape_text import packed
-from ..core.simulation import begin, periods
-from ..core.trajectory import level
+from ..core.base.errors import DigiclayError, ParameterError
+from ..core.engine.simulation import begin, periods
+from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.model.layout import grid
+from ..core.model.trajectory import level
+from ..core.scene.assembly import assemble
+from ..core.scene.forming import display_of, display_time, touch_height
+from ..core.scene.schema import Scene
+from ..core.session.snapshot import packed as kept_bytes
+from ..core.shapes.height_text import packed
+from ..core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from ..core.shapes.relief import Relief
+from ..core.shapes.request import Shape
+from ..core.shapes.source_file import Fitted, fitted, fitted_to
 from ..device import view
 from ..device.instant import CLEARANCE
 from ..live import bed_state, sculpting

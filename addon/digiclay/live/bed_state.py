@@ -10,7 +10,7 @@ from .running import Floats, Running
 
 __all__ = ["MOMENT", "POSE", "STATE", "clear", "kept", "moment", "pose", "write"]
 
-#: The state by `core.keeping`, the finger's pose at it, and the tick it is of.
+#: The state by `core.session.snapshot`, the finger's pose at it, and the tick it is of.
 STATE, POSE, MOMENT = "digiclay_state", "digiclay_pose", "digiclay_moment"
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.accuracy import ErrorMonitor, Errors
-from ..core.live import Clock
-from ..core.scene import Scene
-from ..core.state import State
-from ..core.system import System
-from ..core.trace import Trace
+from ..core.engine.state import State
+from ..core.engine.system import System
+from ..core.scene.schema import Scene
+from ..core.session.accuracy import ErrorMonitor, Errors
+from ..core.session.live_periods import Clock
+from ..core.session.recent_trace import Trace
 from .stroke import Stroke
 
 __all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put", "said", "say"]
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """Where a gesture began: period, kept state (`core.keeping`), and pose of the finger (7,)."""
+    """Where a gesture began: period, kept state (`core.session.snapshot`), and pose of the finger (7,)."""
 
     period: int
     kept: bytes
@@ -37,7 +37,7 @@ class Recording:
     Attributes
     ----------
     start : bytes
-        The state recording began with, kept by `core.keeping`.
+        The state recording began with, kept by `core.session.snapshot`.
     first : int
         Its period.
     rows : ndarray (capacity, 8)
@@ -63,7 +63,7 @@ class Recording:
 
     @property
     def path(self) -> Floats:
-        """Poses, shape (t + 1, 7): `core.live.lived` simulates them again bit for bit."""
+        """Poses, shape (t + 1, 7): `core.session.live_periods.lived` simulates them again bit for bit."""
         return self.rows[: self.count, :7]
 
     @property
@@ -112,7 +112,7 @@ class Running:
     state : State
         Used up by the next tick: read what you need, keep nothing of it.
     kept : bytes
-        The state by `core.keeping`; also in the bed's property.
+        The state by `core.session.snapshot`; also in the bed's property.
     pose : ndarray (7,)
         The fingertip's, up to which the session has followed it.
     moment : int

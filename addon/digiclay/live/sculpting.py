@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import accuracy
-from ..core.assembly import assemble
-from ..core.errors import StateError
-from ..core.keeping import carried, packed, unpacked
-from ..core.live import Clock, due, lived, reachable, spent, way
-from ..core.scene import Scene
-from ..core.simulation import begin
-from ..core.state import State
-from ..core.system import System
-from ..core.trace import begun as trace_begun
-from ..core.trace import extended, felt, picked, row
+from ..core.base.errors import StateError
+from ..core.engine.simulation import begin
+from ..core.engine.state import State
+from ..core.engine.system import System
+from ..core.scene.assembly import assemble
+from ..core.scene.schema import Scene
+from ..core.session import accuracy
+from ..core.session.live_periods import Clock, due, lived, reachable, spent, way
+from ..core.session.recent_trace import begun as trace_begun
+from ..core.session.recent_trace import extended, felt, picked, row
+from ..core.session.snapshot import carried, packed, unpacked
 from ..device.instant import CLEARANCE
 from .running import Gesture, Recording, Running
 from .stroke_queue import drop_strokes, take_path

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.fingertip import Fingertip
-from ..core.layout import Grid
-from ..core.pointing import ground
+from ..core.model.fingertip import Fingertip
+from ..core.model.layout import Grid
+from ..core.surface.pointing import ground
 
 __all__ = ["DEEPEST", "Sample", "Stroke", "deepen", "draw", "follow", "start"]
 

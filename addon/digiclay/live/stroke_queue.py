@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.fingertip import Fingertip
+from ..core.model.fingertip import Fingertip
 from .running import Gesture, Running
 from .stroke import Stroke, follow, start
 

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import bridge, preferences
-from ..core.errors import DigiclayError, DivergenceError
-from ..core.fingertip import Fingertip
+from ..core.base.errors import DigiclayError, DivergenceError
+from ..core.model.fingertip import Fingertip
 from ..device import display, unit, view
 from ..recorded import takes
 from ..recorded.bake import is_baked

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 from ..device import view
 from . import running
 from .running import Running

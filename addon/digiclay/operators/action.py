@@ -3,7 +3,7 @@
 # No postponed annotations in this package: Blender reads an operator's properties from them.
 from typing import Any
 
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 
 __all__ = ["Action", "FileAction", "Polled"]
 

@@ -4,12 +4,12 @@ from typing import Any
 
 from .. import preferences
 from ..compat import bpy
-from ..core.actuator import Actuator
-from ..core.fingertip import Fingertip
-from ..core.layout import Layout
-from ..core.methods import METHODS
-from ..core.scene import Scene
-from ..core.scene_table import PRESETS
+from ..core.control.methods import METHODS
+from ..core.model.actuator import Actuator
+from ..core.model.fingertip import Fingertip
+from ..core.model.layout import Layout
+from ..core.scene.schema import Scene
+from ..core.scene.toml_table import PRESETS
 from ..device import palettes, rebuild, view
 from ..device.instant import Instant
 from ..device.view import bed_of

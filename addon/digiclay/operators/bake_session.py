@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from ..compat import bpy
-from ..core.assembly import assemble
-from ..core.fingertip import Fingertip
-from ..core.keeping import packed
-from ..core.simulation import begin
-from ..core.take import Take
+from ..core.engine.simulation import begin
+from ..core.model.fingertip import Fingertip
+from ..core.scene.assembly import assemble
+from ..core.session.snapshot import packed
+from ..core.session.take import Take
 from ..device.view import bed_of
 from ..recorded import bake, takes
 from ..settings import properties

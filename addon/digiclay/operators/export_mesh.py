@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.export import FORMATS, UNITS, suffix, write
-from ..core.export_model import bodies
+from ..core.mesh_io.export_model import bodies
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
 from .mesh_options import SurfaceOptions, chosen, sentence

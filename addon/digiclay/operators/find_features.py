@@ -3,8 +3,8 @@
 from typing import Any
 
 from ..compat import bpy
-from ..core.export_model import features
-from ..core.features import summary
+from ..core.mesh_io.export_model import features
+from ..core.surface.features import summary
 from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
 from .mesh_options import FindingOptions, SurfaceAction, chosen

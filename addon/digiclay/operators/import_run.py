@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.scene_file import load
+from ..core.scene.scene_source import load
 from ..device.instant import read
 from .action import FileAction
 from .add_bed import add_shown, place_at_cursor

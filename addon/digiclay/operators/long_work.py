@@ -6,7 +6,7 @@ import time
 from collections.abc import Generator
 from typing import Any
 
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 from . import status
 from .action import Action
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.export_model import bodies
+from ..core.mesh_io.export_model import bodies
 from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
 from .mesh_options import SurfaceOptions, chosen

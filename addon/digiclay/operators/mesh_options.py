@@ -3,11 +3,11 @@
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import OutputError
-from ..core.export_model import KINDS, Model
-from ..core.features import Finding
-from ..core.quantity import quantities
-from ..core.skins import SKINS
+from ..core.base.errors import OutputError
+from ..core.base.quantity import quantities
+from ..core.mesh_io.export_model import KINDS, Model
+from ..core.surface.features import Finding
+from ..core.surface.skins import SKINS
 from ..device.view import bed_of
 from ..exchange import formed_bed
 from .action import Action

@@ -6,12 +6,12 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.fingertip import Fingertip
-from ..core.scene import Scene
-from ..core.scene_file import find, load, sample_names
-from ..core.scene_table import resolve
-from ..core.shape import Shape
-from ..core.shape_file import sample_shapes
+from ..core.model.fingertip import Fingertip
+from ..core.scene.scene_source import find, load, sample_names
+from ..core.scene.schema import Scene
+from ..core.scene.toml_table import resolve
+from ..core.shapes.request import Shape
+from ..core.shapes.source_file import sample_shapes
 from ..device import view
 from ..exchange import shape_show
 from ..recorded import takes

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 from ..device import display
 from ..device.view import bed_of
 from ..press import aim

@@ -4,8 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 from ..compat import bpy
-from ..core.scene_file import load
-from ..core.scene_table import PRESETS
+from ..core.scene.scene_source import load
+from ..core.scene.toml_table import PRESETS
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.devices import laid_out

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
+from ..core.base.errors import DigiclayError
 from ..device import view
 from ..live import running, tick
 from ..live.stroke import DEEPEST, deepen, draw

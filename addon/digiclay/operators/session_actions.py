@@ -5,9 +5,9 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.assembly import assemble
-from ..core.fingertip import Fingertip
-from ..core.simulation import begin
+from ..core.engine.simulation import begin
+from ..core.model.fingertip import Fingertip
+from ..core.scene.assembly import assemble
 from ..device import view
 from ..device.instant import CLEARANCE
 from ..device.view import bed_of

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.shape import LENGTHS, UPWARDS, Shape
-from ..core.shape_file import KINDS, sample_shapes
+from ..core.shapes.request import LENGTHS, UPWARDS, Shape
+from ..core.shapes.source_file import KINDS, sample_shapes
 from ..device.view import bed_of
 from ..exchange import shape_show
 from ..live import running

@@ -5,8 +5,8 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.shape import Shape
-from ..core.shape_text import packed
+from ..core.shapes.height_text import packed
+from ..core.shapes.request import Shape
 from ..device.view import bed_of
 from ..settings import properties
 from .action import Action

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import DigiclayError
-from ..core.scene_table import text
-from ..core.take import as_scene
-from ..core.whole_files import write_whole
+from ..core.base.errors import DigiclayError
+from ..core.base.whole_files import write_whole
+from ..core.scene.toml_table import text
+from ..core.session.take import as_scene
 from ..device.view import bed_of
 from ..live import recovery, running, sculpting
 from ..recorded import takes

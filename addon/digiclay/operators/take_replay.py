@@ -7,12 +7,12 @@ import numpy as np
 
 from .. import bridge, preferences
 from ..compat import bpy
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError
-from ..core.fingertip import LEVEL, Fingertip
-from ..core.keeping import packed, unpacked
-from ..core.live import Clock, due, lived
-from ..core.take import MOST_PARTS, Take, finer
+from ..core.base.errors import DigiclayError
+from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.scene.assembly import assemble
+from ..core.session.live_periods import Clock, due, lived
+from ..core.session.snapshot import packed, unpacked
+from ..core.session.take import MOST_PARTS, Take, finer
 from ..device import view
 from ..device.view import bed_of
 from ..live import bed_state, sculpting, tick

@@ -13,8 +13,8 @@ import numpy as np
 
 from .. import preferences
 from ..compat import bpy
-from ..core.modes import Mode
-from ..core.set_point import asked
+from ..core.base.modes import Mode
+from ..core.model.set_point import asked
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import on_screen
@@ -135,7 +135,7 @@ def _draw() -> None:
 
     A quad view has four; what is written stands in the one that can be turned, picked pins are marked in all.
     """
-    from .draw import draw  # needs a graphics card: not there in the background
+    from .draw import draw
 
     context = bpy.context
     bed = _chosen(context) if context.space_data.overlay.show_overlays else None

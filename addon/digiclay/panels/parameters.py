@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..core.methods import METHODS
-from ..core.quantity import quantities
-from ..core.scene import NEEDS, OPTIONAL, parameters
-from ..core.scene_table import PRESETS
+from ..core.base.quantity import quantities
+from ..core.control.methods import METHODS
+from ..core.scene.schema import NEEDS, OPTIONAL, parameters
+from ..core.scene.toml_table import PRESETS
 from ..live import running
 from ..settings import own_presets, properties
 from ..settings.declared import title
@@ -119,7 +119,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
     Parameters
     ----------
     section : str
-        Of `core.scene.SECTIONS`. A part a scene may leave out has a switch in the header.
+        Of `core.scene.schema.SECTIONS`. A part a scene may leave out has a switch in the header.
     parent : str
         `bl_idname` of the panel it stands in.
     order : int

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..bridge import SCALE
 from ..compat import bpy, scratch
-from ..core.modes import Mode
-from ..core.shots import Film, Turntable
+from ..core.base.modes import Mode
+from ..core.session.render_settings import Film, Turntable
 from ..device import view
 from ..device.instant import Instant
 from . import stage

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..compat import bpy, quiet, strips, to_video
-from ..core.errors import OutputError
-from ..core.shots import Moving
-from ..core.unfinished import unfinished
+from ..core.base.errors import OutputError
+from ..core.base.unfinished import unfinished
+from ..core.session.render_settings import Moving
 from .still import why_not
 
 __all__ = ["encoded", "frames_beside", "whole_film"]

@@ -13,7 +13,7 @@ import numpy as np
 from .. import bridge
 from ..bridge import linear
 from ..compat import bpy, shader_nodes
-from ..core.modes import MEANINGS, Mode
+from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
 
 __all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]

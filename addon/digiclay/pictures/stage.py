@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import bpy, shader_nodes
-from ..core.modes import Mode
+from ..core.base.modes import Mode
 from ..device import view
 from ..device.instant import Instant
 from .legend import Front, of_forces, of_modes

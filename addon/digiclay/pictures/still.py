@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy, has_denoiser, quiet, scratch
-from ..core.errors import OutputError
-from ..core.shots import Picture, Still
+from ..core.base.errors import OutputError
+from ..core.session.render_settings import Picture, Still
 from ..device import view
 from ..device.instant import Instant
 from . import stage

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.metrics import in_contact
-from ..core.surface import grid_shape, skin, solid
+from ..core.metrics.summary import in_contact
+from ..core.surface.skin_mesh import grid_shape, skin, solid
 from .figure import INK, LINES, MM, legend_above
 from .relief import fit_relief
 

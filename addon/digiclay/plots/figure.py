@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import OutputError
-from ..core.whole_files import write_whole
+from ..core.base.errors import OutputError
+from ..core.base.whole_files import write_whole
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.metrics import compute_metrics, in_contact
-from ..core.metrics_path import sum_cells
-from ..core.set_point import SetPoint
+from ..core.metrics.finger_path import sum_cells
+from ..core.metrics.summary import compute_metrics, in_contact
+from ..core.model.set_point import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
 

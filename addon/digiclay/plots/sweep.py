@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.axes import Column
-from ..core.evaluation import FIGURES
+from ..core.studies.axes import Column
+from ..core.studies.evaluation import FIGURES
 from .figure import INK, LINES, canvas, save
 
 if TYPE_CHECKING:  # only named in annotations

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
-from ..core.errors import DigiclayError
-from ..core.layout import Grid, grid
-from ..core.pointing import meeting, ray
+from ..core.base.errors import DigiclayError
+from ..core.model.layout import Grid, grid
+from ..core.surface.pointing import meeting, ray
 from ..device import view
 from ..live import running
 from ..settings import properties

@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.fingertip import Fingertip
-from ..core.layout import Grid
-from ..core.pointing import patch
+from ..core.model.fingertip import Fingertip
+from ..core.model.layout import Grid
+from ..core.surface.pointing import patch
 from ..device import view
 from ..live import running
 from ..overlay.picture import Line
@@ -46,7 +46,7 @@ def outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) 
 
 def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     """Draw the patch under the mouse; Blender hands the place over in pixels of the window."""
-    from ..overlay.draw import cursor  # needs a graphics card: not there in the background
+    from ..overlay.draw import cursor
 
     region = context.region
     if region is None or region.type != "WINDOW" or context.mode != "OBJECT":

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError
-from ..core.fingertip import Fingertip
-from ..core.keeping import unpacked
-from ..core.live import lived
-from ..core.take import Take
+from ..core.base.errors import DigiclayError
+from ..core.model.fingertip import Fingertip
+from ..core.scene.assembly import assemble
+from ..core.session.live_periods import lived
+from ..core.session.snapshot import unpacked
+from ..core.session.take import Take
 from ..device import view
 from ..device.roles import BAKE
 from .bake_tree import MOMENT, pins_at_moment

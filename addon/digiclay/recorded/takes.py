@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.assembly import assemble
-from ..core.errors import DigiclayError
-from ..core.keeping import packed
-from ..core.live import lived
-from ..core.scene import Scene
-from ..core.simulation import begin
-from ..core.take import Take, from_bytes, to_bytes
+from ..core.base.errors import DigiclayError
+from ..core.engine.simulation import begin
+from ..core.scene.assembly import assemble
+from ..core.scene.schema import Scene
+from ..core.session.live_periods import lived
+from ..core.session.snapshot import packed
+from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
 __all__ = [

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 from ..compat import bpy
-from ..core.control.shapes import SHAPES
-from ..core.quantity import EXTENTS, Parameters, Quantity
+from ..core.base.quantity import EXTENTS, Parameters, Quantity
+from ..core.control.named_shapes import SHAPES
 from .shown_units import shown, unit_of
 
 __all__ = ["INT_MAX", "Update", "group", "listed", "title"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..core.layout import Layout
-from ..core.scene import Scene
-from ..core.scene_file import load
-from ..core.scene_table import PRESETS, resolve
+from ..core.model.layout import Layout
+from ..core.scene.scene_source import load
+from ..core.scene.schema import Scene
+from ..core.scene.toml_table import PRESETS, resolve
 from .own_presets import path
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.methods import METHODS
-from ..core.quantity import quantities
-from ..core.scene import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
-from ..core.scene_table import HEXAGONAL_SHARE, PRESETS
+from ..core.base.quantity import quantities
+from ..core.control.methods import METHODS
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
+from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from .declared import Update, group, title
 from .table import assign, read, reset

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from ..core.errors import ParameterError
-from ..core.methods import METHODS
-from ..core.quantity import quantities
-from ..core.scene import SECTIONS, parameters
+from ..core.base.errors import ParameterError
+from ..core.base.quantity import quantities
+from ..core.control.methods import METHODS
+from ..core.scene.schema import SECTIONS, parameters
 from .declared import title
 from .shown_units import in_words
 

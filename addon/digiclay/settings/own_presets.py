@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 from ..compat import PACKAGE, bpy
-from ..core.errors import OutputError
-from ..core.scene import Scene
-from ..core.scene_table import PRESETS, text
+from ..core.base.errors import OutputError
+from ..core.scene.schema import Scene
+from ..core.scene.toml_table import PRESETS, text
 
 __all__ = ["folder", "names", "path", "remove", "save"]
 

@@ -9,11 +9,11 @@ import json
 from typing import Any
 
 from ..compat import bpy
-from ..core.errors import ParameterError
-from ..core.methods import METHODS
-from ..core.quantity import Parameters
-from ..core.scene import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
-from ..core.scene_table import ABSENT, resolve
+from ..core.base.errors import ParameterError
+from ..core.base.quantity import Parameters
+from ..core.control.methods import METHODS
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
+from ..core.scene.toml_table import ABSENT, resolve
 from ..device.pins_drawn import differs
 from .groups import CLASSES, SETTINGS
 from .messages import named

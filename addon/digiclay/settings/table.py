@@ -10,8 +10,8 @@ import dataclasses
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
-from ..core.errors import ParameterError
-from ..core.quantity import Parameters
+from ..core.base.errors import ParameterError
+from ..core.base.quantity import Parameters
 from .declared import INT_MAX, listed
 from .shown_units import shown, si, unit_of
 

@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 import numpy as np
 from digiclay import bridge
-from digiclay.core.assembly import assemble
-from digiclay.core.keeping import unpacked
-from digiclay.core.simulation import begin
+from digiclay.core.engine.simulation import begin
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.session.snapshot import unpacked
 from digiclay.device import view
 from digiclay.live import bed_state, handlers, running, tick
 from digiclay.settings import properties

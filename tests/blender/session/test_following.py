@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.core.keeping import packed
-from digiclay.core.set_point import SetPoint
+from digiclay.core.model.set_point import SetPoint
+from digiclay.core.session.snapshot import packed
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 

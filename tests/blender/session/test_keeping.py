@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.core.keeping import packed
+from digiclay.core.session.snapshot import packed
 from digiclay.live import bed_state, handlers, running, sculpting, tick
 
 from tests.blender.session.live import (

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.errors import DigiclayError
+from digiclay.core.base.errors import DigiclayError
 from digiclay.device import view
 from digiclay.live import running, tick
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..layout import Grid
-from ..physics import Cell
+from ..model.layout import Grid
+from ..model.physics import Cell
 from .blister import Blister
 
 __all__ = ["Bench"]

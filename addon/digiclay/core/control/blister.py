@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
-from ..filled import filled
-from ..quantity import Parameters, quantity
+from ..base.constants import filled
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
 
 __all__ = ["Blister"]
 

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..errors import ParameterError
-from ..layout import ON_THE_SIDE
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
-from ..set_point import SetPoint
-from ..some import some
+from ..base.counting import some
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import ON_THE_SIDE
+from ..model.set_point import SetPoint
 from .bench import Bench
 from .blister import Blister
 from .noise_floor import above, check_told
@@ -152,7 +152,7 @@ class CellStatesControl:
         return Patch()
 
     def attend(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
-        """Find where the finger presses, and how far its blister can reach; see `places.Controller`."""
+        """Find where the finger presses, and how far its blister can reach; see `interfaces.Controller`."""
         pressed = touched.force > self._least(touched.mode)
         if not some(pressed):
             return memory, None
@@ -169,7 +169,7 @@ class CellStatesControl:
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
-        """Let every cell follow its arrows, then act as its mode says; see `places.Controller`."""
+        """Let every cell follow its arrows, then act as its mode says; see `interfaces.Controller`."""
         seen = seen._replace(force=above(seen.force, self.floor)) if self.floor else seen
         mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)

@@ -13,10 +13,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError
-from ..methods import ControlParameters
-from ..physics import Cell
-from ..quantity import quantity
+from ..base.errors import ParameterError
+from ..base.quantity import quantity
+from ..model.physics import Cell
+from .methods import ControlParameters
 
 __all__ = ["Drive", "DriveParameters", "TouchParameters", "check_damping", "drive", "feeling_above"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
 from .bench import Bench
 from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .servo import locked_under_overload
@@ -49,11 +49,11 @@ class ElasticControl:
         """Nothing to remember."""
 
     def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `places.Controller`."""
+        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
         return memory, None
 
     def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
-        """Let pressed cells give way, and the others spring back; see `places.Controller`."""
+        """Let pressed cells give way, and the others spring back; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
         pressed = seen.force >= known.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..errors import ParameterError
-from ..layout import Grid
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import Grid
 from .bench import Bench
 from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
+from .named_shapes import FILE, check_shape, from_file, named
 from .neighbours import cells_at
 from .noise_floor import check_told
 from .servo import locked_under_overload
-from .shapes import FILE, check_shape, from_file, named
 
 __all__ = ["ForceDisplay", "ForceDisplayControl", "assembled"]
 
@@ -76,11 +76,11 @@ class ForceDisplayControl:
         """Nothing to remember but the cells' own rows."""
 
     def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `places.Controller`."""
+        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
         return memory, None
 
     def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
-        """Let cells that feel the finger press back, the others rest; see `places.Controller`."""
+        """Let cells that feel the finger press back, the others rest; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         asked = self.field.take(cells_at(self.grid, seen.place))
         pressed = seen.force >= known.felt_force

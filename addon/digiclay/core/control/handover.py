@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..layout import Grid
-from ..places import Controller, Measurement, Orders
-from ..shape import Shape
+from ..model.interfaces import Controller, Measurement, Orders
+from ..model.layout import Grid
+from ..shapes.request import Shape
 from .bench import Bench
 from .drive import DriveParameters
 from .neighbours import cells_at
@@ -73,7 +73,7 @@ class Handover:
     def attend(
         self, memory: Handed, touched: Measurement
     ) -> tuple[Handed, tuple[float, float, float] | None]:
-        """Let the one whose turn it is look at the touched cells; see `places.Controller`."""
+        """Let the one whose turn it is look at the touched cells; see `interfaces.Controller`."""
         if not self.displayed(memory):
             progress, disc = self.display.attend(memory.display, touched)
             return memory._replace(display=progress), disc
@@ -83,7 +83,7 @@ class Handover:
         return memory._replace(method=known), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Orders]:
-        """Let the one whose turn it is command the cells; see `places.Controller`."""
+        """Let the one whose turn it is command the cells; see `interfaces.Controller`."""
         if self.method is None or not self.displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
             return memory._replace(display=progress), orders

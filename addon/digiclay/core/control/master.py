@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
-from ..quantity import quantity
-from ..set_point import SetPoint
+from ..base.quantity import quantity
+from ..model.set_point import SetPoint
 from .tracking import Tracking
 from .travel import Heading
 

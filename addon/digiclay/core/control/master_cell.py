@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..delay import Queue
-from ..physics import GAUSS, Cell
+from ..model.delay import Queue
+from ..model.physics import GAUSS, Cell
 
 __all__ = ["MasterCell", "master_cell"]
 

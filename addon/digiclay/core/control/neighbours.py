@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..layout import Grid
+from ..model.layout import Grid
 
 __all__ = ["Exchange", "cells_at", "exchange"]
 

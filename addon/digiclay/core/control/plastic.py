@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..errors import ParameterError
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
 from .bench import Bench
 from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .noise_floor import check_told
@@ -57,11 +57,11 @@ class PlasticControl:
         """Nothing to remember but the cells' targets."""
 
     def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `places.Controller`."""
+        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
         return memory, None
 
     def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
-        """Let cells give way that are pressed beyond yield, hold the others; see `places.Controller`."""
+        """Let cells give way that are pressed beyond yield, hold the others; see `interfaces.Controller`."""
         known = self.parameters
         pressed = seen.force >= known.felt_force
         yielding = seen.force > known.yield_force

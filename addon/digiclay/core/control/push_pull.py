@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..errors import ParameterError
-from ..layout import ON_THE_SIDE
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import ON_THE_SIDE
 from .bench import Bench
 from .drive import Drive, DriveParameters, drive
 from .travel import square_distance
@@ -95,7 +95,7 @@ class PushPullControl:
     def attend(
         self, memory: Listening, touched: Measurement
     ) -> tuple[Listening, tuple[float, float, float] | None]:
-        """Listen where a hand may be; see `places.Controller`.
+        """Listen where a hand may be; see `interfaces.Controller`.
 
         The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
         they are left out.
@@ -109,7 +109,7 @@ class PushPullControl:
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
 
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Orders]:
-        """Drag commanded heights along, and move every pin up or down; see `places.Controller`."""
+        """Drag commanded heights along, and move every pin up or down; see `interfaces.Controller`."""
         known, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
         listening = square_distance(memory.x, memory.y, seen.place) <= limit

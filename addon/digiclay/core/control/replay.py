@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..layout import Grid
-from ..places import Measurement, Orders
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import Grid
 
 __all__ = ["Replay"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..filled import filled
-from ..quantity import Parameters, quantity
-from ..some import some
+from ..base.constants import filled
+from ..base.counting import some
+from ..base.quantity import Parameters, quantity
 
 __all__ = ["Servo", "locked_under_overload"]
 

@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..errors import ParameterError
-from ..layout import Grid
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.errors import ParameterError
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import Grid
 from .bench import Bench
 from .drive import Drive, DriveParameters, drive
+from .named_shapes import FILE, check_shape, from_file, named
 from .neighbours import cells_at
 from .servo import locked_under_overload
-from .shapes import FILE, check_shape, from_file, named
 
 __all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "assembled"]
 
@@ -117,11 +117,11 @@ class ShapeDisplayControl:
     def attend(
         self, memory: Progress, touched: Measurement
     ) -> tuple[Progress, tuple[float, float, float] | None]:
-        """Ask for all cells while there is a move to make; see `places.Controller`."""
+        """Ask for all cells while there is a move to make; see `interfaces.Controller`."""
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Orders]:
-        """Set the heights of the move under way, and bring every cell to its own; see `places.Controller`."""
+        """Set the heights of the move under way, and bring every cell to its own; see `interfaces.Controller`."""
         rest, target = self.actuator.rest_height, seen.target
         if memory.move < len(self.moves):
             memory, target = self._moved(memory, seen)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..methods import ControlParameters
-from ..quantity import quantity
+from ..base.quantity import quantity
+from .methods import ControlParameters
 from .servo import Servo
 
 __all__ = ["Tracking"]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..modes import Mode
+from ..base.modes import Mode
 
 __all__ = ["BY_FORCE", "BY_PLACE", "Arrow", "changed"]
 

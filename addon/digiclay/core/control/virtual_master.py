@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..filled import filled
-from ..layout import ON_THE_SIDE
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..some import how_many, some
+from ..base.constants import filled
+from ..base.counting import how_many, some
+from ..base.modes import Mode
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import ON_THE_SIDE
 from .bench import Bench
 from .blister import Blister
 from .master import Master, Phase, VirtualMaster
@@ -75,7 +75,7 @@ class VirtualMasterControl:
     def attend(
         self, memory: Master, touched: Measurement
     ) -> tuple[Master, tuple[float, float, float] | None]:
-        """Locate the finger and move the master; see `places.Controller`."""
+        """Locate the finger and move the master; see `interfaces.Controller`."""
         felt = touched._replace(force=above(touched.force, self.floor)) if self.floor else touched
         pressed = felt.place.dot(felt.force).tolist()[:3]
         master = self._locate(memory, felt, pressed)
@@ -165,7 +165,7 @@ class VirtualMasterControl:
         return master.led(phase, height, opening)
 
     def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
-        """Create the blister, freeze what is left behind, command every cell; see `places.Controller`."""
+        """Create the blister, freeze what is left behind, command every cell; see `interfaces.Controller`."""
         target, mode = seen.target, self._left_alone(seen.target)
         if memory.phase is not Phase.IDLE:
             memory, target = self._created(memory, seen, mode)

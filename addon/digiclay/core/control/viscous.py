@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..actuator import Actuator
-from ..layout import Grid
-from ..modes import Mode
-from ..places import Measurement, Orders
-from ..quantity import quantity
+from ..base.modes import Mode
+from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement, Orders
+from ..model.layout import Grid
 from .bench import Bench
 from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
 from .neighbours import Exchange, cells_at, exchange
@@ -98,12 +98,12 @@ class ViscousControl:
         return Spot()
 
     def attend(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
-        """Ask for all displaced cells and a margin around them; see `places.Controller`."""
+        """Ask for all displaced cells and a margin around them; see `interfaces.Controller`."""
         spot = memory.around(touched.place[:, touched.force >= self.parameters.felt_force])
         return spot, spot.disc(self.margin)
 
     def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Orders]:
-        """Exchange, relax, and move every cell to its new height; see `places.Controller`."""
+        """Exchange, relax, and move every cell to its new height; see `interfaces.Controller`."""
         known, actuator = self.parameters, self.actuator
         cells, rest = cells_at(self.grid, seen.place), actuator.rest_height
         pressed = seen.force >= known.felt_force

@@ -1,1 +1,1 @@
-"""Time steppers: one short file a method, all behind `places.Stepper`."""
+"""Time steppers: one short file a method, all behind `interfaces.Stepper`."""

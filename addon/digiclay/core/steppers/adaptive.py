@@ -14,10 +14,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..delay import Queue
-from ..physics import Cell, Speeds, felt, speeds
-from ..places import Movement, Segment
-from ..some import some
+from ..base.counting import some
+from ..model.delay import Queue
+from ..model.interfaces import Movement, Segment
+from ..model.physics import Cell, Speeds, felt, speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Adaptive", "AdaptivePlan"]
@@ -94,7 +94,7 @@ class Adaptive:
         return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed, speeds(cell), period)
 
     def bind(self, plan: AdaptivePlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `places.Stepper`."""
+        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
         # Every period is done at these two levels, by all cells.
         coarse, fine = (_bound(plan, level, driven.shape, near) for level in (0, 1))
         return partial(self._advance, plan, driven, coarse, fine)
@@ -102,7 +102,7 @@ class Adaptive:
     def _advance(
         self, plan: AdaptivePlan, driven: Floats, whole: Bound, halves: Bound, under: Floats
     ) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Movement`."""
+        """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
         cell, k = plan.levels[0].cell, under.shape[1]
         start, share = driven.copy(), np.full(driven.shape[1], FREE)
         share[:k][start[0, :k] > under.min(axis=0)] = PRESSED

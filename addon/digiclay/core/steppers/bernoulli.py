@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closed_form import crossed, pressed
-from ..delay import Queue
-from ..filled import filled
-from ..physics import Cell
-from ..places import Segment
-from ..some import some
-from ..strained import Strain, Way, loaded_way
+from ..base.constants import filled
+from ..base.counting import some
+from ..model.delay import Queue
+from ..model.interfaces import Segment
+from ..model.physics import Cell
 from .bernoulli_plan import BernoulliPlan, bernoulli_plan
+from .closed_form import crossed, pressed
+from .near_overflow import Strain, Way, loaded_way
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "Block"]
 
@@ -44,7 +44,7 @@ class BernoulliExponential:
         return bernoulli_plan(cell, queue, segments)
 
     def bind(self, plan: BernoulliPlan, driven: Floats, near: int) -> Block:
-        """Make ready to move a block of cells on; see `places.Stepper`."""
+        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
         return Block(plan, driven, near)
 
 
@@ -57,7 +57,7 @@ class Block:
     Parameters
     ----------
     plan, driven, near
-        See `places.Stepper.bind`; k is short for `near` here.
+        See `interfaces.Stepper.bind`; k is short for `near` here.
     """
 
     def __init__(self, plan: BernoulliPlan, driven: Floats, near: int) -> None:
@@ -103,7 +103,7 @@ class Block:
         self.stops = filled((0.0, cell.actuator.stroke), count)
 
     def __call__(self, under: Floats) -> Floats:
-        """Move the block on by one control period, in place; see `places.Movement`."""
+        """Move the block on by one control period, in place; see `interfaces.Movement`."""
         plan = self.plan
         plan.response.dot(self.opened_by, self.openings)
         self.lag[:] = self.opening_after

@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..absent import Unrelaxed
-from ..closed_form import LARGE, TINY
-from ..contact import LARGEST_EXPONENT, Contact
-from ..delay import Queue
-from ..physics import Cell
-from ..places import Pulp, Segment
-from ..supply import Supply
+from ..model.contact import LARGEST_EXPONENT, Contact
+from ..model.delay import Queue
+from ..model.interfaces import Pulp, Segment
+from ..model.null_parts import Unrelaxed
+from ..model.physics import Cell
+from ..model.supply import Supply
+from .closed_form import LARGE, TINY
 
 __all__ = ["POINTS", "BernoulliPlan", "bernoulli_plan"]
 

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..delay import Queue
-from ..physics import Cell, Speeds, felt, rates, speeds
-from ..places import Movement, Segment
+from ..model.delay import Queue
+from ..model.interfaces import Movement, Segment
+from ..model.physics import Cell, Speeds, felt, rates, speeds
 
 __all__ = ["Explicit", "ExplicitPlan", "Rates"]
 
@@ -65,11 +65,11 @@ class Explicit:
         raise NotImplementedError
 
     def bind(self, plan: ExplicitPlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `places.Stepper`."""
+        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
         return partial(self.advance, plan, driven)
 
     def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `places.Movement`."""
+        """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = driven[: cell.rows], driven[cell.rows :]
         thrown = np.zeros(y.shape[1], np.bool_)

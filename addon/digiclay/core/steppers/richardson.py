@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..delay import Queue
-from ..physics import Cell, Speeds, felt, speeds
-from ..places import Movement, Segment
+from ..model.delay import Queue
+from ..model.interfaces import Movement, Segment
+from ..model.physics import Cell, Speeds, felt, speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Richardson", "RichardsonPlan", "halved"]
@@ -62,7 +62,7 @@ class Richardson:
         )
 
     def bind(self, plan: RichardsonPlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `places.Stepper`."""
+        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
         closed_form, cell = BernoulliExponential(), plan.coarse.cell
         coarse = np.empty_like(driven)
         once = closed_form.bind(plan.coarse, coarse, near)

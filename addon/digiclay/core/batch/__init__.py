@@ -1,0 +1,1 @@
+"""Many sessions in one call: the last axis of every array is the run."""

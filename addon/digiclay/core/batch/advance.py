@@ -1,0 +1,208 @@
+"""Simulation of a batch's control periods: `core.engine.simulation` with an axis for the runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import DivergenceError
+from ..engine.state import Rows
+from ..engine.system import System
+from ..model.interfaces import Measurement
+from . import beds
+from .alike import Movement, Touches
+from .beds import NO_DISC, Beds, Disc, Gathered
+from .broadcasting import Floats, numbers
+from .fingers import Fingers, undersides
+from .padding import Gathering, taken_along, taking_part
+from .run_by_run import StackedController
+
+__all__ = ["Stack", "advance", "begin", "blow_up", "broken", "follow", "kept"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """All that does not change in b sessions on one layout.
+
+    Attributes
+    ----------
+    systems : tuple of System
+        Those of the runs.
+    rows : Rows
+    touch : Touches or None
+    pulp_rows : slice
+        The rows that the relaxation owns.
+    controller : StackedController or None
+        None: every valve stays shut.
+    movement : Movement
+    gathering : Gathering
+    """
+
+    systems: tuple[System, ...]
+    rows: Rows
+    touch: Touches | None
+    pulp_rows: slice
+    controller: StackedController | None
+    movement: Movement
+    gathering: Gathering
+
+
+def begin(stack: Stack) -> Beds:
+    """Return the beds before the sessions."""
+    memory = stack.controller.begin() if stack.controller else None
+    heights = numbers([system.cell.actuator.rest_height for system in stack.systems])
+    return beds.at_rest(stack.rows, stack.systems[0].grid.count, heights, memory)
+
+
+def advance(stack: Stack, state: Beds, coming: Fingers | None) -> Beds:
+    """Simulate one control period of all runs in the arrays of `state`, which is used up.
+
+    Parameters
+    ----------
+    stack : Stack
+    state : Beds
+    coming : Fingers or None
+        How the fingers come in some periods, this one among them.
+    """
+    memory, control = _attend(stack, state)
+    window = coming.window[state.period - coming.first] if coming else None
+    held = taking_part(stack.gathering, state, window, control)
+    if held.cells.size:
+        memory = _command(stack, held, memory)
+        _move(stack, held, coming, state.period)
+    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, memory)
+
+
+def _move(stack: Stack, held: Gathered, coming: Fingers | None, period: int) -> None:
+    """Move the gathered cells on by a control period, and work out the forces at its end."""
+    count, driven = held.near, held.block[stack.rows.driven]
+    none = np.empty((stack.systems[0].instants.size, 0, held.cells.shape[1]))
+    under = undersides(coming, period, held.place[:, :count]) if coming and count else none
+    # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
+    valves = driven[stack.systems[0].cell.lag_rows.start :, count:]
+    awake = np.einsum("rwb,rwb->w", valves, valves)
+    chosen = np.concatenate([np.arange(count), count + np.flatnonzero(awake)])
+    moved = driven.take(chosen, axis=1)
+    stack.movement.advance(moved, under)
+    driven[:, chosen] = moved
+    if stack.touch and count:
+        near = held.block[:, :count]
+        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
+
+
+def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> Beds:
+    """Simulate the control period that other beds of the same runs have just done, under their commands.
+
+    Parameters
+    ----------
+    stack : Stack
+        Without a controller.
+    state : Beds
+        Used up.
+    coming : Fingers or None
+    leader : Beds
+        After the period. The cells that took part there do so here: the two differ by errors of the
+        integration, and a set of cells has room for far more.
+    """
+    held, rows = state.gathered, stack.rows
+    if held.cells is not leader.gathered.cells:
+        held = taken_along(stack.gathering, state, leader.gathered)
+    if held.cells.size:
+        _queue(held.block[rows.commands], leader.gathered.block[rows.command])
+        _move(stack, held, coming, state.period)
+    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, None)
+
+
+def _attend(stack: Stack, state: Beds) -> tuple[Any, Disc]:
+    """Let the controllers take in the touched cells; return their memory and the discs they will control."""
+    if stack.controller is None:
+        return None, NO_DISC
+    touched = _measured(stack, state.gathered, state.gathered.near)
+    memory, disc = stack.controller.attend(state.memory, touched)
+    return memory, disc
+
+
+def _measured(stack: Stack, held: Gathered, count: int) -> Measurement:
+    """Measure the first `count` of the gathered cells of every run."""
+    rows, block = stack.rows, held.block[:, :count]
+    mode, place, own = held.mode[:count], held.place[:, :count], block[rows.controlled]
+    return Measurement(place, block[0], block[rows.force], block[rows.target], mode, own)
+
+
+def _command(stack: Stack, held: Gathered, memory: Any) -> Any:
+    """Let the controllers command the gathered cells, and queue the commands; return their memory."""
+    if stack.controller is None:
+        return memory
+    rows = stack.rows
+    memory, orders = stack.controller.command(memory, _measured(stack, held, len(held.cells)))
+    held.block[rows.target] = orders.target
+    held.mode[:] = orders.mode
+    _queue(held.block[rows.commands], orders.command)
+    return memory
+
+
+def _queue(commands: Floats, newest: Floats) -> None:
+    """Put the newest commands behind those on their way, (q, w, b), in place."""
+    for older, newer in pairwise(commands):
+        older[:] = newer
+    commands[-1] = newest
+
+
+def broken(state: Beds) -> NDArray[np.bool_]:
+    """Tell which runs, (b,), hold numbers that are not finite."""
+    block = state.gathered.block
+    # One sum tells that all is well, as it nearly always is.
+    if math.isfinite(np.add.reduce(block, axis=None)):
+        return np.zeros(block.shape[2], np.bool_)
+    finite: NDArray[np.bool_] = np.isfinite(block.sum(axis=(0, 1)))
+    return ~finite
+
+
+def blow_up(stack: Stack, state: Beds, run: int) -> DivergenceError:
+    """Return the error a run that holds a number which is not finite ends in; see `core.engine.simulation`."""
+    system, held, rows = stack.systems[run], state.gathered, stack.rows
+    row, place = np.argwhere(~np.isfinite(held.block[..., run]))[0].tolist()
+    names = {0: "height", rows.force: "force", rows.target: "commanded height"}
+    lag = range(rows.physics)[system.cell.lag_rows]
+    return DivergenceError(
+        (state.period - 1) * system.period,
+        int(held.cells[place, run]),
+        names.get(row, "valve opening" if row in lag else "relaxation"),
+        float(held.block[row, place, run]),
+        "Use a shorter physics step, or the stepper 'bernoulli'.",
+    )
+
+
+def kept(state: Beds, controller: StackedController | None, runs: Sequence[int]) -> Beds:
+    """Return the beds of some of the runs.
+
+    Parameters
+    ----------
+    state : Beds
+    controller : StackedController or None
+        Of all runs.
+    runs : sequence of int
+    """
+    chosen, held = np.array(runs, np.intp), state.gathered
+    # The discs are not worth keeping: the set is made anew.
+    gathered = Gathered(
+        held.cells[:, chosen],
+        held.near,
+        held.block[..., chosen],
+        held.mode[:, chosen],
+        held.place[..., chosen],
+        NO_DISC,
+        NO_DISC,
+        held.peak[chosen],
+        until=0,
+    )
+    memory = controller.kept(state.memory, chosen) if controller else None
+    several = (state.rows, state.modes, state.aged)
+    rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
+    return Beds(state.period, rows, modes, aged, gathered, memory)

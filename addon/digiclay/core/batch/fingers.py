@@ -1,0 +1,142 @@
+"""Fingertips of a batch: paths, undersides, and the cells below them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..engine.system import System
+from ..model.layout import Grid
+from ..model.touch import approach
+from ..model.trajectory import Trajectory
+from .broadcasting import Floats, mapped
+
+__all__ = ["Fingers", "Way", "fingers", "still_coming", "undersides", "way_over"]
+
+#: Control periods that are worked out at a time.
+CHUNK = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Fingers:
+    """How the fingers come in t control periods, at p instants of each.
+
+    The last axis is b, or 1 where all runs have one and the same finger; see `touch.Approach`.
+
+    Attributes
+    ----------
+    first : int
+        The first of these periods.
+    forms : ndarray (t, 2 p, 6, b)
+    join : ndarray (t, 2, p, 1, b)
+    window : ndarray (t, 6, b)
+    """
+
+    first: int
+    forms: Floats
+    join: Floats
+    window: Floats
+
+
+def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, count: int) -> Fingers:
+    """Work out how the fingers come.
+
+    Parameters
+    ----------
+    systems : sequence of System
+        With a fingertip.
+    ways : sequence of Trajectory
+        Each run's.
+    first, count : int
+        Control periods.
+    """
+    runs = list(zip(systems, ways, strict=True))
+    alike = all(_same(run, runs[0]) for run in runs)
+    known = [_approaches(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
+    return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
+
+
+def still_coming(
+    coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+) -> Fingers | None:
+    """Return how the fingers come in a period and some more: what is known, or worked out anew."""
+    if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
+        return coming
+    return fingers(systems, ways, period, CHUNK)
+
+
+def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
+    """Tell whether two runs have the same finger at the same times."""
+    (system, way), (first, its) = one, other
+    assert system.cell.touch is not None
+    assert first.cell.touch is not None
+    return (
+        system.cell.touch.fingertip == first.cell.touch.fingertip
+        and way.interpolation == its.interpolation
+        and system.period == first.period
+        and np.array_equal(system.instants, first.instants)
+        and all(
+            np.array_equal(getattr(way, name), getattr(its, name))
+            for name in ("times", "positions", "orientations")
+        )
+    )
+
+
+def _approaches(system: System, way: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
+    """Work out how one finger comes: the arrays of `Fingers`, without their last axis."""
+    assert system.cell.touch is not None
+    starts = (first + np.arange(count)) * system.period
+    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
+    coming = approach(system.cell.touch.fingertip, poses)[0].coming
+    return coming.forms, coming.join, np.array(coming.windows)
+
+
+def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
+    """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.underside`.
+
+    Parameters
+    ----------
+    coming : Fingers
+    period : int
+        One of these.
+    place : ndarray (6, k, b)
+    """
+    forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
+    rows = mapped(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
+    under: Floats = rows[: len(least)]
+    np.maximum(under, least, out=under)
+    np.sqrt(under, under)
+    under -= root
+    under *= under
+    under += rows[len(least) :]
+    return under
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A finger's way over a bed, at some times.
+
+    Attributes
+    ----------
+    time : ndarray (t,)
+        s.
+    fingertip : ndarray (t, 7)
+        Lowest point, m, and quaternion.
+    cells : ndarray of int (m,)
+        Those that are the nearest to it at some time, ascending.
+    """
+
+    time: Floats
+    fingertip: Floats
+    cells: NDArray[np.intp]
+
+
+def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
+    """Work out a finger's way at times (t,), s."""
+    tip = trajectory.poses(time)
+    places = np.unique(tip[:, :2], axis=0)
+    nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+    return Way(time, tip, np.unique(nearest))

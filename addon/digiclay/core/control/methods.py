@@ -1,0 +1,57 @@
+"""Control methods of a scene: one row a method, one module each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..base.quantity import Parameters
+from ..model.set_point import SetPoint
+
+__all__ = ["METHODS", "ControlParameters", "Method"]
+
+
+@dataclass(frozen=True)
+class ControlParameters(Parameters):
+    """Base of every method's parameters."""
+
+    @property
+    def set_point(self) -> SetPoint | None:
+        """Force asked for; None where the method asks for none."""
+        return None
+
+
+@dataclass(frozen=True)
+class Method:
+    """Where a method is, and what it needs.
+
+    Attributes
+    ----------
+    module : str
+        Within the core; holds a function ``assembled(parameters, bench)``.
+    parameters : str
+        Class of its parameters there.
+    blister : mapping or None
+        Its defaults for the blister where they differ; None: it forms no blister.
+    recovers : bool
+        Whether its cells go back to the height they had at rest.
+    """
+
+    module: str
+    parameters: str
+    blister: Mapping[str, float] | None = field(default=None)
+    recovers: bool = False
+
+
+METHODS: dict[str, Method] = {
+    "virtual_master": Method("control.virtual_master", "VirtualMaster", {}),
+    "cell_states": Method(
+        "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
+    ),
+    "elastic": Method("control.elastic", "Elastic", recovers=True),
+    "plastic": Method("control.plastic", "Plastic"),
+    "viscous": Method("control.viscous", "Viscous", recovers=True),
+    "push_pull": Method("control.push_pull", "PushPull"),
+    "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
+    "shape_display": Method("control.shape_display", "ShapeDisplay"),
+}

@@ -1,0 +1,1 @@
+"""Simulation of one control period: state, active set, order of the parts."""

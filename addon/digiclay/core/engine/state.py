@@ -1,0 +1,247 @@
+"""State of a session at one instant, as a value.
+
+All that belongs to a cell is a row of one array, so that a part that is left out owns no
+row. The few cells that take part in a period are taken out of that array and kept out,
+side by side, for as long as the same cells take part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.modes import Mode
+from ..model.layout import Disc
+
+__all__ = ["Gathered", "Part", "Rows", "State", "at_rest"]
+
+Floats = NDArray[np.float64]
+Cells = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Which row of a cell's state holds what.
+
+    The first `physics` rows (height first, m) are the continuous state of `alike.Cell`;
+    then come the commands on their way to the valve, oldest first; the height a cell is
+    commanded to, m; the force on it at the end of the last period, N; and what the
+    controller and the sensors remember of each cell.
+    """
+
+    physics: int
+    queue: int
+    control: int = 0
+    sensors: int = 0
+
+    @cached_property
+    def driven(self) -> slice:
+        """Rows a stepper works on: the physics and the commands on their way."""
+        return slice(0, self.physics + self.queue)
+
+    @cached_property
+    def commands(self) -> slice:
+        """Rows of the commands on their way."""
+        return slice(self.physics, self.physics + self.queue)
+
+    @cached_property
+    def command(self) -> int:
+        """Row of the newest command."""
+        return self.physics + self.queue - 1
+
+    @cached_property
+    def target(self) -> int:
+        """Row of the commanded height."""
+        return self.physics + self.queue
+
+    @cached_property
+    def force(self) -> int:
+        """Row of the force."""
+        return self.physics + self.queue + 1
+
+    @cached_property
+    def count(self) -> int:
+        """Number of rows."""
+        return self.force + 1 + self.control + self.sensors
+
+    @cached_property
+    def controlled(self) -> slice:
+        """Rows the controller owns."""
+        return slice(self.force + 1, self.force + 1 + self.control)
+
+    @cached_property
+    def sensed(self) -> slice:
+        """Rows the sensors own."""
+        return slice(self.force + 1 + self.control, self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """The cells that take part, taken out of the bed; they alone change.
+
+    Attributes
+    ----------
+    rows : Rows
+        Which row of the block holds what.
+    cells : ndarray of int (m,)
+        First those the finger may touch, then the others that move or are controlled.
+    near : int
+        Number k of those the finger may touch.
+    block : ndarray (r, m)
+        Their rows, see `Rows`.
+    mode : ndarray (m,) of int8
+        Their control modes, `modes.Mode`.
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
+    reach, control : (float, float, float) or None
+        Discs of which every cell is in, the finger's and the controller's: centre x, y, radius, m.
+    peak : float
+        No pin top in the finger's part is higher while this set is in use, m.
+    until : int
+        Control period by which the set is to be made anew.
+    """
+
+    rows: Rows
+    cells: Cells
+    near: int
+    block: Floats
+    mode: NDArray[np.int8]
+    place: Floats
+    reach: Disc | None
+    control: Disc | None
+    peak: float
+    until: int
+
+    # Parts of the block, all of them views. Each is made once: a set lives for many periods.
+
+    @cached_property
+    def all(self) -> Part:
+        """All cells."""
+        return self._part(self.cells.size)
+
+    @cached_property
+    def touched(self) -> Part:
+        """The cells the finger may touch."""
+        return self._part(self.near)
+
+    def _part(self, count: int) -> Part:
+        """Return the rows of the first `count` cells."""
+        rows, block = self.rows, self.block[:, :count]
+        return Part(
+            self.cells[:count],
+            self.place[:, :count],
+            self.mode[:count],
+            block[0],
+            block[rows.command],
+            block[rows.target],
+            block[rows.force],
+            block[rows.controlled],
+            block[rows.sensed],
+        )
+
+    @cached_property
+    def driven(self) -> Floats:
+        """What a stepper works on."""
+        return self.block[self.rows.driven]
+
+    @cached_property
+    def ready(self) -> dict[Any, Any]:
+        """What a simulation works with on just these cells, by the stepper's plan; made when first needed."""
+        return {}
+
+    @cached_property
+    def queue(self) -> tuple[Floats, ...]:
+        """The commands on their way, oldest first."""
+        return tuple(self.block[self.rows.commands])
+
+    @cached_property
+    def flat(self) -> Floats:
+        """All numbers of the block in a row."""
+        return self.block.reshape(-1)
+
+
+class Part(NamedTuple):
+    """Rows of the first gathered cells; `Rows` and `Gathered` say what they are."""
+
+    cells: Cells
+    place: Floats
+    mode: NDArray[np.int8]
+    height: Floats
+    command: Floats
+    target: Floats
+    force: Floats
+    controlled: Floats
+    sensed: Floats
+
+
+class State(NamedTuple):
+    """A session at the start of a control period.
+
+    Attributes
+    ----------
+    period : int
+        Number of control periods done.
+    rows : ndarray (r, n)
+        See `Rows`; out of date for the cells in `gathered`: read it with `row`.
+    modes : ndarray (n,) of int8
+        Control modes; out of date for the cells in `gathered`: read them with `mode`.
+    aged : ndarray (n,)
+        Time up to which a cell's relaxation has been worked out, s: the pulp over cells
+        out of reach goes on relaxing, and is aged exactly when it is needed again.
+    peak : float
+        No pin top outside `gathered` is higher than this, m.
+    gathered : Gathered
+    memory : object
+        The controller's memory.
+    """
+
+    period: int
+    rows: Floats
+    modes: NDArray[np.int8]
+    aged: Floats
+    peak: float
+    gathered: Gathered
+    memory: Any
+
+    def row(self, index: int) -> Floats:
+        """Return one row of all cells, shape (n,), as a new array; `Rows` names them."""
+        values: Floats = self.rows[index].copy()
+        values[self.gathered.cells] = self.gathered.block[index]
+        return values
+
+    def mode(self) -> NDArray[np.int8]:
+        """Return the control modes of all cells, shape (n,), as a new array."""
+        values = self.modes.copy()
+        values[self.gathered.cells] = self.gathered.mode
+        return values
+
+    def copy(self) -> State:
+        """Return a state that shares no array with this one that a step would change."""
+        held = replace(self.gathered, block=self.gathered.block.copy(), mode=self.gathered.mode.copy())
+        return self._replace(
+            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), gathered=held
+        )
+
+
+def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
+    """Return the state before a session: every pin at `height`, every valve shut."""
+    values = np.zeros((rows.count, count))
+    values[0] = values[rows.target] = height
+    none = np.empty(0, np.intp)
+    nobody = Gathered(
+        rows,
+        none,
+        0,
+        np.empty((rows.count, 0)),
+        np.empty(0, np.int8),
+        np.empty((6, 0)),
+        None,
+        None,
+        height,
+        0,
+    )
+    return State(0, values, np.full(count, Mode.REST, np.int8), np.zeros(count), height, nobody, memory)

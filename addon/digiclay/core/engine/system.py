@@ -1,0 +1,87 @@
+"""System of a session: all parts and constants of a bed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.interfaces import Controller, Segment, Sensors, Stepper
+from ..model.layout import Grid
+from ..model.physics import Cell
+from .state import Rows
+
+__all__ = ["System", "segments"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """All that does not change in a session.
+
+    Attributes
+    ----------
+    grid : Grid
+    cell : Cell
+    sensors : Sensors or None
+        None: the controller knows all there is.
+    controller : Controller or None
+        None: every valve stays shut.
+    stepper : Stepper
+    plan : object
+        What the stepper works out once for all periods.
+    period : float
+        Control period, s.
+    fastest : float
+        No pin rises faster, m/s.
+    instants : ndarray (p,)
+        Times into the period at which the finger's pose is needed, first 0, last `period`, s.
+    rows : Rows
+    """
+
+    grid: Grid
+    cell: Cell
+    sensors: Sensors | None
+    controller: Controller | None
+    stepper: Stepper
+    plan: Any
+    period: float
+    fastest: float
+    instants: Floats
+    rows: Rows
+
+
+def segments(stepper: Stepper, cut: float, period: float, count: int) -> tuple[tuple[Segment, ...], Floats]:
+    """Cut a control period into physics steps.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    cut : float
+        Time into the period at which it is cut besides, s; 0: nowhere.
+    period : float
+        Control period, s.
+    count : int
+        Number of steps of equal length.
+
+    Returns
+    -------
+    segments : tuple of Segment
+    instants : ndarray (p,)
+        When the stepper needs the finger's pose, s.
+    """
+    times = {round(i * period / count, 15) for i in range(count + 1)}
+    if cut:
+        times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}
+    edges = sorted(times)
+    pairs = list(pairwise(edges))
+    instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
+    parts = tuple(
+        Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
+        for a, b in pairs
+    )
+    return parts, np.array(instants)

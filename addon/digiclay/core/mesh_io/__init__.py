@@ -1,0 +1,1 @@
+"""Mesh files: writers and readers, one file a format."""

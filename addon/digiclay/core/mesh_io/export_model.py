@@ -1,0 +1,178 @@
+"""Bodies of a formed surface for export: skin, solid, pins, or features."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import OutputError, ParameterError
+from ..base.quantity import Parameters, quantity
+from ..surface.body import NO_PIN, Body, Floats, Indices
+from ..surface.feature_solids import solid as feature_solid
+from ..surface.features import Feature, Finding, find
+from ..surface.formed import Formed
+from ..surface.pins_solid import pins_solid
+from ..surface.sheet import Sheet, stretched
+from ..surface.skin_mesh import BASE_THICKNESS, base_level, solid
+from ..surface.skins import SKINS
+
+__all__ = ["KINDS", "Model", "bodies", "features", "sheet"]
+
+#: Kinds of mesh, by name, with what is said of them in the help.
+KINDS: dict[str, str] = {
+    "solid": "the skin with a base and walls, watertight",
+    "surface": "the skin alone, open",
+    "pins": "the stepped bed as one printable body, watertight",
+    "features": "each boss as a body, each crease as the body that fills it",
+}
+#: Points a pitch of a skin that is not straight between the pins, unless told otherwise.
+CURVED = 4
+#: More points than this no program takes in; it is also a few GB of memory.
+MOST_POINTS = 50_000_000
+
+
+@dataclass(frozen=True)
+class Model(Parameters):
+    """What is made of a formed surface."""
+
+    kind: str = quantity("solid", "kind of mesh", choices=tuple(KINDS))
+    skin: str = quantity("bilinear", "skin between the pins; pins have none", choices=tuple(SKINS))
+    resolution: int = quantity(
+        0, f"points a pitch; 0 is 1 for the bilinear skin and {CURVED} for the others", at_least=0, at_most=64
+    )
+    base_thickness: float = quantity(
+        BASE_THICKNESS, "material under the lowest point of solid and pins", unit="m", above=0.0, at_most=1.0
+    )
+    cap: float = quantity(
+        1e-3, "radius of a pin's flat end, on which the membrane lies", unit="m", above=0.0, at_most=1.0
+    )
+
+    @property
+    def parts(self) -> int:
+        """Points a pitch."""
+        return self.resolution or (1 if self.skin == "bilinear" else CURVED)
+
+
+def sheet(formed: Formed, model: Model) -> Sheet:
+    """Return the skin a model asks for.
+
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+        Its skin and resolution.
+
+    Raises
+    ------
+    ParameterError
+        When it would have too many points.
+    """
+    points = model.parts**2 * len(formed.height)
+    if points > MOST_POINTS:
+        rule = f"must be low enough for {MOST_POINTS // 1_000_000} million points on this bed"
+        value = f"{model.parts}: {points / 1e6:.3g} million points"
+        raise ParameterError("Model", "resolution", rule, value)
+    return stretched(formed, model.skin, model.parts, model.cap)
+
+
+def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
+    """Return the features of the skin a model asks for.
+
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+        Its skin and resolution.
+    finding : Finding
+    """
+    return find(sheet(formed, model), finding)
+
+
+def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
+    """Return what a model asks for as bodies, in m.
+
+    Parameters
+    ----------
+    formed : Formed
+    model : Model
+    finding : Finding, optional
+        How features are found; they become groups of faces. Without it there are no groups, which spares
+        a large bed the search; bodies of features are found by the defaults then.
+
+    Raises
+    ------
+    OutputError
+        When features are asked for and there are none.
+    ParameterError
+        When there would be too many points.
+    """
+    skin = sheet(formed, model)
+    if model.kind == "features":
+        found = find(skin, finding)
+        if not found:
+            known = finding or Finding()
+            wanted = f"at least {known.smallest} pins more than {known.threshold * 1e3:g} mm"
+            raise OutputError(
+                f"There is no feature of {wanted} off the former surface: lower the threshold or the "
+                "smallest number of pins."
+            )
+        return [_feature(formed, one) for one in found]
+    found = find(skin, finding) if finding else []
+    names = tuple(one.name for one in found)
+    label = np.zeros(len(formed.height), np.int32)
+    for number, one in enumerate(found, 1):
+        label[one.pins] = number
+    if model.kind == "pins":
+        return [_pins(formed, model, names, label)]
+    return [_skin(skin, model, names, label)]
+
+
+def _skin(sheet: Sheet, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+    """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
+    if model.kind == "surface":
+        vertices, faces = np.column_stack([sheet.place, sheet.height]), sheet.faces
+        values = sheet.values()
+    else:
+        level = base_level(sheet.height, base_thickness=model.base_thickness)
+        vertices, faces = solid(sheet.place, sheet.height, sheet.rows, sheet.columns, base=level)
+        values = sheet.values_with_base(level)
+    group, vertex_group = np.empty((2, 0), np.int32)
+    if names:
+        group, vertex_group = np.zeros(len(faces), np.int32), np.zeros(len(vertices), np.int32)
+        over = faces[: 2 * (sheet.rows - 1) * (sheet.columns - 1)]
+        vertex_group[: len(sheet.height)] = sheet.nearest(label)
+        group[: len(over)] = vertex_group[over].max(axis=1)
+    closed = model.kind != "surface"
+    return Body("clay", vertices, faces, values, names, group, vertex_group, closed)
+
+
+def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+    """Return the stepped bed; walls and undersides are in the feature of their pin."""
+    vertices, faces, pin = pins_solid(formed, base_thickness=model.base_thickness)
+    owner = np.full(len(vertices), NO_PIN)
+    # Every vertex above the base is a corner, or the middle, of some pin's top; these have the middle first.
+    tops = faces[:, 0] < len(formed.height)
+    owner[faces[tops]] = pin[tops, None]
+    group, vertex_group = np.empty((2, 0), np.int32)
+    if names:
+        group, vertex_group = label[pin], np.where(owner >= 0, label[owner], 0).astype(np.int32)
+    return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group, vertex_group)
+
+
+def _feature(formed: Formed, feature: Feature) -> Body:
+    """Return the body of a feature; its vertices have force and mode of the nearest pin."""
+    body = feature_solid(feature)
+    nearest = formed.nearest(body.vertices[:, :2])
+    return replace(body, values=_of_pins(formed, body.vertices, nearest))
+
+
+def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict[str, Floats]:
+    """Return the values of vertices that belong to a pin each, or to none."""
+    pinned = owner >= 0
+    return {
+        "height": vertices[:, 2].copy(),
+        "force": np.where(pinned, formed.force[owner], 0.0),
+        "mode": np.where(pinned, formed.mode[owner], NO_PIN).astype(np.float64),
+    }

@@ -1,0 +1,251 @@
+"""Reading of glTF files, GLB and JSON: the triangles of all nodes of the scene, in metres, y up.
+
+Materials and pictures are not opened. Vertices in a file of their own are read if it lies in the
+folder of the glTF, or below it; a link that leads out of there is not followed.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from .mesh_limits import refusal, refuse_many_triangles, refuse_size
+from .placed_meshes import IDENTITY, joined, nested
+
+__all__ = ["read"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+UNREADABLE = "must be a glTF 2.0 file that can be read"
+INSIDE = "must have its vertices in the file, or in a file in its own folder"
+#: Kinds of numbers, and how many of them an item has.
+NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+ITEMS = {"SCALAR": 1, "VEC3": 3}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+
+
+def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
+    """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie.
+
+    Parameters
+    ----------
+    path : Path
+        Files that it refers to are looked for beside it.
+    data : bytes
+
+    Raises
+    ------
+    OSError
+        When a file of vertices cannot be read.
+    ParameterError
+        When it is no glTF, is damaged, refers to what is not beside it, or is too large.
+    """
+    try:
+        tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)
+        if not str(tree["asset"]["version"]).startswith("2."):
+            raise ValueError(f"its version is {str(tree['asset']['version'])[:20]}")
+        file = _File(path, tree, binary)
+        placed = list(file.placed())
+        parts = [(one, placement) for mesh, placement in placed for one in file.surfaces(mesh)]
+        refuse_many_triangles(path.name, sum(file.triangles(one) for one, _ in parts))
+        # Vertices that no triangle uses are copied as well.
+        vertices = sum(file.size(one["attributes"]["POSITION"]) for one, _ in parts)
+        refuse_many_triangles(path.name, vertices // 3)
+        return joined(((*file.mesh(one), placement) for one, placement in parts), path.name)
+    except ParameterError:
+        raise
+    except RecursionError:
+        said = "nested too deeply"
+    except KeyError as error:
+        said = f"{error} is missing"
+    except (ValueError, TypeError, IndexError, AttributeError, OverflowError, struct.error) as error:
+        said = " ".join(str(error).split())[:100]
+    raise refusal(UNREADABLE, path.name, said)
+
+
+def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
+    """Return the JSON of a GLB, and its bytes."""
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise ValueError(f"its version is {version}")
+    if length > len(data):
+        raise refusal("must be whole", name, f"{len(data):,} of its {length:,} bytes")
+    at, chunks = 12, []
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise refusal("must be whole", name, f"a part of {size:,} bytes that are not there")
+        chunks.append((kind, at + 8, size))
+        at += 8 + size
+    if not chunks or chunks[0][0] != b"JSON":
+        raise ValueError("its first part is not JSON")
+    (_, first, size), binary = chunks[0], next((one for one in chunks if one[0] == b"BIN\0"), None)
+    return json.loads(data[first : first + size]), data[binary[1] : sum(binary[1:])] if binary else None
+
+
+def _count(value: Any) -> int:
+    """Return a whole number from 0 on."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**53:
+        raise ValueError(f"{str(value)[:20]} is no count")
+    return value
+
+
+class _File:
+    """The tables of a glTF, and the buffers read so far."""
+
+    def __init__(self, path: Path, tree: dict[str, Any], binary: bytes | None) -> None:
+        self._path, self._tree, self._binary = path, tree, binary
+        self._buffers: dict[int, bytes] = {}
+        self._bytes = 0
+
+    def _entry(self, table: str, index: Any) -> Any:
+        """Return an entry of a table, by its number."""
+        entries = self._tree.get(table, [])
+        if _count(index) >= len(entries):
+            raise ValueError(f"there is no entry {index} in {table}")
+        return entries[index]
+
+    def placed(self) -> Iterator[tuple[Any, Floats]]:
+        """Give the meshes of the scene's nodes, and their placements."""
+        nodes = self._tree.get("nodes", [])
+        if self._tree.get("scenes"):
+            roots = self._entry("scenes", self._tree.get("scene", 0)).get("nodes", [])
+        else:
+            inner = {child for node in nodes for child in node.get("children", [])}
+            roots = [index for index in range(len(nodes)) if index not in inner]
+        waiting, seen = [(index, IDENTITY) for index in reversed(roots)], set()
+        while waiting:
+            index, outer = waiting.pop()
+            node = self._entry("nodes", index)
+            if index in seen:
+                raise ValueError(f"node {index} stands in two places")
+            seen.add(index)
+            placement = nested(_placement(node), outer)
+            waiting += [(child, placement) for child in reversed(node.get("children", []))]
+            if "mesh" in node:
+                yield self._entry("meshes", node["mesh"]), placement
+
+    def surfaces(self, mesh: Any) -> list[Any]:
+        """Return those parts of a mesh that are triangles."""
+        return [one for one in mesh["primitives"] if one.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)]
+
+    def size(self, accessor: Any) -> int:
+        """Return how many items an accessor has."""
+        return _count(self._entry("accessors", accessor)["count"])
+
+    def triangles(self, primitive: Any) -> int:
+        """Return how many triangles a part of a mesh has."""
+        corners = self.size(primitive.get("indices", primitive["attributes"]["POSITION"]))
+        return corners // 3 if primitive.get("mode", TRIANGLES) == TRIANGLES else max(0, corners - 2)
+
+    def mesh(self, primitive: Any) -> tuple[Floats, Indices]:
+        """Return vertices and triangles of a part of a mesh."""
+        vertices = self._numbers(primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
+        corners = np.arange(len(vertices))
+        if "indices" in primitive:
+            corners = self._numbers(primitive["indices"], "SCALAR")[:, 0].astype(np.int64)
+        mode, count = primitive.get("mode", TRIANGLES), self.triangles(primitive)
+        if mode == TRIANGLES:
+            if corners.size % 3:
+                raise ValueError(f"{corners.size} corners are no triangles")
+            return vertices, corners.reshape(-1, 3)
+        first = np.arange(count)
+        if mode == FAN:
+            return vertices, corners[np.column_stack([np.zeros(count, np.int64), first + 1, first + 2])]
+        # Every other triangle of a strip runs the other way round.
+        odd = first % 2
+        return vertices, corners[np.column_stack([first, first + 1 + odd, first + 2 - odd])]
+
+    def _numbers(self, accessor: Any, kind: str) -> NDArray[Any]:
+        """Return the items of an accessor, (count, numbers an item)."""
+        known = self._entry("accessors", accessor)
+        if "bufferView" not in known or "sparse" in known:
+            raise refusal(
+                "must not hold compressed or sparse vertices", self._path.name, f"accessor {accessor}"
+            )
+        if known["type"] != kind or known["componentType"] not in NUMBERS:
+            raise ValueError(f"accessor {accessor} is no {kind} of a known type")
+        number, width, count = np.dtype(NUMBERS[known["componentType"]]), ITEMS[kind], self.size(accessor)
+        view = self._entry("bufferViews", known["bufferView"])
+        item = number.itemsize * width
+        offset, stride = _count(known.get("byteOffset", 0)), _count(view.get("byteStride", item))
+        start, length = _count(view.get("byteOffset", 0)), _count(view["byteLength"])
+        buffer = self._buffer(view["buffer"])
+        if stride < item or (count and offset + (count - 1) * stride + item > length):
+            raise ValueError(f"accessor {accessor} reaches beyond its view")
+        if start + length > len(buffer):
+            raise refusal("must be whole", self._path.name, f"{len(buffer):,} bytes of {start + length:,}")
+        items: NDArray[Any] = np.ndarray(
+            (count, width), number, buffer, start + offset, (stride, number.itemsize)
+        )
+        if number.kind != "f" and known.get("normalized", False):
+            return np.maximum(items / float(np.iinfo(number).max), -1.0)
+        return items
+
+    def _buffer(self, index: Any) -> bytes:
+        """Return the bytes of a buffer."""
+        known = self._entry("buffers", index)
+        if index not in self._buffers:
+            uri = known.get("uri")
+            if uri is None and index == 0 and self._binary is not None:
+                return self._binary
+            if not isinstance(uri, str):
+                raise ValueError(f"buffer {index} has no bytes")
+            self._buffers[index] = _inline(uri) if uri.startswith("data:") else self._beside(uri)
+        return self._buffers[index]
+
+    def _beside(self, uri: str) -> bytes:
+        """Return the bytes of a file in the folder of this one."""
+        # What begins with a drive or a scheme, an absolute path and a share are no names of files beside.
+        name, folder = unquote(uri), self._path.parent.resolve()
+        if ":" in name or "\\" in name or "\0" in name or name.startswith("/"):
+            raise refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder):
+            raise refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
+        if not file.is_file():
+            raise refusal("must have its files beside it", self._path.name, f"no {uri[:60]!r}")
+        self._bytes += file.stat().st_size
+        refuse_size(self._path.name, self._bytes)
+        return file.read_bytes()
+
+
+def _inline(uri: str) -> bytes:
+    """Return the bytes that stand in a text."""
+    head, _, text = uri.partition(",")
+    if not head.endswith(";base64"):
+        raise ValueError("bytes as text that is not base64")
+    try:
+        return base64.b64decode(text, validate=True)
+    except binascii.Error as error:
+        raise ValueError(f"bytes as text: {error}") from None
+
+
+def _placement(node: Any) -> Floats:
+    """Return how a node places what is in it, (4, 3)."""
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], np.float64).reshape(4, 4)  # its columns one after another
+        return matrix[:, :3]
+    x, y, z, w = map(float, node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
+    length = math.sqrt(x * x + y * y + z * z + w * w) or 1.0
+    x, y, z, w = x / length, y / length, z / length, w / length
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), np.float64).reshape(3, 1)
+    shift = np.array(node.get("translation", (0.0, 0.0, 0.0)), np.float64).reshape(1, 3)
+    return np.concatenate([scale * turn.T, shift])

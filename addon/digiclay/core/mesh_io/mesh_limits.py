@@ -1,0 +1,64 @@
+"""Size limits of input meshes, and the messages of their refusal."""
+
+from __future__ import annotations
+
+from ..base.errors import ParameterError
+
+__all__ = ["MOST_BYTES", "MOST_TRIANGLES", "refusal", "refuse_many_triangles", "refuse_size"]
+
+#: Most triangles of a mesh: as many as a bed may have cells. They take some 5 GB while they are laid onto it.
+MOST_TRIANGLES = 20_000_000
+#: Most bytes of a mesh's file, or of what a compressed one unpacks to.
+MOST_BYTES = 2_000_000_000
+SMALLER = "Make the mesh coarser first."
+
+
+def refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterError:
+    """Return what is said of a mesh that cannot be used: the rule, the file, and what it has.
+
+    Parameters
+    ----------
+    rule : str
+        What holds for every mesh, from *must* on.
+    name : str
+        Of the file.
+    said : str
+        What this one has.
+    hint : str
+        What to do about it.
+    """
+    return ParameterError("shape", "file", rule, f"{name}: {said}", hint)
+
+
+def refuse_many_triangles(name: str, count: int) -> None:
+    """Refuse a mesh of more triangles than can be worked on, before they are made.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    count : int
+        Triangles.
+    """
+    if count > MOST_TRIANGLES:
+        rule = f"must have at most {MOST_TRIANGLES // 1_000_000} million triangles"
+        # Copies of copies can come to a number of any length.
+        shown = f"{count:,}" if count < 10**15 else "more than 10^15"
+        raise refusal(rule, name, shown, SMALLER)
+
+
+def refuse_size(name: str, size: int, what: str = "") -> None:
+    """Refuse a file of more bytes than can be read; `what` says of which part they are.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    size : int
+        Bytes.
+    what : str
+        Part of the file that has this size; empty: the file.
+    """
+    if size > MOST_BYTES:
+        rule = f"must have at most {MOST_BYTES / 1e9:g} GB{' unpacked' if what else ''}"
+        raise refusal(rule, name, f"{what} {size / 1e9:.3g} GB".strip(), SMALLER)

@@ -1,0 +1,95 @@
+"""Mesh input: all meshes of a file as one; oversized, truncated and external files are refused first.
+
+OBJ, glTF and 3MF are read here; STL, PLY and OFF, which refer to nothing else, by trimesh.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from . import gltf_reader, obj_reader, threemf_reader
+from .head_checks import check_off, check_ply, check_stl, stl_is_text
+from .mesh_limits import refuse_size
+
+__all__ = ["MESHES", "Read", "read", "reader"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Meshes by extension.
+MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")
+#: Formats whose standard says metres, and y upwards.
+GLTF = (".glb", ".gltf")
+CHECKS = {".stl": check_stl, ".ply": check_ply, ".off": check_off}
+#: What a text in UTF-8 may begin with.
+BOM = b"\xef\xbb\xbf"
+
+
+class Read(NamedTuple):
+    """A mesh as a file gives it.
+
+    Attributes
+    ----------
+    vertices : ndarray (v, 3)
+    faces : ndarray of int (f, 3)
+    length : float or None
+        Metres in the vertices' unit; None where the format does not say.
+    up : str
+        Which of its directions the format has upwards.
+    """
+
+    vertices: Floats
+    faces: Indices
+    length: float | None
+    up: str
+
+
+def reader(kind: str) -> str:
+    """Return the library that reads a format, ``""`` where none is needed."""
+    return "trimesh" if kind in CHECKS else ""
+
+
+def read(path: Path) -> Read:
+    """Read a mesh; its extension, one of `MESHES`, tells the format.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    ParameterError
+        When it is too large, cut off, damaged, or refers to what is not in its folder.
+    """
+    kind = path.suffix.lower()
+    refuse_size(path.name, path.stat().st_size)
+    if kind == ".3mf":
+        vertices, faces, length = threemf_reader.read(path)
+        return Read(vertices, faces, length, "z")
+    data = path.read_bytes().removeprefix(BOM)
+    if kind in GLTF:
+        return Read(*gltf_reader.read(path, data), 1.0, "y")
+    if kind == ".obj":
+        return Read(*obj_reader.read(data, path.name), None, "z")
+    CHECKS[kind](data, path.name)
+    return Read(*_by_trimesh(data, kind, path), None, "z")
+
+
+def _by_trimesh(data: bytes, kind: str, path: Path) -> tuple[Floats, Indices]:
+    """Read a mesh with trimesh, which is given the bytes alone and nothing to look elsewhere with."""
+    try:
+        trimesh: Any = importlib.import_module("trimesh")
+    except ImportError:
+        raise ParameterError(
+            "shape", "file", "must be an OBJ, a GLB, a 3MF, a picture or an array without trimesh", str(path),
+            "Run 'pip install trimesh'.",
+        ) from None  # fmt: skip
+    known = "stl_ascii" if kind == ".stl" and stl_is_text(data) else kind[1:]
+    more = {"skip_materials": True} if kind == ".ply" else {}
+    read = trimesh.load_mesh(io.BytesIO(data), file_type=known, resolver={}, process=False, **more)
+    return np.asarray(read.vertices, np.float64), np.asarray(read.faces)

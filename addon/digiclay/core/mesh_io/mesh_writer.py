@@ -1,0 +1,92 @@
+"""Mesh files of bodies: STL, OBJ, PLY, GLB and 3MF, each complete or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+from ..base.errors import OutputError, ParameterError
+from ..base.whole_files import open_whole
+from ..surface.body import Body
+from . import glb_writer, obj_writer, ply_writer, stl_writer, threemf_writer
+
+__all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write"]
+
+#: File formats, by name, with what is said of them in the help.
+FORMATS: dict[str, str] = {
+    "stl": "STL, binary",
+    "stl_ascii": "STL as text",
+    "obj": "Wavefront OBJ, with a group for each feature",
+    "ply": "Stanford PLY, binary, with height, force and mode of each vertex",
+    "glb": "binary glTF, in metres and y up as its standard says",
+    "3mf": "3MF, which names its unit",
+}
+WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
+    "stl": stl_writer.write_binary,
+    "stl_ascii": stl_writer.write_ascii,
+    "obj": obj_writer.write,
+    "ply": ply_writer.write,
+    "glb": glb_writer.write,
+    "3mf": threemf_writer.write,
+}
+
+#: Lengths a file can be written in: how many of them make a metre.
+UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
+
+
+def known_format(name: str) -> str:
+    """Return the format called `name` (``"stl"``, ``".STL"``) as a key of `FORMATS`.
+
+    Raises
+    ------
+    OutputError
+        When there is no such format.
+    """
+    key = name.lower().removeprefix(".")
+    if key not in FORMATS:
+        raise OutputError(f"Unknown mesh format {key!r}: known are {', '.join(FORMATS)}.")
+    return key
+
+
+def suffix(kind: str) -> str:
+    """Return how the name of a file of a format ends; text and binary STL do not share a name."""
+    return ".ascii.stl" if kind == "stl_ascii" else f".{kind}"
+
+
+def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str | None = None) -> Path:
+    """Write bodies into one file, a few MB at a time.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        One at least; they are left as they are.
+    path : str or Path
+        The file; an older one is replaced once the new one is complete.
+    unit : {"mm", "m"}
+        Length unit of all formats but GLB, which is always in metres and y up, because its
+        standard says so.
+    kind : str, optional
+        A key of `FORMATS`; by default the extension of `path`.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    OutputError
+        On an unknown format, nothing to write, or when the file cannot be written.
+    ParameterError
+        On an unknown unit.
+    """
+    target = Path(path)
+    writer = WRITERS[known_format(target.suffix if kind is None else kind)]
+    if unit not in UNITS:
+        raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
+    if not any(len(body.faces) for body in bodies):
+        raise OutputError(f"There is nothing to write to {target}.")
+    with open_whole(target) as file:
+        writer(file, bodies, UNITS[unit])
+    return target

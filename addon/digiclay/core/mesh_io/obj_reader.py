@@ -1,0 +1,139 @@
+"""Reading of Wavefront OBJ files: vertices and faces of all objects.
+
+Materials are not opened.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh_limits import refusal, refuse_many_triangles
+
+__all__ = ["read"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+UNREADABLE = "must be an OBJ file that can be read"
+CUT = "must end with a whole line: the file is cut off"
+#: Bytes that are worked on at a time.
+BLOCK = 1 << 22
+#: A number in a line has no more letters than this.
+LONGEST_WORD = 64
+#: Numbers of textures and normals at a corner.
+BESIDES = re.compile(rb"/[^\s]*")
+VERTEX, FACE = (b"v ", b"v\t"), (b"f ", b"f\t")
+
+
+def read(data: bytes, name: str) -> tuple[Floats, Indices]:
+    """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    ParameterError
+        When a line cannot be read, a face refers to a vertex that is not there, or the file is cut off.
+    """
+    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    vertices, corners = array("d"), array("q")
+    line = 1
+    for block in _blocks(data):
+        lines = [one.strip() for one in block.split(b"\n")]
+        if not _taken_at_once(lines, vertices, corners):
+            _taken(lines, line, name, vertices, corners)
+        refuse_many_triangles(name, max(len(vertices), len(corners)) // 3)
+        line += len(lines) - 1
+    places, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
+    if faces.size and (faces.min() < 0 or faces.max() >= len(places)):
+        rule = "must have faces whose corners are among its vertices"
+        raise refusal(rule, name, f"vertex {faces.max() + 1} of {len(places)}", "Is the file cut off?")
+    _refuse_cut(data, name, places, faces)
+    return places, faces
+
+
+def _blocks(data: bytes) -> Iterator[bytes]:
+    """Give the text in pieces that end with a line."""
+    at = 0
+    while at < len(data):
+        end = data.find(b"\n", at + BLOCK) + 1 or len(data)
+        # A file of the old Macintosh has other ends of lines.
+        yield data[at:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        at = end
+
+
+def _taken_at_once(lines: list[bytes], vertices: array[float], corners: array[int]) -> bool:
+    """Take in lines that are all vertices of three numbers and triangles counted from the first vertex."""
+    places = b" ".join(one for one in lines if one.startswith(VERTEX)).split()
+    faces = b" ".join(one for one in lines if one.startswith(FACE))
+    triangles = BESIDES.sub(b"", faces).split()
+    try:
+        if b"-" in faces or set(places[::4]) - {b"v"} or set(triangles[::4]) - {b"f"}:
+            return False
+        if len(places) % 4 or len(triangles) % 4:
+            return False
+        if max(map(len, [*places, *triangles]), default=0) > LONGEST_WORD:
+            return False
+        numbers = np.array(places).reshape(-1, 4)[:, 1:].astype(np.float64)
+        indices = np.array(triangles).reshape(-1, 4)[:, 1:].astype(np.int64)
+    except (ValueError, OverflowError):
+        return False
+    if sum(one.startswith(VERTEX) for one in lines) != len(numbers):
+        return False
+    if sum(one.startswith(FACE) for one in lines) != len(indices) or (indices < 1).any():
+        return False
+    vertices.frombytes(numbers.tobytes())
+    corners.frombytes((indices - 1).tobytes())
+    return True
+
+
+def _taken(lines: list[bytes], first: int, name: str, vertices: array[float], corners: array[int]) -> None:
+    """Take in lines one by one, and say of which one cannot be."""
+    for number, line in enumerate(lines, first):
+        words = line.partition(b"#")[0].split()
+        try:
+            if words and words[0] == b"v":
+                x, y, z = map(float, words[1:4])
+                vertices.extend((x, y, z))
+            elif words and words[0] == b"f":
+                _add_fan(words[1:], len(vertices) // 3, corners)
+        except (ValueError, OverflowError) as error:
+            said = f"line {number}: {' '.join(str(error).split())[:80]}"
+            raise refusal(UNREADABLE, name, said) from None
+
+
+def _add_fan(words: list[bytes], count: int, corners: array[int]) -> None:
+    """Add a face, given by its words, as triangles; `count` vertices stand before it."""
+    face = []
+    for word in words:
+        place = int(word.partition(b"/")[0])
+        if place == 0 or place < -count:
+            raise ValueError(f"there is no vertex {place}")
+        face.append(place - 1 if place > 0 else count + place)
+    for one, other in pairwise(face[1:]):
+        corners.extend((face[0], one, other))
+
+
+def _refuse_cut(data: bytes, name: str, places: Floats, faces: Indices) -> None:
+    """Refuse a file whose last line is not whole, or that ends in a line before all vertices have faces."""
+    if not data or data.endswith((b"\n", b"\r")):
+        return
+    last = data[max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 :].partition(b"#")[0].split()
+    # All corners of a face are given alike, with or without texture and normal.
+    ways = {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
+    if last in ([b"v"], [b"f"]) or (last[:1] == [b"f"] and (len(last) < 4 or len(ways) > 1)):
+        raise refusal(CUT, name, f"{b' '.join(last)[:40].decode(errors='replace')!r}")
+    unused = len(places) - np.unique(faces).size
+    if unused and len(faces):
+        raise refusal(CUT, name, f"no end of line, and {unused:,} of {len(places):,} vertices without a face")

@@ -1,0 +1,60 @@
+"""Transformation of meshes by a file's items or nodes, and their union."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh_limits import refusal
+
+__all__ = ["IDENTITY", "joined", "nested"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: A placement (4, 3): (x, y, z, 1) times it gives the place. This one leaves all where it is.
+IDENTITY: Floats = np.vstack([np.eye(3), np.zeros(3)])
+
+
+def nested(inner: Floats, outer: Floats) -> Floats:
+    """Return the placement, (4, 3), of what is placed in something that is placed itself.
+
+    Parameters
+    ----------
+    inner, outer : ndarray (4, 3)
+        Three rows of the linear part, and one of the offset.
+    """
+    placement: Floats = inner @ outer[:3]
+    placement[3] += outer[3]
+    return placement
+
+
+def joined(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple[Floats, Indices]:
+    """Return all vertices (v, 3) and triangles (f, 3) of meshes, each given with its placement.
+
+    Triangles of a mesh that is mirrored are turned, so that outside stays outside.
+
+    Parameters
+    ----------
+    meshes : iterable of (ndarray (v, 3), ndarray of int (f, 3), ndarray (4, 3))
+        Vertices, triangles, placement of each.
+    name : str
+        What the message calls the file.
+
+    Raises
+    ------
+    ParameterError
+        When a triangle has a corner that is not among its own mesh's vertices.
+    """
+    places, triangles, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+    for vertices, faces, placement in meshes:
+        if faces.size and (faces.min() < 0 or faces.max() >= len(vertices)):
+            rule = "must have faces whose corners are among its vertices"
+            raise refusal(rule, name, f"corner {faces.max()} of {len(vertices)}")
+        mirrored = np.linalg.det(placement[:3]) < 0.0
+        places.append(vertices @ placement[:3] + placement[3])
+        triangles.append((faces[:, ::-1] if mirrored else faces) + first)
+        first += len(vertices)
+    return np.concatenate(places), np.concatenate(triangles)

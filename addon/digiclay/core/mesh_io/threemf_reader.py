@@ -1,0 +1,251 @@
+"""Reading of 3MF files: a zip of XML parts; the build's items, each an object or components of others.
+
+Read as a stream and with what Python brings along. A document type, which is where XML names what
+is to be put in elsewhere, is refused: 3MF forbids it.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import zipfile
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.npz import BROKEN_ZIP
+from .mesh_limits import refusal, refuse_many_triangles, refuse_size
+from .placed_meshes import IDENTITY, joined, nested
+
+__all__ = ["UNITS", "read"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Key = tuple[str, str]
+#: An object's part and number, and its placement (4, 3).
+Placed = tuple[Key, Floats]
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02 "
+PATH = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06 path"
+RELATION = "http://schemas.openxmlformats.org/package/2006/relationships Relationship"
+MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+#: Metres in a model's unit.
+UNITS = {
+    "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 25.4e-3, "foot": 0.3048, "meter": 1.0,
+}  # fmt: skip
+#: Objects that hold others up while they are printed are no part of the shape.
+SUPPORTS = ("support", "solidsupport")
+#: Bytes handed to the parser at a time, and most of them it may keep waiting for a tag's end.
+PIECE, LONGEST_TAG = 1 << 16, 1 << 22
+UNREADABLE = "must be a 3MF file that can be read"
+#: Most objects, components and items, and how deep components may stand in components.
+MOST_PARTS, DEEPEST = 1_000_000, 64
+
+
+@dataclass
+class _Object:
+    """What a model says of an object; vertices and triangles are flat."""
+
+    support: bool
+    vertices: array[float] = field(default_factory=lambda: array("d"))
+    triangles: array[int] = field(default_factory=lambda: array("q"))
+    components: list[Placed] = field(default_factory=list)
+
+
+@dataclass
+class _Model:
+    """What the parts read so far hold."""
+
+    unit: float = UNITS["millimeter"]
+    objects: dict[Key, _Object] = field(default_factory=dict)
+    items: list[Placed] = field(default_factory=list)
+    counted: int = 0
+    unpacked: int = 0
+
+
+@dataclass(frozen=True)
+class _Extent:
+    """What an object comes to with all that stands in it: triangles, meshes, and how deep they stand."""
+
+    triangles: int
+    meshes: int
+    depth: int
+
+
+def read(path: Path) -> tuple[Floats, Indices, float]:
+    """Return vertices (v, 3), triangles (f, 3), and the metres in the vertices' unit.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    ParameterError
+        When it is no 3MF, is damaged, refers to what it does not hold, or is too large.
+    """
+    name, model = path.name, _Model()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            root = _model_part(archive, name, model)
+            waiting, known = [root], {root}
+            while waiting:
+                named = _take_in(archive, waiting.pop(), name, model, root) - known
+                waiting += sorted(named)
+                known |= named
+    except (*BROKEN_ZIP, EOFError, KeyError) as error:
+        said = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
+        raise refusal(UNREADABLE, name, said) from None
+    return *_placed(model, name), model.unit
+
+
+def _model_part(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
+    """Return the part that holds the model, as the package's relations name it."""
+    found: list[str] = []
+
+    def start(tag: str, given: dict[str, str]) -> None:
+        if tag == RELATION and given.get("Type") == MODEL and given.get("TargetMode") != "External":
+            found.append(_inside("", given.get("Target", "")))
+
+    _parse(archive, "_rels/.rels", name, model, start)
+    if not found:
+        raise refusal(UNREADABLE, name, "its relations name no model")
+    return found[0]
+
+
+def _inside(part: str, target: str) -> str:
+    """Return the place of a part in the zip that another one names."""
+    return posixpath.normpath(posixpath.join("/", posixpath.dirname(part), target)).lstrip("/")
+
+
+def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start: Any) -> None:
+    """Read a part of the zip, telling `start` of each element: its name and its attributes."""
+    entry = archive.getinfo(part)
+    model.unpacked += entry.file_size  # no more than that is unpacked, whatever there is
+    refuse_size(name, model.unpacked, part)
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise refusal("must be stored or deflated, as 3MF has it", name, part)
+    parser = expat.ParserCreate(namespace_separator=" ")
+
+    def refuse(*_: object) -> None:
+        raise refusal("must not have a document type (<!DOCTYPE ...>)", name, part)
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = start
+    fed = 0
+    try:
+        with archive.open(entry) as file:
+            while piece := file.read(PIECE):
+                parser.Parse(piece, False)
+                fed += len(piece)
+                if fed - max(parser.CurrentByteIndex, 0) > LONGEST_TAG:
+                    rule = f"must have tags of at most {LONGEST_TAG // 2**20} MB"
+                    raise refusal(rule, name, f"{part}, byte {parser.CurrentByteIndex}")
+            parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        raise refusal(UNREADABLE, name, f"{part}: {error}") from None
+
+
+def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root: str) -> set[str]:
+    """Add a part's objects to the model, and the root part's items and unit; return the parts it names."""
+    objects: list[_Object] = []
+    named: set[str] = set()
+
+    def taken(kind: str, given: dict[str, str]) -> None:
+        if kind == "vertex":
+            objects[-1].vertices.extend((float(given["x"]), float(given["y"]), float(given["z"])))
+        elif kind == "triangle":
+            objects[-1].triangles.extend((int(given["v1"]), int(given["v2"]), int(given["v3"])))
+        elif kind == "object":
+            objects.append(_Object(given.get("type") in SUPPORTS))
+            model.objects[part, given["id"]] = objects[-1]
+        elif kind == "component" or (kind == "item" and part == root):
+            placed = _reference(part, given)
+            named.add(placed[0][0])
+            (objects[-1].components if kind == "component" else model.items).append(placed)
+        elif kind == "model" and part == root:
+            unit = given.get("unit", "millimeter")
+            if unit not in UNITS:
+                raise ValueError(f"no unit: {unit}")
+            model.unit = UNITS[unit]
+
+    def start(tag: str, given: dict[str, str]) -> None:
+        if not tag.startswith(CORE):
+            return
+        kind = tag[len(CORE) :]
+        if kind in ("object", "component", "item"):
+            model.counted += 1
+            if model.counted > MOST_PARTS:
+                raise refusal(f"must have at most {MOST_PARTS:,} objects, components and items", name, "more")
+        try:
+            taken(kind, given)
+        except KeyError as error:
+            said = f"a {kind} without {error}"
+        except (ValueError, OverflowError, IndexError) as error:
+            said = f"{kind}: {error}"[:100]
+        else:
+            return
+        raise refusal(UNREADABLE, name, f"{part}, {said}")
+
+    _parse(archive, part, name, model, start)
+    refuse_many_triangles(name, sum(len(one.triangles) // 3 for one in model.objects.values()))
+    return named
+
+
+def _reference(part: str, given: dict[str, str]) -> Placed:
+    """Return what a component or an item places, and how."""
+    place = _inside("", given[PATH]) if PATH in given else part
+    placement = IDENTITY
+    if "transform" in given:
+        numbers = [float(word) for word in given["transform"].split()]
+        if len(numbers) != 12:
+            raise ValueError(f"a transform of {len(numbers)} numbers")
+        placement = np.array(numbers).reshape(4, 3)
+    return (place, given["objectid"]), placement
+
+
+def _placed(model: _Model, name: str) -> tuple[Floats, Indices]:
+    """Return all items' vertices and triangles, where the build puts them."""
+    known: dict[Key, _Extent] = {}
+    extents = [_extent(model, key, name, known, 0) for key, _ in model.items]
+    refuse_many_triangles(name, sum(extent.triangles for extent in extents))
+    meshes = sum(extent.meshes for extent in extents)
+    if meshes > MOST_PARTS:
+        raise refusal(f"must place at most {MOST_PARTS:,} meshes", name, f"{meshes:,}")
+    return joined(_meshes(model, known), name)
+
+
+def _meshes(model: _Model, known: dict[Key, _Extent]) -> Iterator[tuple[Floats, Indices, Floats]]:
+    """Give the mesh of each placed object that has one, and its placement."""
+    waiting = list(reversed(model.items))
+    while waiting:
+        key, placement = waiting.pop()
+        if known[key].meshes:
+            one = model.objects[key]
+            waiting += [(inner, nested(own, placement)) for inner, own in reversed(one.components)]
+            if one.triangles:
+                corners = np.array(one.triangles, np.int64).reshape(-1, 3)
+                yield np.array(one.vertices).reshape(-1, 3), corners, placement
+
+
+def _extent(model: _Model, key: Key, name: str, known: dict[Key, _Extent], depth: int) -> _Extent:
+    """Return what an object comes to; a support comes to nothing."""
+    if key not in known:
+        one = model.objects.get(key)
+        if one is None:
+            raise refusal("must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}")
+        below = DEEPEST + 1
+        if depth <= DEEPEST:
+            inside = [_extent(model, inner, name, known, depth + 1) for inner, _ in one.components]
+            below = 1 + max((extent.depth for extent in inside), default=-1)
+        if below > DEEPEST:
+            rule = f"must have components at most {DEEPEST} deep, and none in itself"
+            raise refusal(rule, name, f"object {key[1]}")
+        own = len(one.triangles) // 3
+        triangles = own + sum(extent.triangles for extent in inside)
+        meshes = (own > 0) + sum(extent.meshes for extent in inside)
+        known[key] = _Extent(0, 0, below) if one.support else _Extent(triangles, meshes, below)
+    return known[key]

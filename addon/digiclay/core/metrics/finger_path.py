@@ -1,0 +1,177 @@
+"""Metrics along the fingertip path: contact, lag, and the heights behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.modes import Mode
+
+__all__ = ["AWAY", "CellSums", "in_contact", "lag", "ridge_errors", "sum_cells", "surface_under"]
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+#: How far the finger must have gone on from a cell for it to count as left behind, m.
+AWAY = 12e-3
+#: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
+#: in memory.
+AT_ONCE = 2**17
+
+
+def in_contact(total_force: ArrayLike) -> Rows:
+    """Return which rows have contact, shape (t,), from the total force in N."""
+    touching: Rows = np.asarray(total_force, dtype=np.float64) > 0.0
+    return touching
+
+
+@dataclass(frozen=True, eq=False)
+class CellSums:
+    """What the metrics take of t rows of n cells: sums over the cells, and the first and last heights.
+
+    Attributes
+    ----------
+    total : ndarray (t,)
+        Total force, N.
+    x, y, height : ndarray (t,)
+        Sums over the cells of the force times place, and times height, N m.
+    strongest : ndarray (t,)
+        Largest force on a cell, N.
+    following : ndarray of int (t,)
+        How many cells follow the force.
+    first, last : ndarray (n,)
+        Heights in the first and in the last row, m.
+    """
+
+    total: Floats
+    x: Floats
+    y: Floats
+    height: Floats
+    strongest: Floats
+    following: NDArray[np.intp]
+    first: Floats
+    last: Floats
+
+    @property
+    def touching(self) -> Rows:
+        """Which rows have contact, shape (t,)."""
+        return in_contact(self.total)
+
+    @property
+    def shaping(self) -> Rows:
+        """Which rows shape the clay, shape (t,): in contact, and a cell follows the force."""
+        rows: Rows = self.touching & (self.following > 0)
+        return rows
+
+
+def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
+    """Return the sums over the cells of a history.
+
+    Parameters
+    ----------
+    history : mapping
+        The arrays of ``history.npz``, of at least one row: height, force, mode, total_force and
+        position.
+    """
+    total, height, force, position = (
+        np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
+    )
+    x, y = (force @ position).T
+    lifted = np.einsum("tn,tn->t", force, height)
+    following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
+    return CellSums(total, x, y, lifted, force.max(axis=1), following, height[0], height[-1])
+
+
+def lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
+    """Return how far the blister is behind the finger, in the rows in contact.
+
+    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
+    point, r_j the cells' positions.
+
+    Parameters
+    ----------
+    sums : CellSums
+        Of t rows.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+
+    Returns
+    -------
+    ndarray, shape (rows in contact,)
+        m.
+    """
+    rows = sums.touching
+    centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
+    distance: Floats = np.hypot(*(np.asarray(fingertip, dtype=np.float64)[rows, :2] - centroid).T)
+    return distance
+
+
+def surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
+    """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
+
+    ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
+
+    Parameters
+    ----------
+    sums : CellSums
+        Of t rows.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+
+    Returns
+    -------
+    ndarray, shape (rows in contact,)
+        m.
+    """
+    rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
+    above: Floats = sums.height[rows] / sums.total[rows] - tip[rows, 2]
+    return above
+
+
+def ridge_errors(
+    position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Rows, away: float = AWAY
+) -> Floats:
+    """Return how far the cells the finger has passed over stand above its path at the end.
+
+    ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
+    finger than cell j. A cell counts when the finger went on, in rows of the same unbroken
+    stretch, to a place at least `away` from it: where it pressed or left is no ridge.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        m.
+    final : array_like, shape (n,)
+        Heights at the end, m.
+    fingertip : array_like, shape (t, 7)
+        Lowest point, m, and quaternion.
+    rows : ndarray of bool, shape (t,)
+        Rows in which the finger shapes.
+    away : float, optional
+        m.
+
+    Returns
+    -------
+    ndarray, shape (cells that count,)
+        m, in the order in which the finger passed them.
+    """
+    place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
+    chosen = np.flatnonzero(rows)
+    nearest = np.empty(chosen.size, dtype=np.intp)
+    several = max(1, AT_ONCE // max(len(place), 1))
+    for first in range(0, chosen.size, several):
+        part = slice(first, first + several)
+        square = (tip[chosen[part], 0, None] - place[:, 0]) ** 2
+        square += (tip[chosen[part], 1, None] - place[:, 1]) ** 2
+        nearest[part] = np.argmin(square, axis=1)
+    last = {int(cell): i for i, cell in enumerate(nearest)}
+    stretch = np.concatenate([[0], np.cumsum(np.diff(chosen) > 1)]) if chosen.size else chosen
+    errors = []
+    for cell, i in sorted(last.items(), key=lambda pair: pair[1]):
+        after = chosen[i:][stretch[i:] == stretch[i]]
+        if np.max(np.hypot(*(tip[after, :2] - place[cell]).T)) >= away:
+            errors.append(float(np.asarray(final)[cell]) - float(tip[chosen[i], 2]))
+    return np.array(errors)

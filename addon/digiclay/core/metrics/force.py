@@ -1,0 +1,111 @@
+"""Metrics of the total force: deviation, contact loss, first touch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .finger_path import Rows, in_contact
+from .signal import mean, overshoot, settling_time, weights
+
+__all__ = ["BAND", "contact_loss_share", "first_touch", "rfd", "touchdown"]
+
+Floats = NDArray[np.float64]
+
+#: Settled is a force this near to its set point, as a share of it.
+BAND = 0.1
+
+
+def rfd(
+    time: ArrayLike, total_force: ArrayLike, set_point: ArrayLike, rows: Rows | None = None
+) -> float | None:
+    """Return the reference force deviation, N.
+
+    ``RFD = sqrt(sum w_i (F_i - F_ref,i)² / sum w_i)`` with the `weights` of the rows.
+
+    Parameters
+    ----------
+    time : array_like, shape (t,)
+        s.
+    total_force : array_like, shape (t,)
+        N.
+    set_point : array_like, shape (t,) or ()
+        Total force asked for, N; rows in which it is NaN are left out.
+    rows : ndarray of bool, shape (t,), optional
+        Rows to judge; those in contact by default. They include touching down, and leave out
+        the gaps when the finger is lost: read it next to `contact_loss_share`.
+
+    Returns
+    -------
+    float or None
+        None when there is no such row.
+    """
+    force = np.asarray(total_force, dtype=np.float64)
+    wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
+    chosen = (in_contact(force) if rows is None else rows) & ~np.isnan(wanted)
+    square = mean((force - wanted)[chosen] ** 2, weights(time)[chosen])
+    return None if square is None else float(np.sqrt(square))
+
+
+def contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
+    """Return the share of the time from first to last contact without contact.
+
+    A pause the session makes on purpose, with the finger lifted, counts as well.
+
+    Parameters
+    ----------
+    time : array_like, shape (t,)
+        s.
+    total_force : array_like, shape (t,)
+        N.
+
+    Returns
+    -------
+    float or None
+        In [0, 1); None when the finger never touches.
+    """
+    touching = in_contact(total_force)
+    if not np.any(touching):
+        return None
+    first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
+    return mean(1.0 - touching[first:after], weights(time)[first:after])
+
+
+def first_touch(total_force: ArrayLike) -> slice:
+    """Return the rows from the last one before the first contact to the last one of that contact."""
+    touching = in_contact(total_force)
+    if not np.any(touching):
+        return slice(0, 0)
+    start = int(np.argmax(touching))
+    gone = np.flatnonzero(~touching[start:])
+    return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
+
+
+def touchdown(time: Floats, total_force: Floats, set_point: Floats) -> tuple[float | None, float | None]:
+    """Return overshoot and settling time of the force at first touch; None where no force is asked for.
+
+    Parameters
+    ----------
+    time, total_force : ndarray, shape (t,)
+        s, N.
+    set_point : ndarray, shape (t,)
+        Total force asked for, N; NaN in rows that ask for none: in them the force is not settled.
+
+    Returns
+    -------
+    passed : float or None
+        Largest force beyond the set point, as a share of its mean over the first touch.
+    settled : float or None
+        s.
+    """
+    first = first_touch(total_force)
+    if first.stop == first.start:
+        return None, None
+    beyond, wanted = total_force[first] - set_point[first], set_point[first]
+    known = ~np.isnan(wanted)
+    typical = mean(wanted[known], weights(time[first])[known])
+    if typical is None:
+        return None, None
+    # Without contact the force is below its set point by all of it.
+    passed = overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
+    return passed, settling_time(time[first], beyond / wanted, 0.0, BAND)

@@ -1,0 +1,198 @@
+"""Metrics of a session: pure functions on the arrays of a history.
+
+Averages are over time, by the trapezium rule: a row stands for half of the intervals on
+either side of it, so histories with uneven rows are judged alike. *In contact* are the
+rows with a total force above zero; the finger cannot pull, and a force it no longer
+exerts is exactly zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import ParameterError
+from ..model.set_point import SetPoint, asked
+from ..surface.skin_mesh import grid_shape
+from .finger_path import CellSums, in_contact, lag, ridge_errors, sum_cells, surface_under
+from .force import contact_loss_share, first_touch, rfd, touchdown
+from .signal import deviation, mean, weights
+
+__all__ = [
+    "METRICS",
+    "cell_area",
+    "compute_metrics",
+    "compute_metrics_from_sums",
+    "contact_loss_share",
+    "first_touch",
+    "in_contact",
+    "lag",
+    "rfd",
+    "weights",
+]
+
+Floats = NDArray[np.float64]
+
+#: All cells.
+ALL = slice(None)
+
+#: Every key of `compute_metrics`: its unit and its meaning.
+METRICS: dict[str, tuple[str, str]] = {
+    "duration": ("s", "simulated time from the first row to the last"),
+    "set_point": ("N", "total force asked for; one that changes from row to row: its mean while shaping"),
+    "rfd": ("N", "rms over time of (total force - set point) while the finger touches"),
+    "rfd_shaping": ("N", "the same, only while a cell follows the force: without touching down"),
+    "rfd_session": ("N", "the same over the whole session; without contact the force is 0"),
+    "contact_share": ("1", "share of the session's time in which the finger touches"),
+    "contact_loss_share": ("1", "share of the time from first to last contact in which it does not touch"),
+    "lag_mean": ("m", "mean horizontal distance from fingertip to the centroid of the cells' forces"),
+    "lag_max": ("m", "largest such distance"),
+    "force_deviation": ("N", "standard deviation over time of the total force while shaping"),
+    "force_overshoot": ("1", "first touch: largest force beyond the set point, as a share of it"),
+    "settling_time": (
+        "s",
+        "first touch: from touching down until the force stays within 10 % of its set point",
+    ),
+    "height_deviation": (
+        "m",
+        "standard deviation over time of the surface's height over the finger, shaping",
+    ),
+    "ridge_offset": ("m", "mean height of what the finger left behind over its path"),
+    "ridge_error": ("m", "rms of the same"),
+    "ridge_unevenness": ("m", "standard deviation of the same"),
+    "max_cell_force": ("N", "largest force on one cell"),
+    "max_total_force": ("N", "largest force on all cells together"),
+    "lowest": ("m", "height of the lowest pin at the end"),
+    "highest": ("m", "height of the highest pin at the end"),
+    "height_range": ("m", "highest less lowest: the relief that was formed"),
+    "raised_volume": ("m3", "volume formed above the initial surface"),
+    "sunk_volume": ("m3", "volume formed below the initial surface"),
+}
+
+
+def cell_area(position: ArrayLike) -> float | None:
+    """Return the area of the bed one cell stands for, m²: distance in a row times distance of the rows.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        m; ordered row by row.
+
+    Returns
+    -------
+    float or None
+        A single row is taken as wide as its pins are apart; None for a single pin.
+    """
+    place = np.asarray(position, dtype=np.float64)
+    rows, columns = grid_shape(place)
+    along = abs(float(place[1, 0] - place[0, 0])) if columns > 1 else 0.0
+    across = abs(float(place[columns, 1] - place[0, 1])) if rows > 1 else 0.0
+    area = (along or across) * (across or along)
+    return area or None
+
+
+def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
+    """Return every metric of a session.
+
+    Parameters
+    ----------
+    history : mapping
+        The arrays of ``history.npz``: time, height, force, mode, fingertip, total_force and
+        position.
+    set_point : SetPoint or None
+        Force asked for; None where none is.
+
+    Returns
+    -------
+    dict
+        The keys of `METRICS`; SI. None where there is nothing to compute from, never a NaN.
+
+    Raises
+    ------
+    ParameterError
+        When the history has no rows.
+    """
+    time = np.asarray(history["time"], dtype=np.float64)
+    if not len(time):
+        raise ParameterError("History", "time", "must have at least one row", "none")
+    fingertip, position = (np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position"))
+    return compute_metrics_from_sums(sum_cells(history), time, fingertip, position, set_point)
+
+
+def compute_metrics_from_sums(
+    sums: CellSums,
+    time: Floats,
+    fingertip: Floats,
+    position: Floats,
+    set_point: SetPoint | None,
+    near: NDArray[np.intp] | slice = ALL,
+) -> dict[str, float | None]:
+    """Return every metric of the session the sums are of.
+
+    Parameters
+    ----------
+    sums : CellSums
+        Of t rows of n cells.
+    time : ndarray, shape (t,)
+        s.
+    fingertip : ndarray, shape (t, 7)
+        Lowest point, m, and quaternion.
+    position : ndarray, shape (n, 2)
+        m; ordered row by row.
+    set_point : SetPoint or None
+        Force asked for; None where none is.
+    near : ndarray of int or slice, optional
+        The cells that are the nearest to the finger at some time, where they are known: only they can
+        be left behind in a ridge.
+
+    Returns
+    -------
+    dict
+        See `compute_metrics`.
+    """
+    total, weight, felt, rows = sums.total, weights(time), sums.touching, sums.shaping
+    # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
+    behind = np.round(lag(sums, fingertip), 12)
+    above = surface_under(sums, fingertip)
+    ridge = ridge_errors(position[near], sums.last[near], fingertip, rows)
+    each = np.ones(len(ridge))
+    wanted = asked(set_point, sums.following)
+    beyond, settled = touchdown(time, total, wanted)
+    formed, area = sums.last - sums.first, cell_area(position)
+    found: dict[str, float | None] = {
+        "duration": float(time[-1] - time[0]),
+        "set_point": _typical(set_point, wanted[rows], weight[rows]),
+        "rfd": rfd(time, total, wanted),
+        "rfd_shaping": rfd(time, total, wanted, rows),
+        "rfd_session": rfd(time, total, wanted, np.ones(len(time), dtype=bool)),
+        "contact_share": mean(felt.astype(np.float64), weight),
+        "contact_loss_share": contact_loss_share(time, total),
+        "lag_mean": mean(behind, weight[felt]),
+        "lag_max": float(behind.max()) if len(behind) else None,
+        "force_deviation": deviation(total[rows], weight[rows]),
+        "force_overshoot": beyond,
+        "settling_time": settled,
+        "height_deviation": deviation(above[rows[felt]], weight[rows]),
+        "ridge_offset": mean(ridge, each),
+        "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
+        "ridge_unevenness": deviation(ridge, each),
+        "max_cell_force": float(sums.strongest.max()),
+        "max_total_force": float(total.max()),
+        "lowest": float(sums.last.min()),
+        "highest": float(sums.last.max()),
+        "height_range": float(np.ptp(sums.last)),
+        "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
+        "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
+    }
+    return {
+        name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
+    }
+
+
+def _typical(set_point: SetPoint | None, wanted: Floats, weight: Floats) -> float | None:
+    """Return a set point as one number, N: its mean in the rows that shape, if it changes."""
+    if set_point is None:
+        return None
+    return mean(wanted, weight) if set_point.per_cell else set_point.force

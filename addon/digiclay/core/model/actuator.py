@@ -1,0 +1,57 @@
+"""Fluidic cylinder under each pin (equations 1 and 2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["Actuator"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Actuator(Parameters):
+    """A single-acting cylinder: the pin is its rod."""
+
+    bore: float = quantity(
+        2e-3, "inner diameter of the cylinder", unit="m", symbol="D_a", source="P", above=0.0
+    )
+    stroke: float = quantity(
+        100e-3, "height of the upper end stop", unit="m", symbol="H_max", source="P", above=0.0
+    )
+    rest_height: float = quantity(40e-3, "initial height of all pins", unit="m", symbol="H_0", at_least=0.0)
+
+    def check(self) -> None:
+        """The rest height lies between the end stops."""
+        if self.rest_height > self.stroke:
+            rule = f"must be at most the stroke, {self.stroke:g} m"
+            raise ParameterError("Actuator", "rest_height", rule, f"{self.rest_height:g} m")
+
+    @property
+    def area(self) -> float:
+        """Cross section A_a of the cylinder, m²."""
+        return math.pi * self.bore**2 / 4.0
+
+    def pressure(self, force: Floats) -> Floats:
+        """Return the gauge pressure P_a = F_a / A_a, Pa (equation 2), for forces pressing down, N."""
+        return force / self.area
+
+    def rate(self, flow: Floats, height: Floats) -> Floats:
+        """Return dH/dt = q / A_a, m/s (equation 1); no flow into an end stop.
+
+        Parameters
+        ----------
+        flow : ndarray (n,)
+            Flow into the cylinder, m³/s.
+        height : ndarray (n,)
+            Height, m.
+        """
+        inward = ((height >= self.stroke) & (flow > 0.0)) | ((height <= 0.0) & (flow < 0.0))
+        return np.where(inward, 0.0, flow / self.area)

@@ -1,0 +1,73 @@
+"""Conduit between valve and cylinder: Hagen-Poiseuille, in series with the valve (equation 8)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.quantity import Parameters, quantity
+from .fluid import Fluid
+from .valve import Orifice
+
+__all__ = ["Conduit", "OrificeAndConduit", "in_series"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Conduit(Parameters):
+    """A straight round channel."""
+
+    length: float = quantity(10e-3, "length", unit="m", symbol="L_c", at_least=0.0)
+    diameter: float = quantity(0.8e-3, "inner diameter", unit="m", symbol="D_c", above=0.0)
+
+    def resistance(self, fluid: Fluid) -> float:
+        """Return ΔP/Q = 128 μ L_c / (π D_c⁴), Pa s/m³ (equation 8)."""
+        return 128.0 * fluid.dynamic_viscosity * self.length / (math.pi * self.diameter**4)
+
+
+@dataclass(frozen=True)
+class OrificeAndConduit(Orifice):
+    """Valve and conduit in series: the drops add, the flow is one.
+
+    Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
+    smaller flow holds, as without a conduit.
+
+    Attributes
+    ----------
+    resistance : float
+        Of the conduit, Pa s/m³.
+    """
+
+    resistance: float
+
+    @property
+    def resistances(self) -> tuple[float, float]:
+        """Of the conduit, and of the fully open valve in its laminar branch, Pa s/m³."""
+        return self.resistance, 1.0 / self.laminar
+
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
+        """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
+        line, valve = self.resistances
+        lift = self.laminar_lift(opening, out)
+        series = lift * line
+        series += valve
+        lift /= series
+        return lift
+
+    def conductance(self, opening: Floats, drop: Floats) -> Floats:
+        """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""
+        a = self.turbulent * np.abs(opening)
+        ra = self.resistance * a
+        turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
+        laminar: Floats = self.laminar_conductance(opening)
+        return np.minimum(laminar, turbulent)
+
+
+def in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
+    """Put a conduit behind a valve."""
+    return OrificeAndConduit(valve.laminar, valve.turbulent, valve.power, conduit.resistance(fluid))

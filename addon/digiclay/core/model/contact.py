@@ -1,0 +1,54 @@
+"""Pulp over one cell: an exponential spring (equation 11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.constants import filled
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["Contact"]
+
+Floats = NDArray[np.float64]
+
+#: Beyond this exponent the spring is stiffer than anything physical; the cut keeps even its square finite.
+LARGEST_EXPONENT = 300.0
+
+
+@dataclass(frozen=True)
+class Contact(Parameters):
+    """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
+
+    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
+    exponent: float = quantity(2000.0, "rate of stiffening of the pulp", unit="1/m", symbol="m", above=0.0)
+    offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
+    share: float = quantity(
+        0.34, "share of a cell in the flat-plate law", symbol="f_d", source="D", above=0.0
+    )
+
+    def tension(self, depth: Floats) -> Floats:
+        """Return the elastic force T, N, before the share f_d.
+
+        Parameters
+        ----------
+        depth : ndarray (..., n)
+            Indentation x, m; negative where there is a gap.
+        """
+        m, offset, none, most, unit = filled(self.numbers, depth.shape[-1])
+        exponent: Floats = depth * m
+        exponent -= offset
+        np.maximum(exponent, none, out=exponent)
+        np.minimum(exponent, most, out=exponent)
+        np.expm1(exponent, exponent)
+        exponent *= unit
+        return exponent
+
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """What `tension` is made with: m, 1/m; m x0; the exponent's bounds; b/m, N."""
+        m = self.exponent
+        return m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m

@@ -1,0 +1,56 @@
+"""Dead time between controller and valve, at its exact value (the t - t_d of equation 9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["Delay", "Queue", "queue"]
+
+
+@dataclass(frozen=True)
+class Delay(Parameters):
+    """The valve sees a command `dead_time` after the controller gave it."""
+
+    dead_time: float = quantity(1e-3, "dead time", unit="s", symbol="t_d", at_least=0.0)
+
+
+@dataclass(frozen=True)
+class Queue:
+    """Commands on their way, and when in a period the valve sees the next one.
+
+    The queue holds the last `length` commands, oldest first, the newest pushed at the
+    start of the period. Until `cut` the valve sees the oldest; after it, the next.
+
+    Attributes
+    ----------
+    length : int
+        Number of commands kept, at least 1.
+    cut : float
+        Time into the period at which the valve goes over to the next command, s; 0 when
+        the dead time is a whole number of periods (then the valve sees the oldest all along).
+    """
+
+    length: int = 1
+    cut: float = 0.0
+
+    def seen(self, time: float) -> int:
+        """Return which command of the queue the valve sees from `time` into the period on."""
+        return 1 if self.cut > 0.0 and time >= self.cut * (1.0 - 1e-12) else 0
+
+
+def queue(delay: Delay, period: float) -> Queue:
+    """Split a dead time into whole control periods and the cut inside one.
+
+    Parameters
+    ----------
+    delay : Delay
+    period : float
+        Control period, s.
+    """
+    whole = int(delay.dead_time / period + 1e-9)
+    cut = delay.dead_time - whole * period
+    if cut < 1e-9 * period:
+        return Queue(whole + 1)
+    return Queue(whole + 2, cut)

@@ -1,0 +1,185 @@
+"""Fingertip ellipsoid: its underside over each cell.
+
+Beyond nine tenths of the way to its rim the ellipsoid is continued by the paraboloid
+that meets it with equal slope. The ellipsoid itself ends there with infinite slope; the
+finger does not end there, and a tall pin that the finger runs into sideways must be met
+by a force that grows, not by one that jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["LEVEL", "Fingertip", "forms", "matrices", "reach", "reaches", "underside"]
+
+Floats = NDArray[np.float64]
+
+#: Squared reduced radius at which the paraboloid takes over.
+JOIN = 0.96
+#: Orientation of a level finger (quaternion w, x, y, z).
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+_ROOT = (1.0 - JOIN) ** 0.5
+_SLOPE = 0.5 / _ROOT
+
+
+@dataclass(frozen=True)
+class Fingertip(Parameters):
+    """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
+
+    length: float = quantity(
+        10e-3, "semi-axis along the fingertip", unit="m", symbol="a_x", source="C, Microsoft", above=0.0
+    )
+    width: float = quantity(
+        8e-3, "semi-axis across the fingertip", unit="m", symbol="a_y", source="C, Microsoft", above=0.0
+    )
+    height: float = quantity(
+        8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="C, Microsoft", above=0.0
+    )
+
+    def outline(self, poses: Floats) -> Floats:
+        """Work out, for each pose, what its underside needs.
+
+        Parameters
+        ----------
+        poses : ndarray (k, 7)
+            Position of the lowest point, m, and unit quaternion w, x, y, z.
+
+        Returns
+        -------
+        ndarray (k, 10)
+            Centre x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²;
+            the tilt of the mid surface t_x, t_y; the half thickness over the centre, m; the
+            smaller eigenvalue of S, 1/m².
+        """
+        rotation = matrices(poses[:, 3:])
+        axes = np.array([self.length, self.width, self.height])
+        inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
+        form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
+        lowest = inverse[:, :, 2] / np.sqrt(inverse[:, 2, 2])[:, None]
+        tilt = form[:, :2, 2] / form[:, 2, 2][:, None]
+        schur = form[:, :2, :2] - tilt[:, :, None] * form[:, 2, None, :2]
+        outline = np.empty((len(poses), 10))
+        outline[:, :3] = poses[:, :3] + lowest
+        outline[:, 3], outline[:, 4], outline[:, 5] = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
+        outline[:, 6:8] = tilt
+        outline[:, 8] = form[:, 2, 2] ** -0.5
+        outline[:, 9] = _smaller_eigenvalue(schur)
+        return outline
+
+
+def reaches(outline: Floats) -> Floats:
+    """Return what `reach` needs of each outline (..., 10), shape (..., 3): base, m; tilt; bend, 1/m."""
+    half = outline[..., 8]
+    base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
+    return np.stack(
+        [base, np.hypot(outline[..., 6], outline[..., 7]), 2.0 * _SLOPE * half * outline[..., 9]], -1
+    )
+
+
+def reach(base: float, tilt: float, bend: float, peak: float) -> float:
+    """Return a radius about the centre beyond which the underside is above `peak`, m.
+
+    A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
+    stays one with the smallest base, the largest tilt and the smallest bend of several poses.
+
+    Parameters
+    ----------
+    base, tilt, bend : float
+        From `reaches`.
+    peak : float
+        No pin top is higher than this, m.
+
+    Returns
+    -------
+    float
+        Negative when the finger is wholly above `peak`.
+    """
+    square = tilt * tilt + 2.0 * bend * (peak - base)
+    return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
+
+
+def forms(outline: Floats) -> tuple[Floats, Floats]:
+    """Return what `underside` needs as quadratic forms of the position.
+
+    With r² the squared reduced radius, t the half thickness over the centre, and
+    ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
+    tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
+
+    Parameters
+    ----------
+    outline : ndarray (..., p, 10)
+        From `Fingertip.outline`.
+
+    Returns
+    -------
+    forms : ndarray (..., 2 p, 6)
+        Coefficients of 1, x, y, x², x y, y²: p rows in R, then p rows in the tangent, m.
+    join : ndarray (..., 2, p, 1)
+        c, m, and its root.
+    """
+    x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = np.moveaxis(outline, -1, 0)
+    zero = np.zeros_like(x)
+    square = xx * x * x + 2.0 * xy * x * y + yy * y * y
+    inward = np.stack(
+        [1.0 - square, 2.0 * (xx * x + xy * y), 2.0 * (xy * x + yy * y), -xx, -2.0 * xy, -yy], -1
+    )
+    middle = np.stack([z + tilt_x * x + tilt_y * y, -tilt_x, -tilt_y, zero, zero, zero], -1)
+    slope, join = (_SLOPE * half)[..., None], (0.5 * _ROOT * half)[..., None]
+    tangent = middle - slope * inward
+    tangent[..., 0] -= join[..., 0]
+    rows = np.concatenate([inward * (join / (1.0 - JOIN)), tangent], -2)
+    return rows, np.stack([join, np.sqrt(join)], -3)
+
+
+def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
+    """Return the height of the finger's underside, shape (..., p, k), m.
+
+    Parameters
+    ----------
+    forms : ndarray (..., 2 p, 6)
+    join : ndarray (..., 2, p, 1)
+        From `forms`.
+    place : ndarray (6, k)
+        Rows 1, x, y, x², x y, y² of the places asked for.
+    """
+    count = join.shape[-2]
+    # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
+    rows = np.matmul(forms, place)
+    inner: Floats = rows[..., :count, :]
+    np.maximum(inner, join[..., 0, :, :], out=inner)
+    np.sqrt(inner, inner)
+    inner -= join[..., 1, :, :]
+    inner *= inner
+    inner += rows[..., count:, :]
+    return inner
+
+
+def _smaller_eigenvalue(matrices: Floats) -> Floats:
+    """Return the smaller eigenvalue of symmetric matrices (k, 2, 2)."""
+    a, b, c = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
+    smaller: Floats = (a * c - b * b) / larger
+    return smaller
+
+
+def matrices(quaternions: Floats) -> Floats:
+    """Return rotation matrices (k, 3, 3) of quaternions (k, 4), w first."""
+    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    return np.moveaxis(
+        np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        ),
+        2,
+        0,
+    )

@@ -1,0 +1,233 @@
+"""Interfaces of the parts between fingertip and pins, as protocols.
+
+A place holds either the real part or a stand-in from `absent` that owns no state and
+computes nothing. Parts hold parameters only: state is handed in and handed back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .delay import Queue
+
+__all__ = [
+    "Controller",
+    "Flow",
+    "Lag",
+    "Measurement",
+    "Movement",
+    "Orders",
+    "Pulp",
+    "Segment",
+    "Sensors",
+    "Stepper",
+    "Truth",
+]
+
+Floats = NDArray[np.float64]
+#: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
+#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N.
+Movement = Callable[[Floats], Floats]
+
+
+class Flow(Protocol):
+    """Valve, with or without a conduit: opening and pressure drop to flow."""
+
+    @property
+    def knee(self) -> float: ...
+
+    @property
+    def power(self) -> int: ...
+
+    @property
+    def resistances(self) -> tuple[float, float]: ...
+
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any: ...
+
+    def conductance(self, opening: Floats, drop: Floats) -> Floats: ...
+
+    def flow(self, opening: Floats, drop: Floats) -> Floats: ...
+
+
+class Lag(Protocol):
+    """How the valve's opening follows its command; `own` are the state rows it owns, shape (rows, n)."""
+
+    @property
+    def rows(self) -> int: ...
+
+    def opening(self, own: Floats, command: Floats) -> Floats: ...
+
+    def rate(self, own: Floats, command: Floats) -> Floats: ...
+
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats: ...
+
+    def settle(self, own: Floats) -> None: ...
+
+
+class Pulp(Protocol):
+    """How the pulp under the finger relaxes; `own` are its state rows, shape (rows, k)."""
+
+    @property
+    def rows(self) -> int: ...
+
+    def relaxed(self, own: Floats) -> Any: ...
+
+    def rate(self, own: Floats, tension: Floats) -> Floats: ...
+
+    def lost(self, step: float) -> tuple[Floats, float]: ...
+
+    def transition(self, step: float) -> Floats: ...
+
+    def age(self, own: Floats, time: Floats) -> None: ...
+
+
+class Sensors(Protocol):
+    """What the controller gets to know of forces and heights; `own` are the state rows it owns."""
+
+    @property
+    def rows(self) -> int: ...
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
+        ...
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Bring `own` up to date, in place, with what there is at the end of a period."""
+        ...
+
+
+class Truth(NamedTuple):
+    """What there is to be measured, of some cells, between two control periods.
+
+    Attributes
+    ----------
+    cells : ndarray of int (m,)
+    period : int
+        Number of control periods done.
+    force, height : ndarray (m,)
+        N, m.
+    command : ndarray (m,)
+        Valve command of the period before.
+    """
+
+    cells: NDArray[np.intp]
+    period: int
+    force: Floats
+    height: Floats
+    command: Floats
+
+
+class Stepper(Protocol):
+    """How a block of cells is moved on by one control period."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def order(self) -> int: ...
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """When, in shares of a physics step, the finger's pose is needed."""
+        ...
+
+    @property
+    def bridges(self) -> bool:
+        """Whether a step may hold the instant at which a lagging valve goes over to the next command."""
+        ...
+
+    def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
+        """Work out once what all periods share."""
+        ...
+
+    def bind(self, plan: Any, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on, as often as its set of cells serves.
+
+        Parameters
+        ----------
+        plan : object
+            From `plan`.
+        driven : ndarray (r + q, n)
+            State rows, see `alike.Cell`, then the commands of the queue, oldest first.
+        near : int
+            Number k of cells, the first, that the finger may touch.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One physics step of a control period.
+
+    Attributes
+    ----------
+    start, length : float
+        Time into the period, and length, s.
+    nodes : tuple of int
+        Which of the period's instants the stepper needs.
+    """
+
+    start: float
+    length: float
+    nodes: tuple[int, ...]
+
+
+class Measurement(NamedTuple):
+    """What a controller sees of some cells.
+
+    Attributes
+    ----------
+    place : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of where they are, m.
+    height, force : ndarray (m,)
+        As measured, m and N.
+    target : ndarray (m,)
+        Height they are commanded to, m.
+    mode : ndarray (m,) of int8
+    own : ndarray (rows, m)
+        What the controller remembers of each cell; brought up to date in place.
+    """
+
+    place: Floats
+    height: Floats
+    force: Floats
+    target: Floats
+    mode: NDArray[np.int8]
+    own: Floats
+
+
+class Orders(NamedTuple):
+    """What a controller makes of a measurement, (m,) each: targets, m; modes; valve commands."""
+
+    target: Floats
+    mode: NDArray[np.int8]
+    command: Floats
+
+
+class Controller(Protocol):
+    """A strategy: parameters only; its memory is handed in and handed back."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        ...
+
+    def begin(self) -> Any:
+        """Return the memory before a session."""
+        ...
+
+    def attend(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
+        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
+        ...
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+        """Return memory and orders for the cells of the disc and all that still move."""
+        ...

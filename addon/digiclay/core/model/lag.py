@@ -1,0 +1,70 @@
+"""Valve lag: first-order response to the command (equation 9)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.quantity import Parameters, quantity
+from .delay import Queue
+
+__all__ = ["ValveLag"]
+
+Floats = NDArray[np.float64]
+
+#: A valve on its way shut and this little open counts as shut: it can let through no more than
+#: 1e-18 of a cell's free speed, and a cell with a shut valve need not be integrated.
+SHUT = 1e-9
+
+
+@dataclass(frozen=True)
+class ValveLag(Parameters):
+    """``τ_v dK/dt + K = K_com``: exact while the command is held."""
+
+    time_constant: float = quantity(2e-3, "time constant of the valve", unit="s", symbol="τ_v", above=0.0)
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: its opening."""
+        return 1
+
+    def opening(self, own: Floats, command: Floats) -> Floats:
+        """Return the opening K, shape (n,)."""
+        opening: Floats = own[0]
+        return opening
+
+    def rate(self, own: Floats, command: Floats) -> Floats:
+        """Return dK/dt, 1/s (equation 9), shape (1, n), for held commands, shape (n,)."""
+        return (command - own) / self.time_constant
+
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the opening at some times of a control period, as a linear map; exact.
+
+        Parameters
+        ----------
+        queue : Queue
+            Says when the valve goes over from one held command to the next.
+        times : sequence of float (t,)
+            Times into the period, s.
+
+        Returns
+        -------
+        ndarray (t, 1 + queue.length)
+            To be multiplied with the opening at the start and the commands of the queue.
+        """
+        response = np.zeros((len(times), 1 + queue.length))
+        for row, time in zip(response, times, strict=True):
+            row[0] = math.exp(-time / self.time_constant)
+            row[1] = math.exp(-max(time - queue.cut, 0.0) / self.time_constant) if queue.cut else 1.0
+            row[1] -= row[0]
+            if queue.cut:
+                row[2] = -math.expm1(-max(time - queue.cut, 0.0) / self.time_constant)
+        return response
+
+    def settle(self, own: Floats) -> None:
+        """Shut valves that are almost shut, in place."""
+        own[np.abs(own) < SHUT] = 0.0

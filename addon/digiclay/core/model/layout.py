@@ -1,0 +1,165 @@
+"""Layout of the bed: number and spacing of the cells, and the cells near a point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "grid"]
+
+Floats = NDArray[np.float64]
+Cells = NDArray[np.intp]
+#: First row, last row, first column, last column.
+Bounds = tuple[int, int, int, int]
+#: Centre x, y and radius, m.
+Disc = tuple[float, float, float]
+
+#: Relative slack, so that cells exactly on a limit count the same on every side of the centre.
+ON_THE_SIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class Layout(Parameters):
+    """Rows and columns of cells, centred on the origin of the bed.
+
+    *aligned*: a square grid. *staggered*: every other row shifted by half a pitch, rows
+    one pitch apart. *hexagonal*: shifted likewise, rows ``pitch * sqrt(3) / 2`` apart.
+    """
+
+    rows: int = quantity(
+        25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000
+    )
+    columns: int = quantity(
+        25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
+    )
+    pitch: float = quantity(
+        3e-3, "distance of neighbouring cells in a row", unit="m", symbol="p", source="P", above=0.0
+    )
+    arrangement: str = quantity(
+        "aligned",
+        "offset of neighbouring rows",
+        source="P",
+        choices=("aligned", "staggered", "hexagonal"),
+    )
+
+    def check(self) -> None:
+        """Refuse a bed larger than memory or integer indices can hold."""
+        if self.rows * self.columns > 20_000_000:
+            rule = "must have at most 20 million cells"
+            raise ParameterError("Layout", "rows * columns", rule, f"{self.rows} x {self.columns}")
+
+    @property
+    def row_spacing(self) -> float:
+        """Distance between rows, m."""
+        return self.pitch * (math.sqrt(0.75) if self.arrangement == "hexagonal" else 1.0)
+
+    @property
+    def shift(self) -> float:
+        """How far odd rows are shifted along x, m."""
+        return 0.0 if self.arrangement == "aligned" else self.pitch / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The cells' positions, and quick answers to "which cells are near here?".
+
+    Attributes
+    ----------
+    layout : Layout
+    x, y : ndarray (n,)
+        Positions of the cells' axes, m; cell ``row * columns + column``.
+    """
+
+    layout: Layout
+    x: Floats
+    y: Floats
+
+    @property
+    def count(self) -> int:
+        """Number of cells n."""
+        return self.x.size
+
+    @cached_property
+    def corner(self) -> tuple[float, float]:
+        """Position of the first cell, m."""
+        return float(self.x[0]), float(self.y[0])
+
+    @property
+    def positions(self) -> Floats:
+        """Positions of the cells, shape (n, 2), m."""
+        return np.column_stack([self.x, self.y])
+
+    def bounds(self, x: float, y: float, radius: float) -> Bounds:
+        """Return the rows and columns that hold all cells within `radius` of a point.
+
+        Parameters
+        ----------
+        x, y : float
+            Centre, m.
+        radius : float
+            m; cells exactly on a side are inside. Negative: no cells.
+
+        Returns
+        -------
+        Bounds
+            First row, last row, first column, last column; a last below a first means none.
+        """
+        plan = self.layout
+        spacing, (left, bottom) = plan.row_spacing, self.corner
+        return (
+            max(0, math.ceil((y - radius - bottom) / spacing - ON_THE_SIDE)),
+            min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + ON_THE_SIDE)),
+            max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - ON_THE_SIDE)),
+            min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + ON_THE_SIDE)),
+        )
+
+    def within(self, bounds: Bounds) -> Cells:
+        """Return the cells of some rows and columns, in ascending order."""
+        low_row, high_row, low, high = bounds
+        if low_row > high_row or low > high:
+            return np.empty(0, np.intp)
+        columns = self.layout.columns
+        rows = np.arange(low_row * columns, high_row * columns + 1, columns)
+        return (rows[:, None] + np.arange(low, high + 1)).ravel()
+
+    def disc(self, x: float, y: float, radius: float) -> Cells:
+        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
+        cells = self.within(self.bounds(x, y, radius))
+        square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
+        return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
+
+    def at(self, x: Floats, y: Floats) -> Cells:
+        """Return the cells nearest to some places, m, shape (k,)."""
+        plan, (left, bottom) = self.layout, self.corner
+        row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
+        column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
+        cells: Cells = (row * plan.columns + column).astype(np.intp)
+        return cells
+
+    def place(self, cells: Cells) -> Floats:
+        """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
+        x, y = self.x.take(cells), self.y.take(cells)
+        return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+
+
+def grid(layout: Layout) -> Grid:
+    """Lay out the cells of a bed, centred on the origin.
+
+    Returns
+    -------
+    Grid
+        With arrays of ``rows * columns`` positions.
+    """
+    column = np.arange(layout.columns) * layout.pitch
+    row = np.arange(layout.rows)
+    width = (layout.columns - 1) * layout.pitch + (layout.shift if layout.rows > 1 else 0.0)
+    x = column - width / 2 + (row[:, None] % 2) * layout.shift
+    y = np.broadcast_to(((row - (layout.rows - 1) / 2) * layout.row_spacing)[:, None], x.shape)
+    return Grid(layout, x.ravel(), y.ravel())

@@ -1,0 +1,76 @@
+"""Null parts, which replace omitted parts: no state, no computation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .delay import Queue
+from .interfaces import Truth
+
+__all__ = ["InstantValve", "PerfectSensors", "Unrelaxed"]
+
+Floats = NDArray[np.float64]
+
+
+class InstantValve:
+    """No valve lag: the opening is the command."""
+
+    rows = 0
+
+    def opening(self, own: Floats, command: Floats) -> Floats:
+        """Return the command."""
+        return command
+
+    def rate(self, own: Floats, command: Floats) -> Floats:
+        """Return no rows."""
+        return own
+
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the map that picks the command seen at each time, shape (t, queue.length)."""
+        response = np.zeros((len(times), queue.length))
+        response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
+        return response
+
+    def settle(self, own: Floats) -> None:
+        """Nothing to settle."""
+
+
+class Unrelaxed:
+    """No relaxation: the pulp is elastic."""
+
+    rows = 0
+
+    def relaxed(self, own: Floats) -> float:
+        """Return no loss of force."""
+        return 0.0
+
+    def rate(self, own: Floats, tension: Floats) -> Floats:
+        """Return no rows."""
+        return own
+
+    def lost(self, step: float) -> tuple[Floats, float]:
+        """Return the map to no loss of force, shape (1,), and no share."""
+        return np.zeros(1), 0.0
+
+    def transition(self, step: float) -> Floats:
+        """Return the map to no rows, shape (0, 3)."""
+        return np.empty((0, 3))
+
+    def age(self, own: Floats, time: Floats) -> None:
+        """Nothing to age."""
+
+
+class PerfectSensors:
+    """No sensor model: the controller knows the true forces and heights."""
+
+    rows = 0
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return what is there."""
+        return truth.force, truth.height
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Nothing to remember."""

@@ -1,0 +1,138 @@
+"""Continuous physics of one cell, in the order of the paper: from touch to flow to motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .actuator import Actuator
+from .interfaces import Flow, Lag
+from .supply import Supply
+from .touch import Touch, force
+
+__all__ = ["GAUSS", "Cell", "Speeds", "felt", "rates", "speeds"]
+
+Floats = NDArray[np.float64]
+
+#: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
+GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The parts every cell is made of.
+
+    A block of n cells has state rows ``y`` of shape (r, n): height, m; the pulp's rows (used
+    for the first k cells, which the finger may touch); the lag's rows.
+    """
+
+    actuator: Actuator
+    flow: Flow
+    supply: Supply
+    lag: Lag
+    touch: Touch | None
+
+    @cached_property
+    def lag_rows(self) -> slice:
+        """The rows of ``y`` that the valve lag owns."""
+        first = self.pulp_rows.stop
+        return slice(first, first + self.lag.rows)
+
+    @cached_property
+    def pulp_rows(self) -> slice:
+        """The rows of ``y`` that the relaxation owns."""
+        return slice(1, 1 + (self.touch.pulp.rows if self.touch else 0))
+
+    @cached_property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        return 1 + (self.touch.pulp.rows if self.touch else 0) + self.lag.rows
+
+
+@dataclass(frozen=True, eq=False)
+class Speeds:
+    """How fast a pin without load goes through a valve that is wide open, m/s.
+
+    Attributes
+    ----------
+    fall, rise : float or ndarray (b,)
+        Its velocity downwards, not above 0, and upwards, not below.
+    """
+
+    fall: Any
+    rise: Any
+
+    def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
+        """Return the lowest and the highest that pins can be after some time, (n, ..), m.
+
+        A finger that pushes a pin leaves it where they part, and what it does not push goes no faster than
+        its valve lets it: no pin is lower than it was, or than the finger came, by more than such a fall.
+
+        Parameters
+        ----------
+        height : ndarray (n, ..)
+            Heights before, m.
+        under : ndarray (p, k, ..)
+            Undersides of the finger over the first k, m.
+        time : float or ndarray (b,)
+            s.
+        """
+        lowest = height.copy()
+        near = lowest[: under.shape[1]]
+        np.minimum(near, under.min(axis=0), out=near)
+        lowest += time * self.fall
+        return lowest, height + time * self.rise
+
+
+def speeds(cell: Cell) -> Speeds:
+    """Work out how fast a pin without load goes at most."""
+    wide = np.array([-1.0, 1.0])
+    ways = cell.flow.flow(wide, cell.supply.pressure(wide)) / cell.actuator.area
+    return Speeds(min(float(ways.min()), 0.0), max(float(ways.max()), 0.0))
+
+
+def felt(cell: Cell, y: Floats, under: Floats) -> Floats:
+    """Return the force on the first k cells of a block, shape (k,), N.
+
+    Parameters
+    ----------
+    cell : Cell
+    y : ndarray (r, n)
+        State rows, see `Cell`.
+    under : ndarray (k,)
+        Underside of the finger over the first k cells, m.
+    """
+    if cell.touch is None:
+        return np.empty(0)
+    return force(cell.touch, y[0, : under.size], under, y[cell.pulp_rows, : under.size])
+
+
+def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
+    """Return dy/dt of a block of cells.
+
+    Parameters
+    ----------
+    cell : Cell
+    y : ndarray (r, n)
+        State rows, see `Cell`.
+    under : ndarray (k,)
+        Underside of the finger over the first k cells, m.
+    command : ndarray (n,)
+        Held valve commands, in [-1, 1].
+    """
+    height, lag, pulp = y[0], y[cell.lag_rows], y[cell.pulp_rows, : under.size]
+    pressure = np.zeros_like(height)
+    change = np.zeros_like(y)
+    if cell.touch and under.size:
+        pressure[: under.size] = cell.actuator.pressure(felt(cell, y, under))
+        tension = cell.touch.contact.tension(height[: under.size] - under)
+        change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
+    opening = cell.lag.opening(lag, command)
+    drop = cell.supply.pressure(opening) - pressure
+    change[0] = cell.actuator.rate(cell.flow.flow(opening, drop), height)
+    change[cell.lag_rows] = cell.lag.rate(lag, command)
+    return change

@@ -1,0 +1,112 @@
+"""Relaxation of the pulp: quasi-linear viscoelasticity by Prony filters (equations 10, 12 to 14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["Relaxation"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Relaxation(Parameters):
+    """Reduced relaxation ``G(t) = (c0 + Σ c_i exp(-t/t_i)) / Σ c`` as filters ``dz_i/dt = (T - z_i)/t_i``.
+
+    The force is ``F = T - Σ ĉ_i z_i`` with ``ĉ_i = c_i / Σ c``: exactly the convolution of
+    equation 10, not an approximation to it.
+    """
+
+    times: tuple[float, ...] = quantity(
+        (4e-3, 70e-3, 1.4), "relaxation times", unit="s", symbol="1/ν_i", source="Pawluk 1999", at_least=1e-9
+    )
+    weights: tuple[float, ...] = quantity(
+        (0.08, 0.62, 0.20, 0.10),
+        "weights c0 (permanent share) to c_k",
+        symbol="c_i",
+        source="C, Jindrich 2003",
+        at_least=0.0,
+    )
+
+    def check(self) -> None:
+        """One weight more than times, and not all of them zero."""
+        if len(self.weights) != len(self.times) + 1:
+            rule = f"must have one value more than times, {len(self.times) + 1}"
+            raise ParameterError("Relaxation", "weights", rule, str(len(self.weights)))
+        if not sum(self.weights) > 0.0:
+            raise ParameterError("Relaxation", "weights", "must not all be 0", str(self.weights))
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: one a filter."""
+        return len(self.times)
+
+    @cached_property
+    def rates(self) -> Floats:
+        """Relaxation rates ν_i, shape (k, 1), 1/s."""
+        return 1.0 / np.array(self.times)[:, None]
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Shares ĉ_i of the filters, shape (k,)."""
+        weights = np.array(self.weights)
+        return np.asarray(weights[1:] / weights.sum())
+
+    def reduced(self, time: Floats) -> Floats:
+        """Return G(t) (equation 12); G(0) = 1."""
+        decay = np.exp(-np.asarray(time)[..., None] / np.array(self.times))
+        return np.asarray(1.0 - self.shares.sum() + decay @ self.shares)
+
+    def relaxed(self, own: Floats) -> Floats:
+        """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n,), of filters z (k, n)."""
+        relaxed: Floats = self.shares.dot(own)
+        return relaxed
+
+    def rate(self, own: Floats, tension: Floats) -> Floats:
+        """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
+        return self.rates * (tension - own)
+
+    def lost(self, step: float) -> tuple[Floats, float]:
+        """Return the force lost over a step, on average, as a map of (z, T at the start), and a share of T.
+
+        ``S = map . (z, T_0) + share T``, T the tension that there is: exact for a mean over the
+        step if the tension is linear in time, and the whole loss where the filters are quicker
+        than the step.
+
+        Returns
+        -------
+        map : ndarray (k + 1,)
+        share : float
+            In [0, 1).
+        """
+        turns = self.rates[:, 0] * step
+        kept = -np.expm1(-turns) / turns
+        # Of a small number of turns the difference is rounding only; its series takes over there.
+        series = turns / 3.0 - turns * turns / 12.0
+        share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - kept) / turns))
+        return np.append(self.shares * kept, self.shares @ (1.0 - kept) - share), share
+
+    def transition(self, step: float) -> Floats:
+        """Return the map from (z; T at the start, on average, at the end of a step) to the new z.
+
+        Exact for a tension linear in time.
+
+        Returns
+        -------
+        ndarray (k, k + 3)
+        """
+        turns = self.rates * step
+        fresh = -np.expm1(-turns)
+        bend = 1.0 - fresh * (1.0 / turns + 0.5)
+        return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
+
+    def age(self, own: Floats, time: Floats) -> None:
+        """Let filters decay without contact for `time` seconds, shape (n,), in place; exact."""
+        own *= np.exp(-self.rates * time)

@@ -1,0 +1,259 @@
+"""Sensor model: noise, quantisation and delay of forces and heights.
+
+Each is a small part around another, so a scene puts together what it wants:
+``Delayed(Quantised(Noisy(PerfectSensors())))``, and `observer.ValveObserver` in between. A
+part without an effect is not put in.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+from .interfaces import Sensors, Truth
+
+__all__ = ["Delayed", "Noisy", "Quantised", "Sensing", "normals"]
+
+Floats = NDArray[np.float64]
+Words = NDArray[np.uint64]
+
+#: Standard deviations from which on a reading is no noise: by chance one in 3.5 million is above.
+SURE = 5.0
+#: Finest step a reading can have: below it, rounding errors are larger than the step.
+FINEST = 1e-12
+#: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
+WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+WORD = 2**64
+
+
+@dataclass(frozen=True)
+class Sensing(Parameters):
+    """How the cells' sensors differ from perfect ones; 0 leaves an effect out."""
+
+    force_noise: float = quantity(
+        0.0, "standard deviation of the force sensors", unit="N", symbol="σ_F", at_least=0.0, at_most=100.0
+    )
+    height_noise: float = quantity(
+        0.0, "standard deviation of the height sensors", unit="m", symbol="σ_H", at_least=0.0, at_most=1.0
+    )
+    force_step: float = quantity(
+        0.0, "resolution of a force reading", unit="N", symbol="q_F", at_least=0.0, at_most=100.0
+    )
+    height_step: float = quantity(
+        0.0, "resolution of a height reading", unit="m", symbol="q_H", at_least=0.0, at_most=1.0
+    )
+    delay: int = quantity(0, "delay of readings in control periods", symbol="d", at_least=0, at_most=100)
+    observer: str = quantity(
+        "none",
+        "replacement of the force sensors: none, or an estimate from heights and commands",
+        choices=("none", "valve"),
+    )
+    seed: int = quantity(0, "seed of the noise", at_least=0, at_most=2**63 - 1)
+
+    @property
+    def force_floor(self) -> float:
+        """Force from which on the reading of a cell is no noise, N; 0 without noise.
+
+        Rounding takes a reading up by half a step at most.
+        """
+        return SURE * self.force_noise + 0.5 * self.force_step if self.force_noise else 0.0
+
+    @property
+    def height_floor(self) -> float:
+        """Distance from which on a height that is read is not the true one, m; 0 of perfect sensors."""
+        return SURE * self.height_noise + 0.5 * self.height_step
+
+    @property
+    def motion_floor(self) -> float:
+        """Distance from which on the difference of two heights that are read is motion, m."""
+        return SURE * math.sqrt(2.0) * self.height_noise + self.height_step
+
+    def check(self) -> None:
+        """A step is worth rounding to; an observer leaves no force sensor to be noisy."""
+        for name, unit in (("force_step", "N"), ("height_step", "m")):
+            step = getattr(self, name)
+            if 0.0 < step < FINEST:
+                rule = f"must be 0 {unit}, or at least {FINEST:g} {unit}"
+                raise ParameterError("Sensing", name, rule, f"{step:g} {unit}")
+        for name in ("force_noise", "force_step"):
+            if self.observer != "none" and getattr(self, name):
+                rule = f"must be 0 N with observer = {self.observer!r}: there are no force sensors then"
+                raise ParameterError("Sensing", name, rule, f"{getattr(self, name):g} N")
+
+
+def normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return two independent standard normal numbers a cell, a pure function of the arguments.
+
+    A counter is hashed instead of drawing from a generator: what a cell reads does not depend
+    on which others are read, nor on what was read before.
+
+    Parameters
+    ----------
+    seed, period : int
+        Not negative.
+    cells : ndarray of int (m,)
+
+    Returns
+    -------
+    first, second : ndarray (m,)
+        By Box and Muller's method; no farther from 0 than 8.6.
+    """
+    start = _mixed(np.array([seed % WORD], np.uint64))
+    start = _mixed(start + np.uint64(period % WORD))
+    counter = start + np.uint64(WEYL) * (2 * cells.astype(np.uint64))
+    radius = np.sqrt(-2.0 * np.log(_uniform(counter)))
+    angle = 2.0 * np.pi * _uniform(counter + np.uint64(WEYL))
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def _mixed(words: Words) -> Words:
+    """Scramble 64-bit words: any bit of one changes about half the bits of its result."""
+    words = words + np.uint64(WEYL)
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(FIRST)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(SECOND)
+    return words ^ (words >> np.uint64(31))
+
+
+def _uniform(counter: Words) -> Floats:
+    """Return numbers spread evenly in (0, 1), both ends left out."""
+    uniform: Floats = ((_mixed(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
+    return uniform
+
+
+@dataclass(frozen=True)
+class Noisy:
+    """Normal noise, white from cell to cell and from period to period.
+
+    Attributes
+    ----------
+    inner : Sensors
+    force, height : float
+        Standard deviations, N and m.
+    seed : int
+    """
+
+    inner: Sensors
+    force: float
+    height: float
+    seed: int
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: none of its own."""
+        return self.inner.rows
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return forces and heights with noise; a force may read below 0."""
+        force, height = self.inner.measure(own, truth)
+        first, second = normals(self.seed, truth.period, truth.cells)
+        return force + self.force * first, height + self.height * second
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Nothing of its own to remember."""
+        self.inner.update(own, truth)
+
+
+@dataclass(frozen=True)
+class Quantised:
+    """Readings in whole steps, the nearest one (halfway: the even one); a step of 0 rounds nothing.
+
+    Attributes
+    ----------
+    inner : Sensors
+    force, height : float
+        Steps, N and m.
+    """
+
+    inner: Sensors
+    force: float
+    height: float
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs: none of its own."""
+        return self.inner.rows
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return rounded forces and heights."""
+        force, height = self.inner.measure(own, truth)
+        return _rounded(force, self.force), _rounded(height, self.height)
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Nothing of its own to remember."""
+        self.inner.update(own, truth)
+
+
+def _rounded(values: Floats, step: float) -> Floats:
+    """Return values in whole steps."""
+    return np.rint(values / step) * step if step else values
+
+
+@dataclass(frozen=True)
+class Delayed:
+    """Readings that arrive some whole control periods late; before the first arrives, those of the start.
+
+    A cell that takes no part is not read, and does not change: its readings of that time are
+    made up when they are asked for, so it matters to nobody which cells take part.
+
+    Attributes
+    ----------
+    inner : Sensors
+    periods : int
+        How late, at least 1.
+    rest : float
+        Height of every pin at the start, m.
+    """
+
+    inner: Sensors
+    periods: int
+    rest: float
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs.
+
+        The periods known (one more than the last one read; 0: none), the true force and
+        height then, and a force and a height for each of the readings on their way.
+        """
+        return 3 + 2 * (self.periods + 1) + self.inner.rows
+
+    def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
+        """Return the readings made `periods` ago."""
+        force, height = self._reading(own, truth.cells, max(truth.period - self.periods, 0))
+        return force, height
+
+    def update(self, own: Floats, truth: Truth) -> None:
+        """Make up for the readings a cell has missed, and take new ones."""
+        for period in range(max(truth.period - self.periods, 0), truth.period):
+            own[self._slot(period)] = self._reading(own, truth.cells, period)
+        inner = own[self._inner]
+        self.inner.update(inner, truth)
+        own[self._slot(truth.period)] = self.inner.measure(inner, truth)
+        own[0] = truth.period + 1
+        own[1], own[2] = truth.force, truth.height
+
+    @property
+    def _inner(self) -> slice:
+        """Rows of the inner sensors."""
+        return slice(self.rows - self.inner.rows, None)
+
+    def _slot(self, period: int) -> slice:
+        """Rows that hold the readings of a period."""
+        first = 3 + 2 * (period % (self.periods + 1))
+        return slice(first, first + 2)
+
+    def _reading(self, own: Floats, cells: NDArray[np.intp], period: int) -> Floats:
+        """Return force and height read in a period, shape (2, m)."""
+        stored: Floats = own[self._slot(period)]
+        missed = own[0] <= period
+        if not missed.any():
+            return stored
+        height = np.where(own[0] > 0.0, own[2], self.rest)
+        # A cell that takes no part has its valve shut and nothing on its way to it.
+        still = Truth(cells, period, own[1], height, np.zeros(cells.size))
+        return np.where(missed, self.inner.measure(own[self._inner], still), stored)

@@ -1,0 +1,142 @@
+"""Contact: from the fingertip's pose to the force on each pin (equations 10 to 14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.constants import filled
+from .contact import Contact
+from .fingertip import Fingertip, forms, reach, reaches, underside
+from .interfaces import Pulp
+from .layout import Disc
+
+__all__ = ["Approach", "Coming", "Touch", "Window", "approach", "force", "reached"]
+
+Floats = NDArray[np.float64]
+
+#: Control periods whose undersides are worked out at a time, and most numbers that they may be.
+AHEAD, MOST = 32, 200_000
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Fingertip, contact law and relaxation of the pulp."""
+
+    fingertip: Fingertip
+    contact: Contact
+    pulp: Pulp
+
+
+#: Which cells the finger may touch in a period: centre of its way x, y and half the length
+#: of it, m; then the arguments of `fingertip.reach`.
+Window = tuple[float, float, float, float, float, float]
+
+
+@dataclass(eq=False)
+class Coming:
+    """The finger's way through t control periods, at p instants of each.
+
+    Attributes
+    ----------
+    forms : ndarray (t, 2 p, 6)
+    join : ndarray (t, 2, p, 1)
+        From `fingertip.forms`.
+    windows : list of Window
+        One a period.
+    """
+
+    forms: Floats
+    join: Floats
+    windows: list[Window]
+
+    def __post_init__(self) -> None:
+        # The undersides worked out last: of which places, from which period on.
+        self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
+
+    def under(self, period: int, place: Floats) -> Floats:
+        """Return the underside in one of the periods, see `Approach.under`.
+
+        It is asked for period by period, mostly of the same places: several are worked out at a time.
+        """
+        known, first, unders = self._last
+        if known is not place or not first <= period < first + len(unders):
+            # Not so many that a large bed under a large finger would not fit in memory.
+            count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * place.shape[1])))
+            several = slice(period, period + count)
+            first, unders = period, underside(self.forms[several], self.join[several], place)
+            self._last = (place, first, unders)
+        under: Floats = unders[period - first]
+        return under
+
+
+class Approach(NamedTuple):
+    """The finger in one control period of its way."""
+
+    coming: Coming
+    period: int
+    window: Window
+
+    def under(self, place: Floats) -> Floats:
+        """Return its underside at the period's p instants over some places (6, k), shape (p, k), m."""
+        return self.coming.under(self.period, place)
+
+
+def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
+    """Work out how the finger comes, for some control periods.
+
+    Parameters
+    ----------
+    fingertip : Fingertip
+    poses : ndarray (t, p, 7)
+        Its poses at the p instants of t periods: position of the lowest point, m, quaternion.
+    """
+    count, instants, _ = poses.shape
+    outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
+    low, high = outline[:, :, :2].min(axis=1), outline[:, :, :2].max(axis=1)
+    spread = np.hypot(*(0.5 * (high - low)).T)
+    shape = reaches(outline)
+    farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
+    windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
+    coming = Coming(*forms(outline), [tuple(window) for window in windows])
+    return [Approach(coming, period, window) for period, window in enumerate(coming.windows)]
+
+
+def reached(window: Window, peak: float) -> Disc | None:
+    """Return the disc x, y, radius that holds every cell the finger may touch in a period, m; None: no cell.
+
+    Parameters
+    ----------
+    window : Window
+    peak : float
+        No pin top is higher than this, m.
+    """
+    x, y, spread, base, tilt, bend = window
+    radius = reach(base, tilt, bend, peak)
+    return (x, y, radius + spread) if radius >= 0.0 else None
+
+
+def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
+    """Return the force on each cell, N, pressing down is positive.
+
+    ``F = f_d max(T(x) - Σ ĉ_i z_i, 0)``: the pulp pushes but does not stick.
+
+    Parameters
+    ----------
+    touch : Touch
+    height : ndarray (k,)
+        Pin tops H, m.
+    under : ndarray (k,)
+        Underside of the finger over them, m; x = H - underside.
+    filters : ndarray (r, k)
+        The relaxation's state rows z_i, N.
+    """
+    none, share = filled((0.0, touch.contact.share), height.size)
+    tension = touch.contact.tension(height - under)
+    tension -= touch.pulp.relaxed(filters)
+    np.maximum(tension, none, out=tension)
+    tension *= share
+    return tension

@@ -1,0 +1,153 @@
+"""Fingertip path: waypoints with times, joined smoothly or by straight lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.spline import inner_slopes
+from .fingertip import LEVEL
+
+__all__ = ["Trajectory", "along", "between", "level"]
+
+Floats = NDArray[np.float64]
+
+#: Waypoints are no nearer to each other, s: speeds stay finite.
+SHORTEST = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Waypoints of the fingertip's lowest point, and its orientation there.
+
+    *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
+    and no coordinate overshoots a waypoint. *linear* joins them by straight lines.
+    Before the first and after the last waypoint the finger stays.
+
+    Parameters
+    ----------
+    times : ndarray (w,)
+        Strictly increasing, s.
+    positions : ndarray (w, 3)
+        m.
+    orientations : ndarray (w, 4)
+        Unit quaternions w, x, y, z; turned along the shortest arc.
+    interpolation : {"smooth", "linear"}
+
+    Raises
+    ------
+    ParameterError
+        On values that are not finite, times that do not increase, or a quaternion of length 0.
+    """
+
+    times: Floats
+    positions: Floats
+    orientations: Floats
+    interpolation: str = "smooth"
+
+    def __post_init__(self) -> None:
+        if self.interpolation not in ("smooth", "linear"):
+            rule = "must be one of smooth, linear"
+            raise ParameterError("Trajectory", "interpolation", rule, repr(self.interpolation))
+        if self.times.size == 0:
+            raise ParameterError("Trajectory", "waypoints", "must have at least one waypoint", "none")
+        for name in ("times", "positions", "orientations"):
+            bad = np.argwhere(~np.isfinite(getattr(self, name)))
+            if bad.size:
+                value = f"{getattr(self, name)[tuple(bad[0])]} at waypoint {bad[0][0] + 1}"
+                raise ParameterError("Trajectory", name, "must be finite numbers", value)
+        falls = np.flatnonzero(np.diff(self.times) < SHORTEST)
+        if falls.size:
+            at = int(falls[0])
+            value = f"{self.times[at + 1]:g} s after {self.times[at]:g} s at waypoint {at + 2}"
+            rule = "must increase from waypoint to waypoint"
+            rule += f" by at least {SHORTEST:g} s" if self.times[at + 1] > self.times[at] else ""
+            raise ParameterError("Trajectory", "times", rule, value)
+        lengths = np.linalg.norm(self.orientations, axis=1)
+        if not np.all(lengths > 1e-9):
+            raise ParameterError("Trajectory", "orientations", "must have a length above 0", "0, 0, 0, 0")
+        object.__setattr__(self, "orientations", self.orientations / lengths[:, None])
+
+    @property
+    def duration(self) -> float:
+        """Time of the last waypoint, s."""
+        return float(self.times[-1])
+
+    def poses(self, times: Floats) -> Floats:
+        """Return the finger's poses, shape (k, 7), at `times`, shape (k,), s."""
+        poses = np.empty((times.size, 7))
+        if self.times.size == 1:
+            poses[:, :3], poses[:, 3:] = self.positions[0], self.orientations[0]
+            return poses
+        times = np.clip(times, self.times[0], self.times[-1])
+        piece = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, self.times.size - 2)
+        span = np.diff(self.times)[piece]
+        part = ((times - self.times[piece]) / span)[:, None]
+        start, end = self.positions[piece], self.positions[piece + 1]
+        poses[:, :3] = start + (end - start) * part
+        if self.interpolation == "smooth":
+            slopes = inner_slopes(np.diff(self.times), self.positions)
+            first, last = slopes[piece] * span[:, None], slopes[piece + 1] * span[:, None]
+            bend = part * (1.0 - part)
+            poses[:, :3] += bend * ((1.0 - part) * (first - end + start) - part * (last - end + start))
+        poses[:, 3:] = _turned(self.orientations[piece], self.orientations[piece + 1], part)
+        return poses
+
+
+def level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
+    """Return a trajectory whose finger stays level."""
+    return Trajectory(times, positions, np.tile(LEVEL, (times.size, 1)), interpolation)
+
+
+def between(start: Floats, end: Floats, parts: Floats) -> Floats:
+    """Return poses (k, 7) on the straight way from one pose to another.
+
+    Parameters
+    ----------
+    start, end : ndarray (7,)
+        Poses: position, m, and unit quaternion.
+    parts : ndarray (k,)
+        Where on the way, 0 to 1.
+    """
+    poses: Floats = along(np.array([start, end]), parts)[0]
+    return poses
+
+
+def along(path: Floats, parts: Floats) -> Floats:
+    """Return poses (t, p, 7) on the straight ways from each pose of a path to the next.
+
+    Whether the ways are worked out one by one or together makes no difference to any bit.
+
+    Parameters
+    ----------
+    path : ndarray (t + 1, 7)
+        Poses: position, m, and unit quaternion.
+    parts : ndarray (p,)
+        Where on each way, 0 to 1.
+    """
+    count = len(path) - 1
+    start, end = np.repeat(path[:-1], parts.size, axis=0), np.repeat(path[1:], parts.size, axis=0)
+    part = np.tile(parts, count)[:, None]
+    poses = np.empty((count * parts.size, 7))
+    poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
+    poses[:, 3:] = _turned(start[:, 3:], end[:, 3:], part)
+    return poses.reshape(count, parts.size, 7)
+
+
+def _turned(start: Floats, end: Floats, part: Floats) -> Floats:
+    """Turn unit quaternions (k, 4) along the shortest arc, by the share `part` (k, 1) of the way."""
+    cosine = np.einsum("ij,ij->i", start, end)[:, None]
+    end = np.where(cosine < 0.0, -end, end)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(angle)
+    small = sine < 1e-9
+    divisor = np.where(small, 1.0, sine)
+    turned = np.where(
+        small,
+        start,
+        (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / divisor,
+    )
+    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))

@@ -1,0 +1,113 @@
+"""Valve of a cell: a two-branch orifice law between a reservoir and the cell (equations 3 to 7)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.quantity import Parameters, quantity
+from .fluid import Fluid
+
+__all__ = ["Orifice", "Valve", "orifice"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Valve(Parameters):
+    """Proportional seat valve, after Carretero and Breuer's 10:1 model.
+
+    The discharge coefficient is ``C_q = s h*`` in the turbulent branch and
+    ``C_q = s h* Re*/Re_k`` below ``Re* = Re_k`` (equation 5), with
+    ``Re* = sqrt(Q / (ν h_v))`` (equation 4).
+    """
+
+    orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", symbol="d_o", above=0.0)
+    stroke: float = quantity(
+        30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="Roberts 2003", above=0.0
+    )
+    discharge_slope: float = quantity(
+        0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0
+    )
+    knee_reynolds: float = quantity(
+        200.0, "Reynolds number Re* at which the branches meet", symbol="Re_k", source="P", above=0.0
+    )
+    gap: str = quantity(
+        "stroke",
+        "length in Re*: the full stroke (eq. 4), or the actual opening",
+        source="P",
+        choices=("stroke", "opening"),
+    )
+
+
+@dataclass(frozen=True)
+class Orifice:
+    """The flow law of a valve in a fluid, ready to be evaluated.
+
+    Laminar branch ``Q = g ΔP`` with ``g = laminar |K|^power``; turbulent branch
+    ``Q = a sqrt(ΔP)`` with ``a = turbulent |K|``. The smaller of the two holds: they
+    cross once, at ΔP_crit, so Q is continuous and grows with ΔP.
+
+    Attributes
+    ----------
+    laminar : float
+        Conductance of the fully open valve, m³/(s Pa) (equation 7, laminar).
+    turbulent : float
+        Coefficient of the fully open valve, m³/(s sqrt(Pa)) (equation 7, turbulent).
+    power : int
+        Exponent of the opening in the laminar branch: 2, or 1 with ``gap = "opening"``.
+    """
+
+    laminar: float
+    turbulent: float
+    power: int
+
+    @property
+    def knee(self) -> float:
+        """Smallest drop at which some opening lets the flow turn turbulent, Pa (equation 6 at h* = 1)."""
+        return (self.turbulent / self.laminar) ** 2
+
+    @property
+    def resistances(self) -> tuple[float, float]:
+        """Of the line behind the valve, and of the fully open valve in its laminar branch, Pa s/m³."""
+        return 0.0, 1.0 / self.laminar
+
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
+        """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K; in `out` if that is given."""
+        conductance = self.laminar_lift(opening, out)
+        conductance *= self.laminar
+        return conductance
+
+    def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
+        """Return the opening's size to the power of the laminar branch."""
+        return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
+
+    def conductance(self, opening: Floats, drop: Floats) -> Floats:
+        """Return the secant conductance Q/ΔP, m³/(s Pa).
+
+        Parameters
+        ----------
+        opening : ndarray (n,)
+            Valve opening K; only its size h* = \\|K\\| matters here.
+        drop : ndarray (n,)
+            Pressure drop over valve and line, either sign, Pa.
+        """
+        root = np.sqrt(np.abs(drop)) + np.finfo(float).tiny
+        laminar: Floats = self.laminar_conductance(opening)
+        return np.minimum(laminar, self.turbulent * np.abs(opening) / root)
+
+    def flow(self, opening: Floats, drop: Floats) -> Floats:
+        """Return the flow Q with the sign of `drop`, m³/s (equations 3 to 7); arguments as `conductance`."""
+        return self.conductance(opening, drop) * drop
+
+
+def orifice(valve: Valve, fluid: Fluid) -> Orifice:
+    """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants."""
+    area_term = math.pi * valve.discharge_slope * valve.orifice_diameter**2
+    laminar = area_term**2 / (8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke)
+    turbulent = area_term / 4.0 * math.sqrt(2.0 / fluid.density)
+    return Orifice(laminar, turbulent, 2 if valve.gap == "stroke" else 1)

@@ -1,0 +1,1 @@
+"""Scenes: value, table, file, and the system assembled from them."""

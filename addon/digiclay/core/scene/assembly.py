@@ -1,0 +1,136 @@
+"""Assembly of a scene's system: a part or a null part at each interface.
+
+Modules of parts that a scene may leave out are imported where the part is put in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..control.methods import METHODS
+from ..engine.state import Rows
+from ..engine.system import System, segments
+from ..model.delay import Queue, queue
+from ..model.interfaces import Controller, Flow, Lag, Pulp, Sensors, Stepper
+from ..model.layout import Grid, grid
+from ..model.physics import Cell, speeds
+from ..model.touch import Touch
+from ..model.valve import orifice
+from .schema import STEPPERS, Scene, part
+
+__all__ = ["assemble"]
+
+
+def assemble(scene: Scene) -> System:
+    """Build the system of a scene."""
+    stepper = _stepper(scene)
+    period = scene.simulation.control_period
+    cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
+    line = queue(scene.delay, period) if scene.delay else Queue()
+    # An opening that lags has a kink where the next command comes through; one that does not, a jump.
+    cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
+    steps, instants = segments(stepper, cut, period, scene.simulation.steps)
+    bed = grid(scene.layout)
+    controller, sensors = _controller(scene, bed, cell), _sensors(scene, cell, line)
+    return System(
+        grid=bed,
+        cell=cell,
+        sensors=sensors,
+        controller=controller,
+        stepper=stepper,
+        period=period,
+        plan=stepper.plan(cell, line, steps),
+        fastest=speeds(cell).rise,
+        instants=instants,
+        rows=Rows(
+            cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0
+        ),
+    )
+
+
+def _stepper(scene: Scene) -> Stepper:
+    """Return how a period is integrated."""
+    kind = part(*STEPPERS[scene.simulation.stepper])
+    stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
+    return stepper
+
+
+def _flow(scene: Scene) -> Flow:
+    """Return the valve, behind it the conduit if there is one."""
+    valve = orifice(scene.valve, scene.fluid)
+    if scene.conduit is None:
+        return valve
+    from ..model.conduit import in_series
+
+    return in_series(valve, scene.conduit, scene.fluid)
+
+
+def _lag(scene: Scene) -> Lag:
+    """Return how the valve follows its command."""
+    if scene.valve_lag:
+        return scene.valve_lag
+    from ..model.null_parts import InstantValve
+
+    return InstantValve()
+
+
+def _touch(scene: Scene) -> Touch | None:
+    """Return the finger, or None."""
+    if scene.fingertip is None or scene.contact is None:
+        return None
+    return Touch(scene.fingertip, scene.contact, _pulp(scene))
+
+
+def _pulp(scene: Scene) -> Pulp:
+    """Return how the finger's pulp relaxes."""
+    if scene.relaxation:
+        return scene.relaxation
+    from ..model.null_parts import Unrelaxed
+
+    return Unrelaxed()
+
+
+def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
+    """Return what the controller gets to know: all there is, less what each part takes away."""
+    known = scene.sensors
+    if known is None:
+        return None
+    from ..model.null_parts import PerfectSensors
+    from ..model.sensors import Delayed, Noisy, Quantised
+
+    sensors: Sensors = PerfectSensors()
+    if known.force_noise or known.height_noise:
+        sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
+    if known.force_step or known.height_step:
+        sensors = Quantised(sensors, known.force_step, known.height_step)
+    if known.observer == "valve":
+        from ..model.observer import valve_observer
+
+        period = scene.simulation.control_period
+        sensors = valve_observer(sensors, cell, line, period, known.motion_floor)
+    if known.delay:
+        sensors = Delayed(sensors, known.delay, scene.actuator.rest_height)
+    return sensors
+
+
+def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
+    """Return the control method, before it the display of a shape; or None: every valve stays shut."""
+    if scene.control is None and scene.shape is None:
+        return None
+    from ..control.bench import Bench
+
+    known = scene.sensors
+    floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
+    bench = Bench(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
+    if scene.shape:
+        from ..shapes.source_file import fitted_to
+
+        bench = replace(bench, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
+    controller: Controller | None = None
+    if scene.control:
+        controller = part(METHODS[scene.method].module, "assembled")(scene.control, bench)
+    if scene.shape and not (controller and controller.name == "shape_display"):
+        from ..control.handover import handover
+
+        controller = handover(scene.shape, bench, controller, recovers=METHODS[scene.method].recovers)
+    return controller

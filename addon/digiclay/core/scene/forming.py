@@ -1,0 +1,122 @@
+"""Forming of a shape: duration of its display, and a fingertip path to its highest part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..control.handover import Handover
+from ..control.shape_display import ShapeDisplayControl
+from ..engine.system import System
+from ..model.fingertip import LEVEL, Fingertip, forms, underside
+from ..model.layout import Grid
+from .schema import Path, Scene, Waypoint
+
+__all__ = ["GESTURES", "display_of", "display_time", "shaped", "summit", "touch_height"]
+
+Floats = NDArray[np.float64]
+
+#: What the finger does, in s and m above the height at which it first touches.
+GESTURES: dict[str, tuple[tuple[float, float], ...]] = {
+    "pull": (
+        (0.0, 20e-3), (0.6, 2e-3), (1.6, -5e-3), (1.8, -5e-3), (2.2, -4e-3), (4.2, 6e-3), (4.5, 6e-3),
+        (4.8, 30e-3), (5.5, 30e-3),
+    ),
+    "press": ((0.0, 20e-3), (0.6, 2e-3), (2.0, -5e-3), (2.4, -5e-3), (2.7, 30e-3), (3.4, 30e-3)),
+    "away": ((0.0, 20e-3), (0.5, 20e-3)),
+}  # fmt: skip
+#: Of the highest cells, those within this share of the relief are as good as the highest.
+NEARLY = 0.1
+#: Time for the last micrometres, and for a margin, s.
+MARGIN = 0.5
+
+
+def display_of(system: System) -> ShapeDisplayControl | None:
+    """Return what displays the shape of a scene, or None."""
+    controller = system.controller
+    if isinstance(controller, Handover):
+        return controller.display
+    return controller if isinstance(controller, ShapeDisplayControl) else None
+
+
+def display_time(display: ShapeDisplayControl) -> float:
+    """Return the time within which a free bed has displayed its shape, s, rounded up to a tenth.
+
+    A move takes the way at the slower reservoir's speed, and the time its height control needs to come
+    within the dead band; no longer than its patience.
+    """
+    known, drive = display.parameters, display.drive
+    way = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))
+    if known.refresh != "one_time":
+        way /= known.surfaces
+    speed = min(float(drive.up[-1]), float(drive.down[-1]))
+    settling = drive.settling_time * math.log(max(way / max(drive.dead_band, 1e-9), 1.0) + 1.0)
+    move = min(way / speed + settling + 0.05, known.patience)
+    return math.ceil(10.0 * (MARGIN + len(display.moves) * move)) / 10.0
+
+
+def summit(grid: Grid, heights: Floats) -> tuple[float, float]:
+    """Return the place of the highest cells that is nearest to the bed's middle, m.
+
+    Parameters
+    ----------
+    grid : Grid
+    heights : ndarray (n,)
+        m.
+    """
+    high = np.flatnonzero(heights >= heights.max() - NEARLY * np.ptp(heights))
+    cell = int(high[np.argmin(np.hypot(grid.x[high], grid.y[high]))])
+    return float(grid.x[cell]), float(grid.y[cell])
+
+
+def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
+    """Return the height at which a level finger that comes down over a place first touches, m.
+
+    Parameters
+    ----------
+    grid : Grid
+    heights : ndarray (n,)
+        Pin tops, m.
+    finger : Fingertip
+    x, y : float
+        The place, m.
+    """
+    outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
+    under = underside(*forms(outline), grid.place(np.arange(grid.count)))
+    return float(np.max(heights - under[0]))
+
+
+def shaped(scene: Scene, system: System, gesture: str) -> Scene:
+    """Return a scene whose finger waits until the shape stands, and then forms its highest part.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a shape.
+    system : System
+        Of that scene.
+    gesture : str
+        A key of `GESTURES`.
+
+    Raises
+    ------
+    ParameterError
+        When the scene has no shape, or no finger.
+    """
+    display = display_of(system)
+    if display is None:
+        raise ParameterError("shape", "", "must be given to form it", "none")
+    if scene.fingertip is None:
+        raise ParameterError("fingertip", "", "must be given to form a shape", "absent")
+    x, y = summit(system.grid, display.heights)
+    touch = touch_height(system.grid, display.heights, scene.fingertip, x, y)
+    ready = display_time(display)
+    points = [(ready + time, touch + above) for time, above in GESTURES[gesture]]
+    way = tuple(Waypoint(time=time, position=(x, y, z)) for time, z in [(0.0, points[0][1]), *points])
+    # Its own duration is that of the path.
+    simulation = replace(scene.simulation, duration=points[-1][0])
+    return replace(scene, trajectory=Path("smooth", way), simulation=simulation)

@@ -1,0 +1,149 @@
+"""Scene files: search by path or name, reading, overrides, errors of one line."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..base.errors import ParameterError, SceneError
+from ..base.sample_file import found, named
+from ..base.toml_text import LARGEST, tables
+from .schema import Scene
+from .toml_table import resolve
+
+__all__ = ["SAMPLES", "Setting", "find", "load", "make_scene", "read_table", "sample_names"]
+
+#: Where the sample scenes are.
+SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
+
+
+def sample_names() -> list[str]:
+    """Return the names of the sample scenes."""
+    return list(named(SAMPLES, ".toml"))
+
+
+def find(word: str) -> Path:
+    """Return the file of a scene: a sample's name, a file, or the folder of a run.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file, or sample.
+    """
+    samples = named(SAMPLES, ".toml")
+    if word not in samples and os.path.isdir(word):
+        word = os.path.join(word, "scene.toml")
+    return found(word, samples, "sample")
+
+
+class Setting(NamedTuple):
+    """What an option of the command line changes of a scene file.
+
+    Attributes
+    ----------
+    key : str
+        Section and key, ``valve.stroke``.
+    value : str
+        TOML; a text needs no quotes.
+    option : str
+        What messages call it.
+    """
+
+    key: str
+    value: str
+    option: str = "--set"
+
+
+def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
+    """Read a scene file, and let settings override what it says.
+
+    Raises
+    ------
+    SceneError
+        One line: file or option, key, rule, value.
+    """
+    return make_scene(path, read_table(path), settings)
+
+
+def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = ()) -> Scene:
+    """Make a scene of what its file says, and let settings override it.
+
+    Parameters
+    ----------
+    path : Path
+        The file, by which messages call the scene, and beside which a shape may lie.
+    table : mapping
+        What `read_table` gives of it; it stays as it is.
+    settings : sequence of Setting, optional
+
+    Raises
+    ------
+    SceneError
+        As `load`.
+    """
+    try:
+        return resolve(_override(_find_beside(table, path.parent), settings), path.stem)
+    except ParameterError as error:
+        if settings:
+            make_scene(path, table)  # a file that is wrong by itself is told of first
+        blamed = [one.option for one in settings if one.key == f"{error.owner}.{error.field}"]
+        own = path.name if path.parent == SAMPLES else str(path)
+        origin = (blamed or [one.option for one in settings] or [own])[-1]
+        raise SceneError(f"{origin}: {error}") from None
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file."""
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise SceneError(f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB).")
+        # A byte order mark at the beginning is no part of the text.
+        text = path.read_text(encoding="utf-8-sig")
+        return tables(text)
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path} must be UTF-8 text (byte {error.start} is not).") from None
+    except RecursionError:
+        raise SceneError(f"{path}: lists or tables are nested too deeply.") from None
+    except ValueError as error:
+        said, _, place = str(error).partition(" (at ")
+        line = re.match(r"line (\d+)", place)
+        number = line[1] if line else str(max(1, len(text.splitlines())))
+        raise SceneError(f"{path}, line {number}: {said}.") from None
+
+
+def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Find a shape's file that lies beside the scene file, or in a folder there."""
+    shape = table.get("shape")
+    name = shape.get("file") if isinstance(shape, dict) else None
+    if isinstance(name, str) and Path(name).suffix and "\0" not in name and (folder / name).is_file():
+        return {**table, "shape": {**table["shape"], "file": str((folder / name).resolve())}}
+    return table
+
+
+def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
+    """Return the tables of a scene file with settings in them."""
+    whole = dict(table)
+    for key, value, _ in settings:
+        *groups, last = key.split(".")
+        inner = whole
+        for group in groups:
+            own = inner.get(group)
+            inner[group] = dict(own) if isinstance(own, dict) else {}
+            inner = inner[group]
+        inner[last] = _read_value(value)
+    return whole
+
+
+def _read_value(text: str) -> Any:
+    """Read the value of a setting: TOML, or else a bare text."""
+    try:
+        read = tables(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return read["value"] if len(read) == 1 else text.strip()

@@ -1,0 +1,261 @@
+"""Scene: all parameters of a session as one valid value."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+from ..control.methods import METHODS, ControlParameters
+from ..model.set_point import SetPoint
+
+if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
+    from ..control.blister import Blister
+    from ..model.actuator import Actuator
+    from ..model.conduit import Conduit
+    from ..model.contact import Contact
+    from ..model.delay import Delay
+    from ..model.fingertip import Fingertip
+    from ..model.fluid import Fluid
+    from ..model.lag import ValveLag
+    from ..model.layout import Layout
+    from ..model.relaxation import Relaxation
+    from ..model.sensors import Sensing
+    from ..model.supply import Supply
+    from ..model.trajectory import Trajectory
+    from ..model.valve import Valve
+    from ..shapes.request import Shape
+    from .recorder import Recorder
+
+__all__ = [
+    "NEEDS",
+    "OPTIONAL",
+    "PARTS",
+    "SECTIONS",
+    "STEPPERS",
+    "UNASKED",
+    "Path",
+    "Scene",
+    "Simulation",
+    "Waypoint",
+    "parameters",
+    "part",
+]
+
+#: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`.
+PARTS: dict[str, tuple[str, str]] = {
+    "layout": ("model.layout", "Layout"),
+    "actuator": ("model.actuator", "Actuator"),
+    "supply": ("model.supply", "Supply"),
+    "fluid": ("model.fluid", "Fluid"),
+    "valve": ("model.valve", "Valve"),
+    "conduit": ("model.conduit", "Conduit"),
+    "valve_lag": ("model.lag", "ValveLag"),
+    "delay": ("model.delay", "Delay"),
+    "fingertip": ("model.fingertip", "Fingertip"),
+    "contact": ("model.contact", "Contact"),
+    "relaxation": ("model.relaxation", "Relaxation"),
+    "sensors": ("model.sensors", "Sensing"),
+    "blister": ("control.blister", "Blister"),
+    "shape": ("shapes.request", "Shape"),
+    "simulation": ("scene.schema", "Simulation"),
+    "recorder": ("scene.recorder", "Recorder"),
+}
+#: The sections of a scene that are parts, in the order they are written.
+SECTIONS = (
+    "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
+    "relaxation", "sensors", "control", "blister", "shape", "simulation", "recorder",
+)  # fmt: skip
+#: Parts a scene may leave out.
+OPTIONAL = (
+    "conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "shape", "recorder",
+)  # fmt: skip
+#: Parts a scene leaves out unless it names them.
+UNASKED = ("sensors", "shape")
+#: Parts that are left out together with another.
+NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
+#: Steppers: module and class.
+STEPPERS: dict[str, tuple[str, str]] = {
+    "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
+    "richardson": ("steppers.richardson", "Richardson"),
+    "adaptive": ("steppers.adaptive", "Adaptive"),
+    "euler": ("steppers.euler", "Euler"),
+    "heun": ("steppers.heun", "Heun"),
+    "runge_kutta_4": ("steppers.runge_kutta", "RungeKutta4"),
+}
+#: Most physics steps in a control period, and most control periods on their way to a valve.
+MOST_STEPS = 1000
+#: Most physics steps in a control period of steppers that cut each further: their plans grow with the square,
+#: to a gigabyte.
+MOST_CUT = {"adaptive": 10, "richardson": 500}
+
+
+def part(module: str, name: str) -> Any:
+    """Import a class of the core by name, now that a scene needs it."""
+    return getattr(importlib.import_module(f"..{module}", __package__), name)
+
+
+def parameters(section: str, method: str) -> type[Parameters]:
+    """Import the class that holds the parameters of a section."""
+    module, name = (
+        PARTS[section] if section != "control" else (METHODS[method].module, METHODS[method].parameters)
+    )
+    kind: type[Parameters] = part(module, name)
+    return kind
+
+
+@dataclass(frozen=True)
+class Simulation(Parameters):
+    """How time is cut up, and how much of it there is."""
+
+    control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
+    physics_step: float = quantity(5e-3, "longest physics step", unit="s", symbol="h", above=0.0)
+    stepper: str = quantity("bernoulli", "method of integration", choices=tuple(STEPPERS))
+    tolerance: float = quantity(
+        1e-6, "error of the heights allowed to the adaptive stepper", unit="m", symbol="ε", at_least=1e-7
+    )
+    duration: float = quantity(
+        0.0, "simulated time; 0: duration of the trajectory", unit="s", at_least=0.0, at_most=1e6
+    )
+
+    def check(self) -> None:
+        """A control period has not too many physics steps."""
+        most = MOST_CUT.get(self.stepper, MOST_STEPS)
+        if self.steps > most:
+            rule = f"must be at least a {most}th of simulation.control_period, {self.control_period:g} s"
+            rule += f", with the stepper {self.stepper}" if most < MOST_STEPS else ""
+            raise ParameterError("simulation", "physics_step", rule, f"{self.physics_step:g} s")
+
+    @property
+    def steps(self) -> int:
+        """Physics steps of a control period, all of one length."""
+        return max(1, math.ceil(self.control_period / self.physics_step * (1.0 - 1e-9)))
+
+    def refined(self, parts: int) -> Simulation:
+        """Return the same with every physics step cut into equal parts."""
+        return replace(self, physics_step=self.control_period / (self.steps * parts))
+
+
+@dataclass(frozen=True)
+class Waypoint(Parameters):
+    """Where the fingertip is at one time."""
+
+    time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
+    position: tuple[float, ...] = quantity(
+        (0.0, 0.0, 46e-3), "lowest point of the fingertip: x, y, z", unit="m", at_least=-100.0, at_most=100.0
+    )
+    orientation: tuple[float, ...] = quantity(
+        (1.0, 0.0, 0.0, 0.0), "quaternion w, x, y, z", at_least=-1e6, at_most=1e6
+    )
+
+    def check(self) -> None:
+        """Three coordinates, four parts of a quaternion."""
+        for name, count in (("position", 3), ("orientation", 4)):
+            value = getattr(self, name)
+            if len(value) != count:
+                rule = f"must be a list of {count} numbers"
+                raise ParameterError("Waypoint", name, rule, f"{len(value)} of them")
+
+
+#: The finger's path when a scene names none: one press in the middle of the bed, m above the rest height.
+PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
+
+
+@dataclass(frozen=True)
+class Path:
+    """The finger's path, as a scene gives it."""
+
+    interpolation: str = "smooth"
+    waypoints: tuple[Waypoint, ...] = ()
+
+    @classmethod
+    def press(cls, rest_height: float) -> Path:
+        """Return the path of a scene that names none."""
+        points = (Waypoint(time=t, position=(0.0, 0.0, rest_height + z)) for t, z in PRESS)
+        return cls(waypoints=tuple(points))
+
+    def trajectory(self) -> Trajectory:
+        """Return the path as something that has poses."""
+        from ..model.trajectory import Trajectory
+
+        times, positions, turns = (
+            np.array([getattr(point, name) for point in self.waypoints], dtype=np.float64)
+            for name in ("time", "position", "orientation")
+        )
+        return Trajectory(times, positions, turns, self.interpolation)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that decides a session; equal scenes give equal sessions, bit for bit.
+
+    A part that is None is left out: it costs nothing, and its module is not imported.
+
+    Raises
+    ------
+    ParameterError
+        When parts do not go together; its owner is the section's name.
+    """
+
+    layout: Layout
+    actuator: Actuator
+    supply: Supply
+    fluid: Fluid
+    valve: Valve
+    conduit: Conduit | None
+    valve_lag: ValveLag | None
+    delay: Delay | None
+    fingertip: Fingertip | None
+    contact: Contact | None
+    relaxation: Relaxation | None
+    control: ControlParameters | None
+    blister: Blister | None
+    simulation: Simulation
+    recorder: Recorder | None
+    trajectory: Path
+    name: str = ""
+    description: str = ""
+    preset: str = "paper"
+    method: str = "virtual_master"
+    sensors: Sensing | None = None
+    shape: Shape | None = None
+
+    def __post_init__(self) -> None:
+        if self.layout.pitch < self.actuator.bore:
+            rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
+            raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
+        plan = self.layout
+        longer_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
+        if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
+            rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
+            raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
+        lasts = self.trajectory.trajectory().duration
+        if self.simulation.duration == 0.0:
+            if lasts == 0.0:
+                rule = "must be above 0 s where the trajectory has no duration of its own"
+                raise ParameterError("simulation", "duration", rule, "0 s")
+            object.__setattr__(self, "simulation", replace(self.simulation, duration=lasts))
+        longest = MOST_STEPS * self.simulation.control_period
+        if self.delay and self.delay.dead_time > longest:
+            rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
+            raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
+
+    @property
+    def periods(self) -> int:
+        """Control periods of the whole session; the last one may end after its duration."""
+        return max(1, math.ceil(self.simulation.duration / self.simulation.control_period - 1e-9))
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.layout.rows * self.layout.columns
+
+    @property
+    def set_point(self) -> SetPoint | None:
+        """Force the control asks for; None where it asks for none."""
+        return self.control.set_point if self.control else None

@@ -1,0 +1,1 @@
+"""Whole sessions: runs, error estimates, snapshots, takes, live periods."""

@@ -1,0 +1,217 @@
+"""Error estimate of a session: second, finer integration under the same commands.
+
+The commands are those the session gave, so what differs is the integration alone. Richardson's
+form is more accurate than the other methods and cannot blow up: a method that did does not
+judge itself. A whole run is evaluated from its history; a live session has an `ErrorMonitor`,
+which follows it for a short stretch now and then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import DigiclayError
+from ..control.replay import Replay
+from ..engine.simulation import advance, approaches, begin, periods
+from ..engine.state import State
+from ..engine.system import System
+from ..model.trajectory import along
+from ..scene.assembly import assemble
+from ..scene.schema import Scene, Simulation
+
+__all__ = [
+    "PAUSE",
+    "SHARE",
+    "STRETCH",
+    "ErrorMonitor",
+    "Errors",
+    "begin_stretch",
+    "compare",
+    "estimate_errors",
+    "follow",
+    "has_every_command",
+    "reference_settings",
+    "reset",
+    "start",
+]
+
+Floats = NDArray[np.float64]
+
+#: The reference's own error is taken to be a quarter of that of the run: halving the step leaves so much of
+#: an error of second order, which is what remains of a higher one across a kink. What comes out is an
+#: estimate, no bound, and is said as "about".
+SHARE = 4.0 / 3.0
+#: Control periods of a live session's stretch, and from the end of one to the start of the next.
+STRETCH, PAUSE = 20, 180
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Largest errors over all cells: over all rows of a run, or at the end of a stretch of a live session.
+
+    Attributes
+    ----------
+    height : float
+        m.
+    force : float
+        Of a cell, N.
+    total_force : float
+        Of all cells together, N.
+    """
+
+    height: float
+    force: float
+    total_force: float
+
+    @classmethod
+    def estimate(cls, largest: Floats) -> Errors:
+        """Return the errors that go with the largest differences from a reference, (3,)."""
+        return cls(*(SHARE * largest).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorMonitor:
+    """The reference that follows a live session for a stretch now and then.
+
+    Attributes
+    ----------
+    system : System
+        The session's, with the `reference_settings`.
+    state : State or None
+        The reference's; None between two stretches.
+    left : int
+        Control periods left of the stretch, or of the time to the next one.
+    """
+
+    system: System
+    state: State | None = None
+    left: int = 0
+
+
+def has_every_command(scene: Scene) -> bool:
+    """Tell whether a run of this scene keeps every command: with a recorder that keeps every period."""
+    return scene.recorder is not None and scene.recorder.every == 1
+
+
+def reference_settings(simulation: Simulation) -> Simulation:
+    """Return how a reference is integrated: half the physics step, by Richardson's form or to a tolerance."""
+    finer = simulation.refined(2)
+    return finer if finer.stepper == "adaptive" else replace(finer, stepper="richardson")
+
+
+def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
+    """Return the largest differences of height, m, and force, N, over the cells, and that of the total force.
+
+    Parameters
+    ----------
+    height, other_height : ndarray (n,) or (n, b)
+        m; the last axis, if there is one, is the run.
+    force, other_force : ndarray (k,) or (k, b)
+        N.
+
+    Returns
+    -------
+    ndarray (3,) or (3, b)
+    """
+    apart, pushed = np.abs(height - other_height), force - other_force
+    total = np.abs(np.add.reduce(pushed))
+    largest = (np.maximum.reduce(part, initial=0.0) for part in (apart, np.abs(pushed)))
+    return np.stack([*largest, total])
+
+
+def estimate_errors(
+    scene: Scene,
+    history: dict[str, NDArray[Any]],
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+) -> Errors | None:
+    """Estimate the errors of a run by integrating its commands with the `reference_settings`.
+
+    Parameters
+    ----------
+    scene : Scene
+        One that `has_every_command`.
+    history : dict of ndarray
+        What its run recorded.
+    progress : callable, optional
+        Told after each control period how many are done, and of how many.
+    stopped : callable, optional
+        Asked after each control period; when it says True, there is no estimate: None.
+    """
+    system = _replay(_reference(scene), history["command"])
+    done, largest = len(history["time"]) - 1, np.zeros(3)
+    for row, state in enumerate(periods(system, scene.trajectory.trajectory(), begin(system), done), 1):
+        height, force = state.row(0), state.row(system.rows.force)
+        found = compare(height, force, history["height"][row], history["force"][row])
+        np.maximum(largest, found, out=largest)
+        if progress:
+            progress(row, done)
+        if stopped and stopped():
+            return None
+    return Errors.estimate(largest)
+
+
+def _reference(scene: Scene) -> System:
+    """Return the system of a scene with the `reference_settings`."""
+    return assemble(replace(scene, simulation=reference_settings(scene.simulation)))
+
+
+def _replay(system: System, commands: Floats) -> System:
+    """Return the system under given commands (t, n)."""
+    return replace(system, controller=Replay(system.grid, commands))
+
+
+def start(scene: Scene) -> ErrorMonitor | None:
+    """Return the monitor of a live session's beginning; None where the step cannot be halved."""
+    try:
+        return ErrorMonitor(_reference(scene))
+    except DigiclayError:
+        return None
+
+
+def reset(monitor: ErrorMonitor) -> ErrorMonitor:
+    """Return the monitor of a session that has just become another one."""
+    return replace(monitor, state=None, left=0)
+
+
+def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
+    """Return the monitor with a copy of the session's state, where a stretch is due; else as it is."""
+    if monitor.state is not None or monitor.left > 0:
+        return monitor
+    return replace(monitor, state=state.copy(), left=STRETCH)
+
+
+def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMonitor, Errors | None]:
+    """Integrate the control period a session has just done; return the errors where a stretch ends.
+
+    A reference that diverges tells nothing, and the monitor starts anew.
+
+    Parameters
+    ----------
+    monitor : ErrorMonitor
+        Given the state before by `begin_stretch`, or by the period before.
+    after : State
+        The session's, at the end of the period.
+    path : ndarray (2, 7)
+        The finger at both ends of the period; see `live_periods.lived`.
+    """
+    if monitor.state is None:
+        return begin_stretch(replace(monitor, left=monitor.left - 1), after), None
+    rows = monitor.system.rows
+    system = _replay(monitor.system, after.row(rows.command)[None])
+    finger = approaches(system, along(path, system.instants / system.period))[0]
+    try:
+        # A period's commands are row 0 of what is played: its own memory does not count on.
+        state = advance(system, monitor.state._replace(memory=0), finger)
+    except DigiclayError:
+        return begin_stretch(reset(monitor), after), None
+    if monitor.left > 1:
+        return replace(monitor, state=state, left=monitor.left - 1), None
+    found = compare(state.row(0), state.row(rows.force), after.row(0), after.row(rows.force))
+    return replace(monitor, state=None, left=PAUSE), Errors.estimate(found)

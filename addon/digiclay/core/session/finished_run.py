@@ -1,0 +1,118 @@
+"""Finished run, read from its folder."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import OutputError
+from ..base.npz import BROKEN_ZIP, Head, array, heads
+from ..base.run_folder import MARK
+from ..base.whole_files import read_json
+from ..scene.recorder import Recorder, available_memory
+from ..scene.scene_source import load
+from ..scene.schema import Scene
+
+__all__ = ["SHAPES", "Run", "is_whole", "last_touch", "read", "row_at"]
+
+#: The file of the arrays.
+HISTORY = "history.npz"
+#: Shape of each array of a history, t rows of n cells.
+SHAPES: dict[str, tuple[str | int, ...]] = {
+    "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
+    "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Scene and history of a run."""
+
+    scene: Scene
+    history: dict[str, NDArray[Any]]
+
+
+def read(folder: Path, *names: str) -> Run:
+    """Read a run, and of its history the arrays named.
+
+    Raises
+    ------
+    OutputError
+        When there is no run, or its files do not belong together.
+    """
+    path = folder / HISTORY
+    if not (folder / "scene.toml").is_file():
+        raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
+    if not path.is_file():
+        raise OutputError(f"{folder} has no history.npz: its scene kept no record.")
+    scene = load(folder / "scene.toml")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            held = heads(archive, ("time", *names))
+            _refuse(path, scene, held)
+            return Run(scene, {name: array(archive, name) for name in held})
+    except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
+        raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
+
+
+def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
+    """Refuse arrays that a run of this scene does not leave, before they are unpacked."""
+    rows = held["time"].shape[0] if held["time"].shape else 0
+    most = (scene.recorder or Recorder()).rows(scene.periods)
+    if not 0 < rows <= most:
+        rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
+        raise OutputError(f"{path} {rule} (got {rows:,}).")
+    known = {"n": scene.cells, "t": rows}
+    for name, head in held.items():
+        shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
+        if head.shape != shape:
+            raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
+        if head.kind.kind not in "if" or head.kind.itemsize > 8:
+            raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
+    size, free = sum(head.size for head in held.values()), available_memory()
+    if size > free:
+        rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
+        raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(held)}).")
+
+
+def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:
+    """Tell whether a run's folder has all that belongs into it: copies break off half way.
+
+    Parameters
+    ----------
+    folder : Path
+    scene : Scene
+        Of the run.
+    sizes : dict of str to int, optional
+        Bytes of each file, as they were written; older runs have not noted them.
+    """
+    if isinstance(sizes, dict):
+        try:
+            return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
+        except OSError:
+            return False
+    whole = read_json(folder / MARK) is not None
+    # The names of an archive's parts stand at its end.
+    return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
+
+
+def row_at(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
+    """Return the row nearest to a time, s, within the session; a message calls the time by a name."""
+    moments = history["time"]
+    if not moments[0] <= time <= moments[-1]:
+        raise OutputError(
+            f"{called} must be between {moments[0]:g} s and {moments[-1]:g} s (got {time:g} s)."
+        )
+    return int(np.argmin(np.abs(moments - time)))
+
+
+def last_touch(history: Mapping[str, NDArray[Any]]) -> int:
+    """Return the last row in which the finger touches, or the last one: there is most to be seen."""
+    touching = np.flatnonzero(history["total_force"] > 0.0)
+    return int(touching[-1]) if touching.size else len(history["time"]) - 1

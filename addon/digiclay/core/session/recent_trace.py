@@ -1,0 +1,108 @@
+"""Ring buffer of a live session: total force, set point, and heights of picked pins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.modes import Mode
+from ..engine.state import State
+from ..engine.system import System
+from ..model.set_point import SetPoint, asked
+
+__all__ = ["PICKED", "Trace", "begun", "extended", "felt", "picked"]
+
+Floats = NDArray[np.float64]
+
+#: Most pins whose heights are traced.
+PICKED = 6
+#: How much is kept, s, and in how many rows at most.
+SPAN, ROWS = 10.0, 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A ring of rows: one that is full drops its oldest for each new one.
+
+    Attributes
+    ----------
+    every : int
+        Control periods a row.
+    pins : tuple of int
+        The picked pins, at most `PICKED`.
+    rows : ndarray (k, 3 + PICKED)
+        Time, s; total force, N; set point, N, or NaN where there is none; heights of the
+        picked pins, m, NaN for those that are not there. Oldest first.
+    """
+
+    every: int
+    pins: tuple[int, ...]
+    rows: Floats
+
+    @property
+    def time(self) -> Floats:
+        """Simulated time of the rows, shape (k,), s."""
+        return self.rows[:, 0]
+
+    @property
+    def force(self) -> Floats:
+        """Total force, shape (k,), N."""
+        return self.rows[:, 1]
+
+    @property
+    def set_point(self) -> Floats:
+        """Total force asked for, shape (k,), N; NaN where none is."""
+        return self.rows[:, 2]
+
+    @property
+    def heights(self) -> Floats:
+        """Heights of the picked pins, shape (k, number of pins), m."""
+        return self.rows[:, 3 : 3 + len(self.pins)]
+
+
+def begun(period: float, pins: Sequence[int] = ()) -> Trace:
+    """Return an empty trace for a control period, s."""
+    return Trace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED)))
+
+
+def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
+    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out."""
+    kept = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
+    if kept == trace.pins:
+        return trace
+    rows = trace.rows.copy()
+    rows[:, 3:] = np.nan
+    for column, pin in enumerate(kept):
+        if pin in trace.pins:  # its past stays to be seen
+            rows[:, 3 + column] = trace.rows[:, 3 + trace.pins.index(pin)]
+    return replace(trace, pins=kept, rows=rows)
+
+
+def felt(system: System, state: State) -> float:
+    """Return the total force on the bed, N."""
+    held = state.gathered
+    return float(held.block[system.rows.force, : held.near].sum())
+
+
+def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
+    """Return what a trace keeps of a state."""
+    held = state.gathered
+    heights = [math.nan] * PICKED
+    for column, pin in enumerate(pins):
+        (at,) = np.nonzero(held.cells == pin)
+        heights[column] = float(held.block[0, at[0]] if at.size else state.rows[0, pin])
+    wanted = asked(set_point, np.count_nonzero(held.mode == Mode.FORCE_FOLLOW))
+    return [state.period * system.period, felt(system, state), float(wanted), *heights]
+
+
+def extended(trace: Trace, rows: list[list[float]]) -> Trace:
+    """Return the trace with rows added, each as wide as its own; time may have gone back in between."""
+    if not rows:
+        return trace
+    new = np.array(rows)
+    old = trace.rows[trace.rows[:, 0] < new[0, 0]]
+    return replace(trace, rows=np.concatenate([old, new])[-ROWS:])

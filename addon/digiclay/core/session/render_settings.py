@@ -1,0 +1,117 @@
+"""Render settings of a picture or film: appearance and rows shown; no Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["COLOURS", "ENGINES", "MOST_FRAMES", "Film", "Picture", "Still", "Turntable"]
+
+Floats = NDArray[np.float64]
+
+#: What draws, and what colours the pins.
+ENGINES = ("cycles", "workbench")
+COLOURS = ("mode", "force")
+#: More frames than this are a slip of the keyboard: an hour of film is 90 000.
+MOST_FRAMES = 100_000
+
+
+@dataclass(frozen=True)
+class Picture(Parameters):
+    """What stills, turntables and films have in common."""
+
+    width: int = quantity(960, "width in pixels", at_least=16, at_most=16384)
+    height: int = quantity(600, "height in pixels", at_least=16, at_most=16384)
+    engine: str = quantity("workbench", "what draws: quick and plain, or with soft shadows", choices=ENGINES)
+    samples: int = quantity(6, "samples a pixel, of cycles", at_least=1, at_most=65536)
+    colour: str = quantity(
+        "mode", "whether pins show their control mode or the force on them", choices=COLOURS
+    )
+    arrows: bool = quantity(False, "whether arrows show the force on each pin")
+
+
+@dataclass(frozen=True)
+class Still(Picture):
+    """One instant."""
+
+    when: str = quantity("last touch", "the instant", choices=("last touch", "end"))
+
+
+@dataclass(frozen=True)
+class Moving(Picture):
+    """What turntables and films have in common."""
+
+    rate: int = quantity(25, "frames shown in a second", at_least=1, at_most=240)
+
+    def check(self) -> None:
+        """H.264 keeps colours for blocks of 2 x 2 pixels."""
+        for side in ("width", "height"):
+            if getattr(self, side) % 2:
+                rule = "must be an even number of pixels, as H.264 wants it"
+                raise ParameterError(type(self).__name__, side, rule, str(getattr(self, side)))
+
+
+@dataclass(frozen=True)
+class Turntable(Moving):
+    """The bed turning once about itself, as it is at one instant."""
+
+    when: str = quantity("end", "the instant", choices=("last touch", "end"))
+    frames: int = quantity(75, "frames of the whole turn", at_least=2, at_most=MOST_FRAMES)
+    fingertip: bool = quantity(False, "whether the fingertip is shown")
+
+    def angles(self) -> Floats:
+        """Return the turn of the bed in each frame, rad; the frame after the last would be the first."""
+        return np.arange(self.frames) * (2.0 * np.pi / self.frames)
+
+
+@dataclass(frozen=True)
+class Film(Moving):
+    """A session, or a part of it, from its recorded states."""
+
+    arrows: bool = quantity(True, "whether arrows show the force on each pin")
+    strip: bool = quantity(True, "whether a strip in the picture shows the total force over time")
+    speed: float = quantity(1.0, "simulated seconds shown in a second of film", at_least=1e-3, at_most=1e3)
+    start: float = quantity(0.0, "simulated time of the first frame", unit="s", at_least=0.0, at_most=1e6)
+    stop: float = quantity(
+        0.0, "simulated time of the last frame; 0: the session's end", unit="s", at_least=0.0, at_most=1e6
+    )
+
+    def moments(self, time: Sequence[float] | Floats) -> Floats:
+        """Return the simulated time of each frame, s.
+
+        Parameters
+        ----------
+        time : ndarray (t,)
+            The times of a history, s.
+
+        Raises
+        ------
+        ParameterError
+            When the part asked for is not in the session, or makes too many frames.
+        """
+        first, last = float(time[0]), float(time[-1])
+        stop = min(self.stop, last) if self.stop else last
+        if not first <= self.start <= stop:
+            rule = f"must be between {first:g} s and {stop:g} s, where the film stops"
+            raise ParameterError("Film", "start", rule, f"{self.start:g} s")
+        # Half a frame that remains makes one more, so that the end is seen.
+        count = int((stop - self.start) * self.rate / self.speed + 0.5) + 1
+        if count > MOST_FRAMES:
+            rule = f"must be so high that there are at most {MOST_FRAMES} frames"
+            raise ParameterError("Film", "speed", rule, f"{self.speed:g}: {count} frames")
+        moments: Floats = np.minimum(self.start + np.arange(count) * (self.speed / self.rate), stop)
+        return moments
+
+    def rows(self, time: Sequence[float] | Floats) -> NDArray[np.intp]:
+        """Return the recorded row nearest to each frame; the parameters are those of `moments`."""
+        moments, known = self.moments(time), np.asarray(time, dtype=np.float64)
+        after = np.searchsorted(known, moments).clip(0, len(known) - 1)
+        before = (after - 1).clip(0)
+        nearer = moments - known[before] < known[after] - moments
+        return np.where(nearer, before, after)

@@ -1,0 +1,249 @@
+"""Session from scene to results: simulation, metrics, run folder."""
+
+from __future__ import annotations
+
+import json
+import platform
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import OutputError
+from ..engine.simulation import begin, periods
+from ..engine.state import State
+from ..engine.system import System
+from ..metrics.summary import METRICS, compute_metrics
+from ..model.finger_range import beyond_words, largest_indentation
+from ..model.trajectory import Trajectory
+from ..scene.assembly import assemble
+from ..scene.recorder import Recording, available_memory, refuse_what_cannot_fit, write
+from ..scene.schema import Scene
+from ..scene.toml_table import ABSENT, text
+from .accuracy import Errors
+
+__all__ = ["Ended", "Result", "busy_cells", "fits", "judged", "run", "save"]
+
+History = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a session came to.
+
+    Attributes
+    ----------
+    scene : Scene
+    history : dict of ndarray, or None
+        The arrays of ``history.npz``; None without a recorder.
+    periods : int
+        Control periods done.
+    run_time : float
+        Time the simulation took, s; neither building nor writing is in it.
+    metrics : dict
+        What ``summary.json`` holds; SI units.
+    """
+
+    scene: Scene
+    history: History | None
+    periods: int
+    run_time: float
+    metrics: dict[str, Any]
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether the session was stopped before its end."""
+        return self.periods < self.scene.periods
+
+    def summary(self) -> str:
+        """Return the session in one line."""
+        rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
+        felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
+        simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
+        end = " (incomplete: stopped)" if self.incomplete else ""
+        errors = ""
+        if "height_error" in self.metrics:
+            height, force = self.metrics["height_error"] * 1e6, self.metrics["force_error"] * 1e3
+            errors = f", height error about {height:.2g} µm, force error about {force:.2g} mN"
+        beyond = self.metrics.get("beyond_a_finger")
+        warning = f"; {beyond}" if beyond else ""
+        speed = f"{self.run_time:.2g} s ({factor:.3g} x real time)"
+        return f"{simulated:.1f} s simulated in {speed}{felt}{errors}{end}{warning}"
+
+    def with_errors(self, errors: Errors) -> Result:
+        """Return the result with its estimated errors among the metrics."""
+        judged = {f"{name}_error": value for name, value in asdict(errors).items()}
+        units = {name: "m" if name.startswith("height") else "N" for name in judged}
+        return replace(self, metrics={**self.metrics, **judged, "units": {**self.metrics["units"], **units}})
+
+
+def busy_cells(scene: Scene) -> int:
+    """Return how many cells may take part at once: all, where a shape is displayed; else few."""
+    return scene.cells if scene.shape is not None else 0
+
+
+def fits(scene: Scene, system: System) -> None:
+    """Refuse a session that cannot fit in memory, before it starts; ParameterError says what to change."""
+    busy = busy_cells(scene)
+    refuse_what_cannot_fit(scene.recorder, system.rows, scene.cells, scene.periods, available_memory(), busy)
+
+
+def run(
+    scene: Scene,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+    watched: Callable[[State], None] | None = None,
+    versions: Mapping[str, str] | None = None,
+) -> Result:
+    """Run a scene from rest to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : callable, optional
+        Told after each control period how many are done, and of how many.
+    stopped : callable, optional
+        Asked after each control period; when it says True, the result is what there is so far.
+    watched : callable, optional
+        Shown the state after each control period; the next period uses its arrays up.
+    versions : mapping, optional
+        What else to note as versions the run was made with.
+
+    Raises
+    ------
+    ParameterError
+        When the session cannot fit in memory.
+    DivergenceError
+        When the integration leaves the finite numbers.
+    """
+    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    fits(scene, system)
+    state = begin(system)
+    recording = Recording(scene.recorder, system.rows, state, scene.periods) if scene.recorder else None
+    started = time.perf_counter()
+    start = state
+    for state in periods(system, trajectory, start, scene.periods):
+        if recording:
+            recording.observe(state)
+        if watched:
+            watched(state)
+        if progress:
+            progress(state.period, scene.periods)
+        if stopped and stopped():
+            break
+    took = time.perf_counter() - started
+    if recording:
+        recording.finish(state)
+    rows = recording.arrays() if recording else None
+    return judged(scene, system, trajectory, rows, state, took, versions or {})
+
+
+class Ended(Protocol):
+    """What counts of the state a session ended in."""
+
+    @property
+    def period(self) -> int: ...
+
+    @property
+    def memory(self) -> Any: ...
+
+
+def judged(
+    scene: Scene,
+    system: System,
+    trajectory: Trajectory,
+    rows: History | None,
+    state: Ended,
+    took: float,
+    versions: Mapping[str, str],
+) -> Result:
+    """Return the result of a session that has come to its end.
+
+    Parameters
+    ----------
+    scene : Scene
+    system : System
+    trajectory : Trajectory
+    rows : dict of ndarray, or None
+        From `Recording.arrays`; None without a recorder.
+    state : Ended
+        The state it ended in.
+    took : float
+        Time the simulation took, s.
+    versions : mapping
+        What else to note as versions the run was made with.
+    """
+    history = None if rows is None else _history(scene, system, trajectory, rows)
+    metrics = _metrics(scene, history, state.period, took, versions)
+    # Methods that track a finger count how often it was lost; the others have nothing to lose.
+    metrics["losses"] = getattr(state.memory, "losses", None)
+    return Result(scene, history, state.period, took, metrics)
+
+
+def _history(scene: Scene, system: System, trajectory: Trajectory, rows: History) -> History:
+    """Return the arrays of ``history.npz``."""
+    moments = rows.pop("period") * scene.simulation.control_period
+    return {
+        "time": moments,
+        **rows,
+        "fingertip": trajectory.poses(moments),
+        "total_force": rows["force"].sum(axis=1),
+        "position": system.grid.positions,
+    }
+
+
+def _metrics(
+    scene: Scene, history: History | None, done: int, took: float, versions: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return what a run is judged by, and under what it was made."""
+    simulated = done * scene.simulation.control_period
+    known: dict[str, Any] = {
+        "scene": scene.name,
+        "incomplete": done < scene.periods,
+        "simulated": simulated,
+        "run_time": took,
+        "real_time_factor": simulated / took,
+        "control_periods": done,
+        "cells": scene.cells,
+        "method": scene.method if scene.control else ABSENT,
+        "stepper": scene.simulation.stepper,
+        "versions": {
+            **versions,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+            "system": platform.system(),
+        },
+    }
+    units = {"simulated": "s", "run_time": "s", "real_time_factor": "1"}
+    if history is not None:
+        judged = compute_metrics(history, scene.set_point)
+        known |= judged
+        units |= {name: METRICS[name][0] for name in judged}
+        if scene.fingertip is not None:
+            known["max_indentation"] = largest_indentation(scene.fingertip, history)
+            units["max_indentation"] = "m"
+            known["beyond_a_finger"] = beyond_words(judged["max_total_force"], known["max_indentation"])
+    return {**known, "units": units}
+
+
+def save(result: Result, folder: Path) -> None:
+    """Write ``schema.toml``, ``history.npz`` and ``summary.json`` into an existing folder.
+
+    Raises
+    ------
+    OutputError
+        When the folder cannot be written.
+    """
+    try:
+        (folder / "scene.toml").write_text(text(result.scene), encoding="utf-8")
+        if result.history is not None:
+            write(result.history, folder / "history.npz")
+        judged = json.dumps(result.metrics, indent=2, ensure_ascii=False, allow_nan=False)
+        (folder / "metrics.json").write_text(judged + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"Cannot write into {folder}: {error.strerror or error}.") from None

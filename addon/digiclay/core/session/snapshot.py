@@ -1,0 +1,249 @@
+"""Snapshot of a state as bytes, restored bit for bit.
+
+A short header in JSON says what follows; then come the arrays, little-endian. The
+controller's memory is written by its structure and rebuilt after the memory a session of the
+same controller begins with: nothing that is read can name a class or run code.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import StateError
+from ..base.modes import Mode
+from ..engine.simulation import begin
+from ..engine.state import Gathered, Rows, State
+from ..engine.system import System
+from ..model.layout import Disc
+from .snapshot_memory import rebuilt, written
+
+__all__ = ["carried", "packed", "unpacked"]
+
+#: What kept bytes start with; the number changes when their arrangement does.
+START = b"digiclay state 1\n"
+#: How far rounding may take a height, m, or an opening beyond its ends.
+SLACK = 1e-6
+#: No number of a state is as large: a session ends when the square of one is no longer finite.
+LARGEST = 1e154
+#: No disc a session works in reaches as far, m.
+FARTHEST = 1e9
+#: What can be done about bytes that cannot be used.
+REMEDY = "Reset the session to begin with a bed at rest."
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What bytes hold: the header, and the arrays by their names in `State` and `Gathered`."""
+
+    header: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+    memory: list[NDArray[Any]]
+
+
+def packed(system: System, state: State) -> bytes:
+    """Write a state as bytes that do not change when the session goes on."""
+    held, rows = state.gathered, system.rows
+    arrays: list[NDArray[Any]] = []
+    memory = written(state.memory, arrays)
+    header = {
+        "cells": system.grid.count,
+        "rows": [rows.physics, rows.queue, rows.control, rows.sensors],
+        "control_period": system.period,
+        "period": state.period,
+        "peak": state.peak,
+        "gathered": {
+            "cells": held.cells.size,
+            "near": held.near,
+            "reach": held.reach,
+            "control": held.control,
+            "peak": held.peak,
+            "until": held.until,
+        },
+        "memory": memory,
+        "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
+    }
+    text = json.dumps(header).encode()
+    body = [
+        np.ascontiguousarray(array, kind)
+        for array, kind in (
+            (state.rows, "<f8"),
+            (state.modes, "i1"),
+            (state.aged, "<f8"),
+            (held.cells, "<i8"),
+            (held.block, "<f8"),
+            (held.mode, "i1"),
+        )
+    ]
+    # One copy: the arrays are joined as they stand.
+    parts = (array.data for array in (*body, *arrays))
+    return b"".join([START, len(text).to_bytes(4, "little"), text, *parts])
+
+
+def unpacked(system: System, data: bytes) -> State:
+    """Read a state back; a session that goes on from it does so bit for bit.
+
+    Raises
+    ------
+    StateError
+        When the bytes are no state, are damaged, or are a state of another bed, other parts,
+        another control period or another method.
+    """
+    kept = _read(data)
+    header, rows = kept.header, system.rows
+    here = [rows.physics, rows.queue, rows.control, rows.sensors]
+    _fits("number of cells", header["cells"], system.grid.count)
+    _fits("rows of a cell", header["rows"], here)
+    _fits("control period", header["control_period"], system.period)
+    _within_the_device(system, kept)
+    template = system.controller.begin() if system.controller else None
+    gathered = header["gathered"]
+    cells = kept.arrays["cells"].astype(np.intp)
+    held = Gathered(
+        rows,
+        cells,
+        gathered["near"],
+        kept.arrays["block"],
+        kept.arrays["mode"],
+        system.grid.place(cells),
+        _disc(gathered["reach"]),
+        _disc(gathered["control"]),
+        gathered["peak"],
+        gathered["until"],
+    )
+    memory = rebuilt(template, header["memory"], kept.memory)
+    return State(
+        header["period"],
+        kept.arrays["rows"],
+        kept.arrays["modes"],
+        kept.arrays["aged"],
+        header["peak"],
+        held,
+        memory,
+    )
+
+
+def carried(system: System, data: bytes) -> State:
+    """Return a session's beginning with the heights of a kept state: what is left when parts have changed.
+
+    Every pin stands still at the height it had, as far as the stroke allows; pulp, valves and
+    the controller begin anew.
+
+    Raises
+    ------
+    StateError
+        When the bytes are no state, are damaged, or are a state of another number of cells.
+    """
+    kept = _read(data)
+    _fits("number of cells", kept.header["cells"], system.grid.count)
+    height = kept.arrays["rows"][0].copy()
+    height[kept.arrays["cells"]] = kept.arrays["block"][0]
+    actuator, state = system.cell.actuator, begin(system)
+    height = np.clip(height, 0.0, actuator.stroke)
+    state.rows[0] = state.rows[system.rows.target] = height
+    state.modes[:] = np.where(height == actuator.rest_height, np.int8(Mode.REST), np.int8(Mode.HOLD))
+    peak = float(height.max())
+    return State(0, state.rows, state.modes, state.aged, peak, state.gathered, state.memory)
+
+
+def _within_the_device(system: System, kept: Kept) -> None:
+    """Refuse pins beyond their end stops, and valves opened wider than all the way."""
+    rows, top = system.rows, system.cell.actuator.stroke + SLACK
+    for name in ("rows", "block"):
+        values = kept.arrays[name]
+        height, valves = values[0], (values[system.cell.lag_rows], values[rows.commands])
+        wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
+        if wide or ((height < -SLACK) | (height > top)).any():
+            raise _unusable("holds numbers that no state has")
+
+
+def _read(data: bytes) -> Kept:
+    """Read bytes without regard to any system; their arrays are new ones."""
+    if not isinstance(data, bytes) or not data.startswith(START):
+        raise _unusable("does not begin as one")
+    try:
+        first = len(START) + 4
+        length = int.from_bytes(data[len(START) : first], "little")
+        header = json.loads(data[first : first + length])
+        cells, held = _whole(header["cells"]), header["gathered"]
+        count, taken = Rows(*map(_whole, header["rows"])).count, _whole(held["cells"])
+        shapes: list[tuple[str, tuple[int, ...]]] = [
+            ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
+            ("<i8", (taken,)), ("<f8", (count, taken)), ("i1", (taken,)),
+        ]  # fmt: skip
+        shapes += [(str(kind), tuple(map(_whole, shape))) for kind, shape in header["arrays"]]
+        arrays, end = _arrays(data, first + length, shapes)
+        if end != len(data):
+            raise _unusable(f"must have {end} bytes and has {len(data)}")
+        numbers = [header["peak"], held["peak"], header["control_period"]]
+        numbers += [_whole(value) for value in (header["period"], held["until"], held["near"])]
+        numbers += [*(_disc(held["reach"]) or ()), *(_disc(held["control"]) or ())]
+        names = ("rows", "modes", "aged", "cells", "block", "mode")
+        kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
+        # A memory of nothing is None; one that is not there at all is damage.
+        sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
+        raise _unusable(f"is damaged: {type(error).__name__}") from None
+    if not sound or not _sound(kept, cells):
+        raise _unusable("holds numbers that no state has")
+    return kept
+
+
+def _arrays(
+    data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
+) -> tuple[list[NDArray[Any]], int]:
+    """Return copies of the arrays that stand in `data` from a place on, and where they end."""
+    found = []
+    for name, shape in shapes:
+        kind, count = np.dtype(name), math.prod(shape)
+        if kind.hasobject or kind.itemsize == 0 or at + count * kind.itemsize > len(data):
+            raise ValueError(f"no room for {count} of {kind}")
+        found.append(np.frombuffer(data, kind, count, at).reshape(shape).copy())
+        at += count * kind.itemsize
+    return found, at
+
+
+def _sound(kept: Kept, count: int) -> bool:
+    """Tell whether the arrays hold what those of a state can hold."""
+    arrays = kept.arrays
+    cells = arrays["cells"]
+    return bool(
+        all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
+        and all(((arrays[name] >= 0) & (arrays[name] < len(Mode))).all() for name in ("modes", "mode"))
+        and ((cells >= 0) & (cells < count)).all()
+        and np.unique(cells).size == cells.size
+    )
+
+
+def _whole(value: Any) -> int:
+    """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
+        raise ValueError(f"no count: {value!r}")
+    return value
+
+
+def _disc(values: Any) -> Disc | None:
+    """Return a part of the bed."""
+    if values is None:
+        return None
+    x, y, radius = (float(value) for value in values)
+    if max(abs(x), abs(y), abs(radius)) > FARTHEST:
+        raise ValueError("a disc beyond all beds")
+    return x, y, radius
+
+
+def _fits(what: str, kept: Any, here: Any) -> None:
+    """Refuse a state of another system."""
+    if kept != here:
+        rule = f"must have the same {what} as the bed now, {here} (got {kept})"
+        raise StateError(f"The kept state {rule}. {REMEDY}")
+
+
+def _unusable(reason: str) -> StateError:
+    """Return the error of bytes that are no state."""
+    return StateError(f"The kept state {reason}, and cannot be taken up. {REMEDY}")

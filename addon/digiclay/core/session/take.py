@@ -1,0 +1,191 @@
+"""Take: initial state and fingertip path of a session, replayed bit for bit.
+
+The path is a pose at the start and one at the end of every control period, between which the
+finger goes straight; that and the state at the start decide all that follows. The state at
+the end is kept as well, so that a replay can prove that it came to the same.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import OutputError, ParameterError
+from ..base.npz import BROKEN_ZIP, array, heads
+from ..base.toml_text import tables
+from ..engine.simulation import begin
+from ..engine.state import State
+from ..engine.system import System
+from ..scene.assembly import assemble
+from ..scene.schema import Path, Scene, Waypoint
+from ..scene.toml_table import resolve, text
+from .live_periods import lived
+from .snapshot import packed, unpacked
+
+__all__ = ["Take", "as_scene", "finer", "from_bytes", "states", "to_bytes"]
+
+Floats = NDArray[np.float64]
+
+#: Waypoints that lie this near to the straight way between their neighbours are left out, m and 1.
+STRAIGHT = 1e-12
+#: The arrays of a take.
+PARTS = ("scene", "start", "poses", "end")
+#: Most parts a physics step is cut into when a take is simulated once more.
+MOST_PARTS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A stretch of a session.
+
+    Attributes
+    ----------
+    scene : Scene
+        Its trajectory is not used: the finger follows `poses`.
+    start, end : bytes
+        The states before and after, from `snapshot.packed`.
+    poses : ndarray (t + 1, 7)
+        Finger at the start, and at the end of each of t control periods: lowest point, m,
+        and unit quaternion.
+
+    Raises
+    ------
+    ParameterError
+        When there is no period, or a pose is not finite.
+    """
+
+    scene: Scene
+    start: bytes
+    poses: Floats
+    end: bytes
+
+    def __post_init__(self) -> None:
+        if self.poses.ndim != 2 or self.poses.shape[1] != 7 or len(self.poses) < 2:
+            shown = f"an array of the shape {self.poses.shape}"
+            raise ParameterError(
+                "Take", "poses", "must hold one control period at least, 7 numbers a pose", shown
+            )
+        if not np.isfinite(self.poses).all():
+            row = int(np.argwhere(~np.isfinite(self.poses))[0][0])
+            raise ParameterError("Take", "poses", "must be finite numbers", f"row {row} is not")
+
+    @property
+    def periods(self) -> int:
+        """Number of control periods."""
+        return len(self.poses) - 1
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        return self.periods * self.scene.simulation.control_period
+
+
+def states(take: Take, scene: Scene | None = None) -> Iterator[State]:
+    """Simulate a take once more.
+
+    Parameters
+    ----------
+    take : Take
+    scene : Scene, optional
+        Another way to integrate it, such as `finer`; the take's own when left out.
+
+    Yields
+    ------
+    State
+        After each period; valid until the next one is asked for.
+    """
+    system = assemble(scene or take.scene)
+    yield from lived(system, unpacked(system, take.start), take.poses)
+
+
+def finer(scene: Scene, parts: int) -> Scene:
+    """Return a scene whose physics steps are cut into `parts`; control is sampled as before.
+
+    Raises
+    ------
+    ParameterError
+        When `parts` is not from 1 to 64.
+    """
+    if not 1 <= parts <= MOST_PARTS:
+        raise ParameterError("Take", "parts", f"must be from 1 to {MOST_PARTS}", str(parts))
+    return replace(scene, simulation=scene.simulation.refined(parts))
+
+
+def as_scene(take: Take, name: str) -> Scene:
+    """Return a take as a scene that `digiclay run` simulates.
+
+    Raises
+    ------
+    OutputError
+        When the take does not begin at rest: a scene file has no other beginning.
+    """
+    system = assemble(take.scene)
+    if not _rests(system, take.start):
+        raise OutputError(
+            f"The take {name!r} begins on a bed that is formed already, and a scene file begins at rest: "
+            "reset the session before recording a take for export."
+        )
+    times = np.arange(len(take.poses)) * take.scene.simulation.control_period
+    waypoints = tuple(
+        Waypoint(float(times[row]), tuple(take.poses[row, :3].tolist()), tuple(take.poses[row, 3:].tolist()))
+        for row in np.flatnonzero(_turning_points(take.poses))
+    )
+    lasting = replace(take.scene.simulation, duration=float(times[-1]))
+    return replace(take.scene, name=name, simulation=lasting, trajectory=Path("linear", waypoints))
+
+
+def _rests(system: System, start: bytes) -> bool:
+    """Tell whether a state is that of a bed nothing has happened to, however long it has waited."""
+    state, rest = unpacked(system, start), begin(system)
+    return (
+        all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))
+        and np.array_equal(state.mode(), rest.mode())
+        and packed(system, rest._replace(memory=state.memory)) == packed(system, rest)
+    )
+
+
+def _turning_points(poses: Floats) -> NDArray[np.bool_]:
+    """Tell which poses are needed to draw the path with straight lines, evenly spaced in time."""
+    needed = np.ones(len(poses), bool)
+    bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
+    needed[1:-1] = bend > STRAIGHT
+    return needed
+
+
+def to_bytes(take: Take) -> bytes:
+    """Write a take as numpy's ``.npz``."""
+    written = io.BytesIO()
+    np.savez(
+        written,
+        scene=np.frombuffer(text(take.scene).encode(), np.uint8),
+        start=np.frombuffer(take.start, np.uint8),
+        poses=take.poses,
+        end=np.frombuffer(take.end, np.uint8),
+    )
+    return written.getvalue()
+
+
+def from_bytes(data: bytes) -> Take:
+    """Read what `to_bytes` wrote.
+
+    Raises
+    ------
+    OutputError
+        When it is damaged.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            held = heads(archive, PARTS)
+            # `to_bytes` does not compress: a take unpacks to no more than it is.
+            size = sum(head.size for head in held.values())
+            if size > len(data):
+                raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
+            scene, start, poses, end = (array(archive, name) for name in PARTS)
+        return Take(resolve(tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
+    except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
+        raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

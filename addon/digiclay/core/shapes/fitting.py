@@ -1,0 +1,190 @@
+"""Placement of a shape on a bed: fit of the plan, scale of the relief, clipping."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..model.actuator import Actuator
+from ..model.layout import Grid
+from .height_text import unpacked
+from .relief import Placement, Relief, Tops
+from .request import Shape
+
+__all__ = ["Fitted", "fitted", "given"]
+
+Floats = NDArray[np.float64]
+
+#: A plan narrower than this share of its length is a line or a point: there is nothing to fit.
+THIN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Heights a bed is to display, and what of the shape it cannot.
+
+    Attributes
+    ----------
+    name : str
+    heights : ndarray (n,)
+        m, from 0 to the stroke.
+    covered : int
+        Cells the shape covers; the others stand at its foot.
+    overhanging : int
+        Cells over which more of the shape lies below its top surface; only the top is displayed.
+    too_low, too_high : int
+        Cells clipped at the bed's floor, at the end of the stroke.
+    filled : int
+        Cells under small holes of the shape, whose heights are taken from around.
+    """
+
+    name: str
+    heights: Floats
+    covered: int
+    overhanging: int
+    too_low: int
+    too_high: int
+    filled: int = 0
+
+    def told(self) -> str:
+        """Return all that in one line."""
+        count = self.heights.size
+        low, high = float(self.heights.min()) * 1e3, float(self.heights.max()) * 1e3
+        covers = "all cells" if self.covered == count else f"{self.covered} of {_cells(count)}"
+        parts = [f"{self.name}: heights from {low:.1f} to {high:.1f} mm, covers {covers}"]
+        clipped = self.too_low + self.too_high
+        if clipped:
+            ends = [
+                f"{number} {where}"
+                for number, where in ((self.too_low, "at the floor"), (self.too_high, "at the stroke's end"))
+                if number
+            ]
+            parts.append(f"{_cells(clipped)} clipped ({', '.join(ends)})")
+        else:
+            parts.append("no cell clipped")
+        if self.overhanging:
+            parts.append(f"overhangs under the top at {_cells(self.overhanging)}")
+        if self.filled:
+            parts.append(f"{_cells(self.filled)} under holes filled from around")
+        return ", ".join(parts)
+
+
+def _cells(count: int) -> str:
+    """Write a number of cells."""
+    return f"{count} cell{'s' if count != 1 else ''}"
+
+
+def given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
+    """Return the shape whose heights stand in the scene itself.
+
+    Parameters
+    ----------
+    shape : Shape
+    grid : Grid
+    actuator : Actuator
+        Its stroke limits the heights.
+
+    Raises
+    ------
+    ParameterError
+        When they are not those of this bed.
+    """
+    return _clipped(shape.file or "heights", unpacked(shape.heights, grid), _all_covered(grid), actuator)
+
+
+def fitted(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:
+    """Lay a shape onto a bed.
+
+    Parameters
+    ----------
+    shape : Shape
+        How.
+    relief : Relief
+        What.
+    grid : Grid
+    actuator : Actuator
+        Gives rest height and stroke.
+
+    Raises
+    ------
+    ParameterError
+        When it covers no cell, or cannot be fitted the way it is asked for.
+    """
+    at = _placement(shape, relief, grid)
+    tops = relief.tops(grid, at)
+    if not tops.covered.any():
+        raise ParameterError(
+            "shape", "x, y", "must leave the shape over the bed", f"{relief.name}: no pin lies under it",
+            "Set shape.fit to contain, or move it with shape.x and shape.y.",
+        )  # fmt: skip
+    return _clipped(relief.name, _heights(shape, relief, at, tops, actuator), tops, actuator)
+
+
+def _placement(shape: Shape, relief: Relief, grid: Grid) -> Placement:
+    """Return how the shape's plan lies on the bed."""
+    left, front, right, back = relief.box
+    wide, deep = right - left, back - front
+    if not min(wide, deep) > THIN * max(wide, deep):
+        rule = "must be wider than a line or a point, seen from above"
+        raise ParameterError("shape", "file", rule, f"{relief.name}: {wide:g} x {deep:g}")
+    if shape.fit in ("actual", "placed") and relief.length is None:
+        rule = "must be contain, cover or stretch for a picture or a map: its pixels have no length"
+        raise ParameterError("shape", "fit", rule, f"{shape.fit!r} for {relief.name}")
+    own = relief.length or 1.0
+    if shape.fit == "placed":
+        return Placement(own, own, shape.x, shape.y)
+    plan = grid.layout
+    # The bed is as large as its cells: half a pitch more on every side than the outermost pins.
+    across, along = float(np.ptp(grid.x)) + plan.pitch, float(np.ptp(grid.y)) + plan.row_spacing
+    ways = {
+        "contain": (min(across / wide, along / deep),) * 2,
+        "cover": (max(across / wide, along / deep),) * 2,
+        "stretch": (across / wide, along / deep),
+        "actual": (own, own),
+    }
+    factor_x, factor_y = (factor * shape.scale for factor in ways[shape.fit])
+    middle_x, middle_y = left + wide / 2, front + deep / 2
+    return Placement(factor_x, factor_y, shape.x - middle_x * factor_x, shape.y - middle_y * factor_y)
+
+
+def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: Actuator) -> Floats:
+    """Return the heights of all cells, m, before they are clipped."""
+    foot = actuator.rest_height + shape.foot
+    if shape.fit == "placed":
+        assert relief.value_length is not None  # what has a length in plan has one upwards
+        return np.where(tops.covered, tops.value * relief.value_length, foot)
+    seen = tops.value[tops.covered]
+    # A bed covered all over shows the top surface alone; a shape that stands on the bed shows its sides.
+    bare = relief.underside is not None and not tops.covered.all()
+    low = relief.underside if bare and relief.underside is not None else float(seen.min())
+    high = float(seen.max())
+    if shape.relief == "true":
+        if relief.value_length is None:
+            rule = "must be rise or stroke for a picture: its values are no lengths"
+            raise ParameterError("shape", "relief", rule, f"'true' for {relief.name}")
+        # A mesh keeps its proportions; a map's heights are lengths by themselves.
+        factor = relief.value_length if relief.length is None else math.sqrt(at.factor_x * at.factor_y)
+    elif high > low:
+        factor = (shape.rise if shape.relief == "rise" else actuator.stroke - foot) / (high - low)
+    else:
+        factor = 0.0
+    return np.where(tops.covered, foot + factor * (tops.value - low), foot)
+
+
+def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitted:
+    """Keep heights within the stroke, and count what had to be clipped."""
+    # Less than a nanometre beyond an end is rounding.
+    low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
+    within = np.clip(heights, 0.0, actuator.stroke)
+    counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]
+    counts.append(tops.filled)
+    return Fitted(name, within, *counts)
+
+
+def _all_covered(grid: Grid) -> Tops:
+    """Return the cover of a shape that gives a height for every cell."""
+    return Tops(np.zeros(grid.count), np.ones(grid.count, np.bool_), np.zeros(grid.count, np.bool_))

@@ -1,0 +1,219 @@
+"""Mesh as a shape: its top surface by rays along the axes of the pins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..model.layout import ON_THE_SIDE, Grid
+from .holes import fill_holes
+from .relief import Placement, Tops
+from .request import UPWARDS
+
+__all__ = ["ShapeMesh", "shape_mesh"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: Pairs of a ray and a triangle that are worked on at a time.
+CHUNK = 2_000_000
+#: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
+#: float32 or to six digits, which moves the rim by up to a micrometre, and no pin is placed as exactly.
+EDGE = 1e-3
+#: Faces of a mesh are known to be turned outwards if more than this share of the pins sees an upper side.
+UPPER = 0.8
+#: Two hits of a ray are one when they are closer than this share of the mesh's height.
+SAME = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeMesh:
+    """Triangles with z up.
+
+    Attributes
+    ----------
+    name : str
+    vertices : ndarray (v, 3)
+        In the file's unit.
+    faces : ndarray of int (f, 3)
+    length : float
+        Metres in that unit.
+    """
+
+    name: str
+    vertices: Floats
+    faces: Indices
+    length: float
+
+    @property
+    def value_length(self) -> float:
+        """Metres in the unit of the heights."""
+        return self.length
+
+    @cached_property
+    def used(self) -> Floats:
+        """The corners of the triangles, shape (3 f, 3)."""
+        used: Floats = self.vertices[self.faces.ravel()]
+        return used
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """The plan."""
+        (left, front), (right, back) = self.used[:, :2].min(axis=0), self.used[:, :2].max(axis=0)
+        return float(left), float(front), float(right), float(back)
+
+    @property
+    def underside(self) -> float:
+        """The lowest point."""
+        return float(self.used[:, 2].min())
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether every edge belongs to two triangles: the mesh has an inside."""
+        corners = _merged(self.vertices)[self.faces]
+        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+        # One number an edge, whichever way it runs.
+        edges = np.minimum(start, end) * len(self.vertices) + np.maximum(start, end)
+        _, count = np.unique(edges[start != end], return_counts=True)
+        return bool(np.all(count == 2))
+
+    def tops(self, grid: Grid, at: Placement) -> Tops:
+        """Return the highest hit of each pin's ray, and where the ray passes through more than one layer.
+
+        A closed mesh is passed through once, from its top to its underside; an open one is hit once.
+        Small holes of an open one are filled from around.
+
+        Parameters
+        ----------
+        grid : Grid
+        at : Placement
+        """
+        none = np.empty(0, np.bool_)
+        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
+        cell, z, over, up = (np.concatenate([hit[part] for hit in hits]) for part in range(4))
+        known = np.zeros(grid.count, np.bool_)
+        known[cell[over]] = True
+        used = over | ~known[cell]
+        cell, z, up = cell[used], z[used], up[used]
+        order = np.lexsort((up, z, cell))
+        cell, z, up = cell[order], z[order], up[order]
+        value, covered = np.zeros(grid.count), np.zeros(grid.count, np.bool_)
+        last = np.append(cell[1:] != cell[:-1], True)[: cell.size]
+        value[cell[last]], covered[cell[last]] = z[last], True
+        same = SAME * float(np.ptp(self.used[:, 2]))
+        new = np.append(True, (cell[1:] != cell[:-1]) | (np.diff(z) > same))[: cell.size]
+        layers = np.bincount(cell[new], minlength=grid.count)
+        overhang = layers > (2 if self.closed else 1)
+        if self.closed:
+            return Tops(value, covered, overhang)
+        missing = ~covered
+        if np.count_nonzero(up[last]) > UPPER * np.count_nonzero(last):
+            # Seen from below: through a hole, on the inside of what lies under it.
+            missing[cell[last]] |= ~up[last]
+        value, hole = fill_holes(grid, value, missing)
+        return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
+
+    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
+        """Give cells whose rays hit or closely pass a triangle: where, if they hit it, and if from above."""
+        plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
+        corners, z = plan[self.faces], self.vertices[self.faces, 2]
+        sides = corners[:, 1:] - corners[:, :1]
+        area = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+        size = np.abs(sides).max(axis=(1, 2))
+        slack = EDGE * min(grid.layout.pitch, grid.layout.row_spacing)
+        first_row, last_row, first, last = _window(
+            grid, corners.min(axis=1) - slack, corners.max(axis=1) + slack
+        )
+        rows, columns = np.maximum(last_row - first_row + 1, 0), np.maximum(last - first + 1, 0)
+        # A triangle on edge covers no pin; its neighbours have the same edges.
+        candidates = np.where(np.abs(area) > 1e-12 * size * size, rows * columns, 0)
+        flat = np.flatnonzero(candidates)
+        cuts = np.cumsum(candidates[flat]) // CHUNK
+        for part in np.split(flat, np.flatnonzero(np.diff(cuts)) + 1):
+            count = candidates[part]
+            face = np.repeat(part, count)
+            k = np.arange(face.size) - np.repeat(np.cumsum(count) - count, count)
+            row, column = first_row[face] + k // columns[face], first[face] + k % columns[face]
+            cell = (row * grid.layout.columns + column).astype(np.intp)
+            dx, dy = grid.x[cell] - corners[face, 0, 0], grid.y[cell] - corners[face, 0, 1]
+            (ax, ay), (bx, by) = sides[face, 0].T, sides[face, 1].T
+            one, two = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
+            over = (one >= -ON_THE_SIDE) & (two >= -ON_THE_SIDE) & (one + two <= 1.0 + ON_THE_SIDE)
+            # Beside an edge the triangle is as high as on it, however steep it is.
+            one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)
+            whole = np.maximum(one + two, 1.0)
+            one, two = one / whole, two / whole
+            near = np.hypot(dx - one * ax - two * bx, dy - one * ay - two * by) <= slack
+            cell, over, face, one, two = cell[near], over[near], face[near], one[near], two[near]
+            low = z[face, 0]
+            height = low + one * (z[face, 1] - low) + two * (z[face, 2] - low)
+            yield cell, height, over, area[face] > 0.0
+
+
+def _merged(vertices: Floats) -> Indices:
+    """Return a number for each vertex, the same for those at the same place, as in an STL."""
+    order = np.lexsort(vertices.T)
+    placed = vertices[order]
+    number = np.empty(len(vertices), np.int64)
+    number[order] = np.cumsum(np.append(False, np.any(placed[1:] != placed[:-1], axis=1)))
+    return number
+
+
+def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, Indices, Indices]:
+    """Return the first and last rows and columns of the pins that lie in boxes (f, 2), m."""
+    plan, (left, bottom) = grid.layout, grid.corner
+
+    def index(places: Floats, most: int) -> Indices:
+        bounded: Indices = np.clip(places, -1.0, most).astype(np.int64)
+        return bounded
+
+    first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing)
+    last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing)
+    first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch)
+    last = np.floor((high[:, 0] - left) / plan.pitch)
+    return (
+        np.maximum(index(first_row, plan.rows), 0),
+        np.minimum(index(last_row, plan.rows), plan.rows - 1),
+        np.maximum(index(first, plan.columns), 0),
+        np.minimum(index(last, plan.columns), plan.columns - 1),
+    )
+
+
+def shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
+    """Make a shape of triangles.
+
+    Parameters
+    ----------
+    name : str
+        What messages call it.
+    vertices : ndarray (v, 3)
+    faces : ndarray of int (f, 3)
+    up : str
+        A key of `request.UPWARDS`.
+    length : float
+        Metres in the vertices' unit.
+
+    Raises
+    ------
+    ParameterError
+        When there is no surface, or a vertex is not finite.
+    """
+    place, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    if place.ndim != 2 or place.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:
+        raise ParameterError("shape", "file", "must hold a surface made of faces", f"{name}: no face")
+    if corners.min() < 0 or corners.max() >= len(place):
+        rule = "must have faces whose corners are among its vertices"
+        raise ParameterError("shape", "file", rule, f"{name}: corner {corners.max()} of {len(place)}")
+    bad = np.flatnonzero(~np.isfinite(place).all(axis=1))
+    if bad.size:
+        shown = ", ".join(f"{value:g}" for value in place[bad[0]])
+        rule = "must have vertices that are finite numbers"
+        raise ParameterError("shape", "file", rule, f"{name}: vertex {bad[0]} at {shown}")
+    axes, signs = UPWARDS[up]
+    return ShapeMesh(name, place[:, axes] * signs, corners, length)

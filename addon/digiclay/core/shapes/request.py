@@ -1,0 +1,84 @@
+"""Section [shape] of a scene: the shape displayed before the fingertip arrives, and its placement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["LENGTHS", "UPWARDS", "Shape"]
+
+#: Lengths a file can be in: metres in one of them.
+LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
+#: Directions of a file that can point upwards: which of its axes become x, y, z, and their signs.
+UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
+    "z": ((0, 1, 2), (1, 1, 1)),
+    "y": ((0, 2, 1), (1, -1, 1)),
+    "x": ((2, 1, 0), (-1, 1, 1)),
+    "-z": ((0, 1, 2), (1, -1, -1)),
+    "-y": ((0, 2, 1), (1, 1, -1)),
+    "-x": ((2, 1, 0), (1, 1, -1)),
+}
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Shape(Parameters):
+    """A shape from outside: where it comes from, how it is laid onto the bed, how the bed gets there."""
+
+    file: str = quantity("dome", "name of a sample shape, or a mesh, a picture or a file .npy")
+    heights: str = quantity("", "heights of all cells, packed as text, in place of the file")
+    fit: str = quantity(
+        "contain",
+        "placement on the bed: whole, filling the bed, stretched, in its own size, or at its own coordinates",
+        choices=("contain", "cover", "stretch", "actual", "placed"),
+    )
+    scale: float = quantity(1.0, "scale of the plan", above=0.0, at_most=1e6)
+    x: float = quantity(
+        0.0,
+        "shift of the middle from that of the bed",
+        unit="m",
+        symbol="x_s",
+        at_least=-100.0,
+        at_most=100.0,
+    )
+    y: float = quantity(
+        0.0,
+        "shift of the middle from that of the bed",
+        unit="m",
+        symbol="y_s",
+        at_least=-100.0,
+        at_most=100.0,
+    )
+    relief: str = quantity(
+        "rise",
+        "height: `rise`, up to the end of the stroke, or in proportion to the plan",
+        choices=("rise", "stroke", "true"),
+    )
+    rise: float = quantity(
+        15e-3, "lowest to highest point; a negative value inverts the shape", unit="m", symbol="h_r",
+        at_least=-100.0, at_most=100.0,
+    )  # fmt: skip
+    foot: float = quantity(
+        0.0, "lowest point above the bed at rest", unit="m", symbol="h_f",
+        at_least=-100.0, at_most=100.0,
+    )  # fmt: skip
+    up: str = quantity(AUTO, "upward direction of a mesh", choices=(AUTO, *UPWARDS))
+    unit: str = quantity(AUTO, "unit of length of a mesh", choices=(AUTO, *LENGTHS))
+    refresh: str = quantity(
+        "approximate_gradual",
+        "method of refresh",
+        choices=("one_time", "gradual", "approximate_gradual"),
+    )
+    surfaces: int = quantity(
+        5, "number of intermediate surfaces of a gradual refresh, including the last", symbol="n_s",
+        at_least=1, at_most=1000,
+    )  # fmt: skip
+    patience: float = quantity(2.0, "time limit of a move", unit="s", symbol="t_p", above=0.0)
+
+    def check(self) -> None:
+        """A shape comes from somewhere."""
+        if not self.file and not self.heights:
+            rule = "must be a sample shape's name, a mesh, a picture or a file .npy"
+            raise ParameterError("Shape", "file", rule, "nothing")

@@ -1,0 +1,127 @@
+"""Shapes from files: samples by name, meshes, pictures, and numpy arrays."""
+
+from __future__ import annotations
+
+import importlib
+from contextlib import suppress
+from pathlib import Path
+
+from ..base.errors import ParameterError, SceneError
+from ..base.npz import mapped
+from ..base.sample_file import found, named
+from ..mesh_io import mesh_reader
+from ..mesh_io.mesh_reader import MESHES
+from ..model.actuator import Actuator
+from ..model.layout import Grid
+from .fitting import Fitted, fitted, given
+from .heightmap import HeightMap, height_map
+from .mesh_relief import ShapeMesh, shape_mesh
+from .picture_heights import PICTURES, pixels
+from .relief import Relief
+from .request import AUTO, LENGTHS, Shape
+
+__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "import_reader", "read", "sample_shapes"]
+
+#: Where the sample shapes are.
+SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
+ARRAY = ".npy"
+#: What a file of this kind of shape may end with.
+KINDS = (*MESHES, *PICTURES, ARRAY)
+
+
+def sample_shapes() -> list[str]:
+    """Return the names of the sample shapes."""
+    return list(named(SAMPLES, *KINDS))
+
+
+def find_shape(word: str) -> Path:
+    """Return the file of a shape: a sample's name, or a file.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file, or sample.
+    """
+    return found(word, named(SAMPLES, *KINDS), "sample shape")
+
+
+def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
+    """Return the shape of a scene, laid onto its bed; errors as `read` and `fitting.fitted`.
+
+    Parameters
+    ----------
+    shape : Shape
+    grid : Grid
+    actuator : Actuator
+        Its stroke limits the heights.
+    """
+    if shape.heights:
+        return given(shape, grid, actuator)
+    return fitted(shape, read(shape), grid, actuator)
+
+
+def read(shape: Shape) -> Relief:
+    """Read the shape a scene names.
+
+    Raises
+    ------
+    SceneError
+        When there is no such file.
+    ParameterError
+        When it holds no shape.
+    """
+    try:
+        path = find_shape(shape.file)
+    except SceneError as error:
+        raise SceneError(f"shape.file: {error}") from None
+    kind = path.suffix.lower()
+    if kind == ARRAY:
+        return _array(path)
+    if kind in PICTURES:
+        return height_map(path.name, pixels(path))
+    return _mesh(path, shape)
+
+
+def import_reader(path: Path) -> None:
+    """Import the library that reads a file, where there is one: a stop within an import does harm.
+
+    One that is missing is told of when the file is read.
+    """
+    kind = path.suffix.lower()
+    reader = "PIL.Image" if kind in PICTURES else mesh_reader.reader(kind)
+    if reader:
+        with suppress(ImportError):
+            importlib.import_module(reader)
+
+
+def _array(path: Path) -> HeightMap:
+    """Read an array of heights, m; its first row lies at the lowest y."""
+    try:
+        values = mapped(path)
+    except OSError as error:
+        said = error.strerror or "not an array"
+        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
+    except ValueError:
+        raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
+    return height_map(path.name, values, value_length=1.0)
+
+
+def _mesh(path: Path, shape: Shape) -> ShapeMesh:
+    """Read a mesh."""
+    if path.suffix.lower() not in MESHES:
+        rule = f"must be a mesh, a picture or an array ({', '.join(KINDS)})"
+        raise ParameterError("shape", "file", rule, str(path))
+    try:
+        mesh = mesh_reader.read(path)
+    except (ParameterError, MemoryError):
+        raise
+    except OSError as error:
+        said = error.strerror or error
+        raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
+    # Readers raise whatever a broken file makes them trip over.
+    except Exception as error:
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ParameterError("shape", "file", "must be a mesh that can be read", f"{path}: {said}") from None
+    up = shape.up if shape.up != AUTO else mesh.up
+    length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
+    return shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)

@@ -1,0 +1,180 @@
+"""Closed-form step under extreme loads, and with fingertip jumps.
+
+`closed_form.pressed` holds where every flow is laminar and no exponential overflows. Elsewhere the secant
+conductance is taken at the load of mid step, all is solved on logarithms, and what comes out is held within
+what the valve can do: a pin never goes farther than the flow under the largest load of the step takes it,
+nor deeper than the finger comes. A valve that is shut moves nothing, to the last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.contact import LARGEST_EXPONENT
+from ..model.physics import Cell
+from .closed_form import TINY, careful, crossed, not_zero
+
+__all__ = ["Strain", "Way", "loaded_way"]
+
+Floats = NDArray[np.float64]
+
+
+class Strain(NamedTuple):
+    """What a step finds, for k cells, (k,), or for k cells of b runs, (k, b).
+
+    Attributes
+    ----------
+    openings : ndarray (g, ..)
+        Of the valves, at the step's Gauss points.
+    weights : ndarray (g, 1) or (g, 1, b)
+        Of these points, over the piston's area, s/m².
+    exponent : ndarray
+        At the start of the step, see `closed_form`.
+    bow : ndarray
+        How far the way without load runs above a straight line on average, see `closed_form.crossed`.
+    finger_bow : ndarray
+        The finger's part in it, with its sign changed.
+    lift : ndarray
+        Rise of the finger, in 1/m.
+    relaxed : ndarray
+        exp(e) at which the pulp begins to push.
+    idle : ndarray of bool
+        Cells that it does not push at the start.
+    """
+
+    openings: Floats
+    weights: Floats
+    exponent: Floats
+    bow: Floats
+    finger_bow: Floats
+    lift: Floats
+    relaxed: Floats
+    idle: NDArray[np.bool_]
+
+
+class Way(NamedTuple):
+    """What comes of a step.
+
+    Attributes
+    ----------
+    rise : ndarray
+        Of the pin, m, but for its stops.
+    end : ndarray
+        Exponent at the end.
+    mean : ndarray
+        Mean of the tension over the step, in units of b/m.
+    """
+
+    rise: Floats
+    end: Floats
+    mean: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Valve:
+    """The flow through the valves of a step.
+
+    Attributes
+    ----------
+    cell : Cell
+    openings, weights : ndarray
+        See `Strain`.
+    pressure : ndarray
+        At the far side of the valve, Pa.
+    """
+
+    cell: Cell
+    openings: Floats
+    weights: Floats
+    pressure: Floats
+
+    def conductance(self, load: Floats) -> Floats:
+        """Return the secant conductance under a load, Pa, at each Gauss point."""
+        return self.cell.flow.conductance(self.openings, self.pressure - load)
+
+    def ways(self, load: Floats | float) -> Floats:
+        """Return what flows through each Gauss point's share of the step under a load, Pa, as a way, m."""
+        drop = self.pressure - load
+        ways: Floats = self.weights * (self.cell.flow.conductance(self.openings, drop) * drop)
+        return ways
+
+
+def loaded_way(cell: Cell, m: Floats | float, to_load: Floats | float, share: float, seen: Strain) -> Way:
+    """Return the way of cells over a step in which some of them are strained.
+
+    Parameters
+    ----------
+    cell : Cell
+    m : float or ndarray (b,)
+        The contact's exponent, 1/m.
+    to_load : float or ndarray (b,)
+        Pressure that a unit of tension makes, Pa.
+    share : float or ndarray (b,)
+        Share of the tension that pushes, the rest being lost to relaxation within the step.
+    seen : Strain
+    """
+    valve = _Valve(cell, seen.openings, seen.weights, cell.supply.pressure(seen.openings))
+    decay, free = _mid_load(valve, m, to_load * share, seen)
+    slip = m * free - seen.lift
+    exponent, idle = seen.exponent, seen.idle
+    bent = exponent + seen.bow
+    push, mean = _pressed(bent, slip, np.where(idle, TINY, decay), seen.relaxed)
+    push[idle] = 0.0
+    mean -= 1.0
+    crossing = (_grown(exponent + slip + push) <= seen.relaxed) != idle
+    if crossing.any():
+        parts = (values[crossing] for values in (exponent, seen.bow, slip, decay, seen.relaxed))
+        push[crossing], mean[crossing] = crossed(*parts)
+    rise = _within(valve, m, to_load, seen, free + push / m)
+    return Way(rise, exponent + (m * rise - seen.lift), mean)
+
+
+def _mid_load(
+    valve: _Valve, m: Floats | float, to_load: Floats | float, seen: Strain
+) -> tuple[Floats, Floats]:
+    """Return decay and free rise, m, with the secant conductance at the load of mid step.
+
+    It is predicted with the one at the start: second order, like the rest.
+    """
+    grown = middle = _grown(seen.exponent)
+    for _ in range(2):
+        conductance = valve.conductance(to_load * np.maximum(middle - seen.relaxed, 0.0))
+        decay = m * to_load * (valve.weights * conductance).sum(axis=0) + TINY
+        free = (valve.weights * (conductance * valve.pressure)).sum(axis=0)
+        slip = m * free - seen.lift
+        push, _ = _pressed(seen.exponent, slip, decay, seen.relaxed)
+        way = np.where(grown > seen.relaxed, slip + push, slip)
+        middle = 0.5 * (grown + _grown(seen.exponent + way))
+    return decay, free
+
+
+def _pressed(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
+    """Return the load's part of the way, and the mean of exp(e), of cells that stay under load."""
+    return careful(exponent, not_zero(slip + decay * relaxed), slip, decay, relaxed)
+
+
+def _within(valve: _Valve, m: Floats | float, to_load: Floats | float, seen: Strain, rise: Floats) -> Floats:
+    """Return a rise, m, held within what the valve can do.
+
+    Upwards that is the flow without load. Downwards it is the flow under the largest load there is; and no
+    finger pushes a pin deeper than it comes, what the pin falls by itself aside.
+    """
+    alone = valve.ways(0.0)
+    highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)
+    # Along the parabola of the finger's way, at its middle and its end.
+    middle = 0.5 * seen.lift + 1.5 * seen.finger_bow
+    deepest = np.maximum(seen.exponent - np.minimum(np.minimum(middle, seen.lift), 0.0), 0.0)
+    most = _grown(deepest + m * highest)
+    pushed = np.minimum(valve.ways(to_load * (most - 1.0)), 0.0).sum(axis=0)
+    lowest = np.maximum(pushed, fall - deepest / m)
+    return np.minimum(np.maximum(rise, lowest), highest)
+
+
+def _grown(exponent: Floats) -> Floats:
+    """Return exp(e), 1 where there is a gap."""
+    grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
+    return grown

@@ -1,0 +1,1 @@
+"""Series of sessions: sweeps, batches of jobs, budgets, trials."""

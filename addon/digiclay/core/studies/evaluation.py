@@ -1,0 +1,249 @@
+"""Evaluation of a sweep's points: batches, single runs, and their results."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from ..base.errors import DigiclayError, ParameterError, one_line
+from ..base.quantity import nearest
+from ..batch.packing import structure, why_not
+from ..batch.run_together import judge_of, judge_together
+from ..metrics.summary import METRICS
+from ..scene.schema import Scene
+from ..session.accuracy import estimate_errors, has_every_command
+from ..session.run_scene import Result, run
+from .axes import Point
+from .series import describe_error
+
+__all__ = [
+    "ERRORS", "FIGURES", "RUNS", "Bundles", "Record", "StackWarning", "evaluate", "evaluate_bundle",
+    "explain_failed_stacks", "find_figure", "make_bundles",
+]  # fmt: skip
+
+#: What is kept of a point: its ``figures``, or the ``error`` it ended in.
+Record = dict[str, Any]
+
+#: How exact a session is: unit and meaning. It is integrated once more for them, where they are asked for.
+ERRORS: dict[str, tuple[str, str]] = {
+    "height_error": ("m", "largest error of a pin's height, estimated"),
+    "force_error": ("N", "largest error of the force on a cell, estimated"),
+    "total_force_error": ("N", "largest error of the total force, estimated"),
+}
+#: What a session can be judged by: unit and meaning.
+FIGURES: dict[str, tuple[str, str]] = {
+    **{name: (known[0], known[1]) for name, known in METRICS.items()},
+    "simulated": ("s", "simulated time"),
+    "run_time": ("s", "time the simulation took"),
+    "real_time_factor": ("1", "simulated time over the time it took"),
+    **ERRORS,
+}
+#: Short names of figures.
+SHORT = {"lag": "lag_mean"}
+#: Fewer points than this are as quick one at a time.
+LEAST = 4
+#: From twice as many points on there are two stacks: a larger one gains little, and busies one core only.
+RUNS = 32
+#: Bytes a stack may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
+#: by unseen.
+BUDGET, BYTES_A_ROW = 2**30, 41
+#: Where a record says why its point was run by itself although it stood in a stack.
+ALONE = "alone"
+
+
+def find_figure(word: str) -> str:
+    """Return the name of a figure asked for, such as ``lag``.
+
+    Raises
+    ------
+    ParameterError
+        When there is none; the nearest is suggested.
+    """
+    name = SHORT.get(word, word)
+    if name in FIGURES:
+        return name
+    close = nearest(word, [*FIGURES, *SHORT])
+    hint = f"Did you mean {close}?" if close else f"Known: {', '.join(FIGURES)}."
+    raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
+
+
+@dataclass(frozen=True)
+class Bundles:
+    """The points of a sweep, in bundles that run at a time.
+
+    Attributes
+    ----------
+    stacks : tuple of tuple of Point
+        Of `LEAST` points or more.
+    alone : tuple of tuple of Point
+        Of one point each.
+    why : tuple of str
+        Why some run alone, one line a reason.
+    """
+
+    stacks: tuple[tuple[Point, ...], ...]
+    alone: tuple[tuple[Point, ...], ...]
+    why: tuple[str, ...]
+
+    def describe(self) -> list[str]:
+        """Return how the points run, as lines for a person."""
+        lines = []
+        if self.stacks:
+            count = sum(len(stack) for stack in self.stacks)
+            lines.append(f"{count} points run in {_count(len(self.stacks), 'stack')}")
+        return [*lines, *self.why]
+
+
+def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
+    """Put points of one structure together, as many as make a stack; in the order of the points.
+
+    Which stand together depends on the points alone, not on what is done already or how many
+    workers there are: the same sweep comes to the same results to the last bit.
+
+    Parameters
+    ----------
+    points : sequence of Point
+        All of the sweep.
+    errors : bool, optional
+        Whether errors are to be estimated: those that judge the points must then be of one structure too.
+    """
+    alike: dict[object, list[Point]] = {}
+    alone: list[Point] = []
+    why: Counter[str] = Counter()
+    for point in points:
+        reason = why_not(point.scene) if point.scene else ""
+        if point.scene is None or reason:
+            alone.append(point)
+            why.update([reason] if reason else [])
+            continue
+        try:
+            judge = structure(judge_of(point.scene)) if errors else None
+        except ParameterError:  # it is told when the point is run
+            alone.append(point)
+            continue
+        alike.setdefault((structure(point.scene), judge), []).append(point)
+    stacks: list[tuple[Point, ...]] = []
+    for group in alike.values():
+        most = _limit_runs(group[0].scene)
+        if min(len(group), most) < LEAST:
+            alone += group
+            few = len(group) < LEAST
+            why[
+                f"fewer than {LEAST} have the same bed, parts and steps"
+                if few
+                else "they have too many rows to keep for many at once"
+            ] += len(group)
+            continue
+        pieces = max(1, len(group) // RUNS, -(-len(group) // most))
+        edges = [len(group) * i // pieces for i in range(pieces + 1)]
+        stacks += [tuple(group[a:b]) for a, b in pairwise(edges)]
+    alone.sort(key=lambda point: point.index)
+    return Bundles(tuple(stacks), tuple((point,) for point in alone), _explain(why))
+
+
+def _limit_runs(scene: Scene | None) -> int:
+    """Return how many runs like this one may be in a stack."""
+    assert scene is not None
+    rows = scene.recorder.rows(scene.periods) if scene.recorder else 1
+    return BUDGET // (rows * BYTES_A_ROW)
+
+
+def _count(count: int, what: str) -> str:
+    """Say how many."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _explain(why: Mapping[str, int]) -> tuple[str, ...]:
+    """Return a line a reason for points that run one at a time; `why` counts them."""
+    return tuple(f"{_count(count, 'point')} one at a time: {reason}" for reason, count in why.items())
+
+
+def explain_failed_stacks(records: Mapping[int, Record]) -> tuple[str, ...]:
+    """Return a line a reason for points that were run one by one because their stack failed."""
+    return _explain(Counter(record[ALONE] for record in records.values() if record.get(ALONE)))
+
+
+def evaluate(
+    scene: Scene, stopped: Callable[[], bool] | None = None, *, errors: bool = False
+) -> Record | None:
+    """Run one point; return its record, None when it was stopped.
+
+    Parameters
+    ----------
+    scene : Scene
+    stopped : callable, optional
+        Asked after each control period.
+    errors : bool, optional
+        Estimate `ERRORS` too.
+    """
+    try:
+        result = run(scene, stopped=stopped)
+        if errors and result.history is not None and not result.incomplete and has_every_command(scene):
+            found = estimate_errors(scene, result.history, stopped=stopped)
+            if found is None:
+                return None
+            result = result.with_errors(found)
+    except Exception as error:  # whatever is wrong with one point, the others are worth having
+        return {"error": describe_error(error)}
+    return None if result.incomplete else _make_record(result, errors=errors)
+
+
+def _make_record(result: Result, *, errors: bool) -> Record:
+    """Return what is kept of a session that came to its end; `ERRORS` only where they were asked for."""
+    names = [name for name in FIGURES if errors or name not in ERRORS]
+    return {"figures": {name: result.metrics.get(name) for name in names}}
+
+
+class StackWarning(RuntimeWarning):
+    """A stack failed as a whole for a reason that is no user's to mend."""
+
+
+def evaluate_bundle(
+    bundle: Sequence[Point], stopped: Callable[[], bool] | None = None, *, errors: bool = False
+) -> list[Record | None]:
+    """Run a bundle; return the record of each of its points, None for one that was stopped.
+
+    When a stack fails as a whole, its points are run one by one, and each record says why under
+    ``alone``.
+
+    Parameters
+    ----------
+    bundle : sequence of Point
+        One, or several of one stack.
+    stopped, errors
+        As `evaluate` has them.
+
+    Warns
+    -----
+    StackWarning
+        When a stack failed neither for lack of memory nor by an error a user can cause.
+    """
+    scenes = [point.scene for point in bundle if point.scene]
+    if not scenes:  # values that do not go together are in no stack
+        return [{"error": point.error} for point in bundle]
+    records: list[Record | None] = [None] * len(scenes)
+    why = ""
+    if len(scenes) > 1:
+        try:
+            for number, result in judge_together(scenes, errors=errors, stopped=stopped):
+                if isinstance(result, DigiclayError):
+                    records[number] = {"error": one_line(result)}
+                else:
+                    records[number] = _make_record(result, errors=errors)
+        except MemoryError:
+            why = "there is not enough memory for a stack"
+        except Exception as error:  # each point meets it again by itself, and says what it is
+            why = describe_error(error)
+            if not isinstance(error, DigiclayError):
+                warnings.warn(f"A stack of {len(scenes)} runs failed: {why}", StackWarning, stacklevel=2)
+        if why:
+            records = [None] * len(scenes)
+    for number, scene in enumerate(scenes):
+        if records[number] is None and not (stopped and stopped()):
+            record = evaluate(scene, stopped, errors=errors)
+            records[number] = {**record, ALONE: why} if record and why else record
+    return records

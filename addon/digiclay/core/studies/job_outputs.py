@@ -1,0 +1,106 @@
+"""Outputs of a job's run: exports, stills, turntables and films; as a value, a table and a text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..base.errors import ParameterError
+from ..base.part_table import read_part, refuse_unknown, shown
+from ..base.quantity import Parameters, quantities
+from ..mesh_io.export_model import Model
+from ..session.render_settings import Film, Still, Turntable
+
+__all__ = ["KEYS", "Outputs", "outputs", "word"]
+
+#: Pictures a job can leave, by their section.
+PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
+#: Sections of a job.toml: what is exported, and the pictures.
+SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
+#: The keys of a job.toml.
+KEYS = ("export", "errors", *SECTIONS)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What is made of a run.
+
+    Attributes
+    ----------
+    export : tuple of str
+        Mesh formats.
+    mesh : Model
+        What is made of the final surface in these formats.
+    errors : bool
+        Whether the run's errors are estimated, which takes twice its time.
+    still, turntable, film
+        Pictures, where they are wanted.
+    """
+
+    export: tuple[str, ...] = ()
+    errors: bool = True
+    mesh: Model = field(default_factory=Model)
+    still: Still | None = None
+    turntable: Turntable | None = None
+    film: Film | None = None
+
+    @property
+    def drawn(self) -> bool:
+        """Whether any of it needs Blender."""
+        return any(getattr(self, section) for section in PICTURES)
+
+    def text(self) -> str:
+        """Return a job.toml that reads back as an equal value."""
+        lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
+        lines += [f"export = {word(list(self.export))}", f"errors = {word(self.errors)}"]
+        for section in SECTIONS:
+            part = getattr(self, section)
+            if part is None:
+                continue
+            lines.append(f"\n[{section}]")
+            for key, known in quantities(part).items():
+                note = f"{known.unit}: {known.doc}" if known.unit else known.doc
+                lines.append(f"{key} = {word(getattr(part, key))}  # {note}")
+        return "\n".join(lines) + "\n"
+
+
+def outputs(table: Mapping[str, Any]) -> Outputs:
+    """Read what is made of each run from a table of `KEYS`.
+
+    Raises
+    ------
+    ParameterError
+        Its owner is the section.
+    """
+    refuse_unknown("", table, KEYS)
+    export = table.get("export", [])
+    if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
+        raise ParameterError("export", "", 'must be a list of formats such as ["stl"]', shown(export))
+    if len(set(export)) < len(export):
+        raise ParameterError("export", "", "must not name a format twice", shown(export))
+    errors = table.get("errors", True)
+    if not isinstance(errors, bool):
+        raise ParameterError("errors", "", "must be true or false", shown(errors))
+    parts: dict[str, Any] = {}
+    for section, kind in SECTIONS.items():
+        if section not in table:
+            continue
+        own = table[section]
+        if not isinstance(own, dict):
+            raise ParameterError(section, "", f"must be a section, [{section}]", shown(own))
+        parts[section] = read_part(section, kind, {}, own)
+    return Outputs(tuple(export), errors, **parts)
+
+
+def word(value: Any) -> str:
+    """Write a value as TOML: a text, number, truth value, or a list of them."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(word, value))}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's; only TOML wants the delete character escaped as well.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

@@ -1,0 +1,201 @@
+"""Jobs of a JOBS file: scenes × methods × settings, each self-contained.
+
+A job's folder holds ``schema.toml``, every parameter of its session, and ``job.toml``, what is
+made of the run. Whoever has that folder and this package can do the job, on any machine.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import ParameterError, SceneError, one_line
+from ..base.part_table import refuse_unknown, shown
+from ..base.safe_names import name_of, unique_names
+from ..base.sample_file import found, named
+from ..control.methods import METHODS
+from ..model.layout import grid
+from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
+from ..scene.schema import Scene
+from ..shapes.height_text import packed
+from ..shapes.source_file import fitted_to
+from .job_outputs import KEYS, Outputs, outputs, word
+
+__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_outputs"]
+
+#: The files of a job.
+SCENE, JOB = "scene.toml", "job.toml"
+#: More jobs than this are a slip of the keyboard.
+MOST = 10_000
+#: Where the sample batches are.
+BATCHES = SAMPLES.parent / "batches"
+#: What decides which jobs there are; all other keys say what is made of each.
+WHICH = ("scenes", "methods", "settings")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One scene with one method and one setting.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    scene : Scene or None
+        None where the values do not go together; `error` says why.
+    """
+
+    name: str
+    scene: Scene | None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The jobs of a file, and what is made of each."""
+
+    name: str
+    jobs: tuple[Job, ...]
+    outputs: Outputs
+
+
+def batch(path: Path) -> Batch:
+    """Read a JOBS file.
+
+    Every scene is combined with every method and every setting. A combination whose values do
+    not go together makes a job with an error; what no job could have is refused.
+
+    Raises
+    ------
+    SceneError
+        One line: file, key, rule, value.
+    """
+    table = read_table(path)
+    try:
+        refuse_unknown("", table, (*WHICH, *KEYS))
+        made = outputs({key: table[key] for key in table if key not in WHICH})
+        words, methods, changes = _scenes(table), _methods(table), _settings(table)
+        count = len(words) * len(methods) * len(changes)
+        if count > MOST:
+            raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
+        files = [_found(path, said) for said in words]
+        for file in files:
+            load(file)  # what is wrong without any change is told of first
+        _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
+        _refuse_twice("methods", methods, methods)
+        parts = list(itertools.product(files, methods, changes.items()))
+        names = unique_names([_name(file, method, label) for file, method, (label, _) in parts])
+        jobs = tuple(_job(name, *part) for name, part in zip(names, parts, strict=True))
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+    return Batch(name_of(path), jobs, made)
+
+
+def find_jobs(said: str) -> Path:
+    """Return a JOBS file: a sample's name, or a file.
+
+    Raises
+    ------
+    SceneError
+        When there is none.
+    """
+    return found(said, named(BATCHES, ".toml"), "sample batch")
+
+
+def job_outputs(path: Path) -> Outputs:
+    """Read a ``job.toml``; SceneError says in one line what is wrong with it."""
+    try:
+        return outputs(read_table(path))
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def _scenes(table: Mapping[str, Any]) -> list[str]:
+    """Return what the file says its scenes are."""
+    words = table.get("scenes")
+    if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
+        value = "none" if words is None else shown(words)
+        raise ParameterError("scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value)
+    return words
+
+
+def _methods(table: Mapping[str, Any]) -> list[str]:
+    """Return the methods every scene is run with; an empty one is the scene's own."""
+    if "methods" not in table:
+        return [""]
+    methods = table["methods"]
+    if not isinstance(methods, list) or not methods:
+        raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', shown(methods))
+    for method in methods:
+        if not isinstance(method, str) or method not in METHODS:
+            raise ParameterError("methods", "", f"must be some of {', '.join(METHODS)}", shown(method))
+    return methods
+
+
+def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
+    """Return the settings by their labels; without any, one that changes nothing."""
+    if "settings" not in table:
+        return {"": []}
+    given = table["settings"]
+    if not isinstance(given, dict) or not given:
+        rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
+        raise ParameterError("settings", "", rule, shown(given))
+    found = {}
+    for label, changes in given.items():
+        if not isinstance(changes, dict):
+            rule = "must be a table such as { control.force_gain = 2 }"
+            raise ParameterError("settings", label, rule, shown(changes))
+        if not re.fullmatch(r"\w[\w.+-]*", label):
+            raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
+        option = f"settings.{label}"
+        found[label] = [Setting(key, word(value), option) for key, value in _flat(changes)]
+    return found
+
+
+def _flat(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    """Return the dotted keys of nested tables, and their values."""
+    pairs = []
+    for key, value in table.items():
+        dotted = f"{above}{key}"
+        pairs += _flat(value, f"{dotted}.") if isinstance(value, dict) else [(dotted, value)]
+    return pairs
+
+
+def _found(jobs: Path, said: str) -> Path:
+    """Return the file of a scene: beside the JOBS file, or as anywhere else."""
+    beside = jobs.parent / said
+    return find(str(beside)) if os.path.exists(beside) else find(said)
+
+
+def _name(file: Path, method: str, label: str) -> str:
+    """Return what a job is called by its parts."""
+    return "-".join(part for part in (name_of(file, SCENE), method, label) if part)
+
+
+def _job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
+    """Make one job."""
+    chosen = [Setting("control.method", word(method), "methods")] if method else []
+    try:
+        return Job(name, _alone(load(file, [*chosen, *setting[1]])))
+    except (SceneError, ParameterError) as error:
+        return Job(name, None, one_line(error))
+
+
+def _alone(scene: Scene) -> Scene:
+    """Return a scene with the heights of its shape in it, so that it needs no other file."""
+    if scene.shape is None or scene.shape.heights:
+        return scene
+    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
+
+
+def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:
+    """Refuse a list in which two words mean the same: it would make the same jobs twice."""
+    for place, one in enumerate(meant):
+        if one in meant[:place]:
+            raise ParameterError(key, "", "must not name one thing twice", f"{words[place]} twice")

@@ -1,0 +1,239 @@
+"""Omission of model parts within a budget of height error, tried and measured.
+
+Each omission is tried by itself, the controller acting on what it then sees, in step with the
+full scene. Those that fit are added one after another, the one that saves most work for its
+error first, and the whole is measured again each time: errors neither add nor cancel in a
+closed loop. What is kept in the end was measured as it is, with the error of its integration
+on top.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..engine.simulation import begin, periods
+from ..engine.system import System
+from ..scene.assembly import assemble
+from ..scene.recorder import Recorder
+from ..scene.schema import Scene
+from ..session.accuracy import estimate_errors
+from ..session.run_scene import run
+
+__all__ = ["Fitted", "Omission", "Tried", "fitted", "omissions"]
+
+#: Parts that can be left out, and what is said of it.
+PARTS = {
+    "conduit": "no conduit behind the valve",
+    "valve_lag": "valves that follow at once",
+    "delay": "no dead time",
+    "relaxation": "a fingertip that does not relax",
+    "sensors": "perfect sensors",
+}
+#: Those of them that own no row of the state a stepper works on.
+WITHOUT_ROWS = ("conduit", "sensors")
+#: Shares of the budget a cell may stay off its commanded height: it comes to rest earlier.
+BANDS = (0.5, 0.25)
+
+
+class Omission(NamedTuple):
+    """Something a scene can do without.
+
+    Attributes
+    ----------
+    kind : str
+        Of one kind only one can be left out.
+    said : str
+        What the scene then has.
+    leave_out : callable
+        Makes a scene without it.
+    """
+
+    kind: str
+    said: str
+    leave_out: Callable[[Scene], Scene]
+
+
+class Tried(NamedTuple):
+    """What leaving something out did.
+
+    Attributes
+    ----------
+    said : str
+    departure : float
+        Largest difference of a height from the full scene, m; infinite when the trial was
+        broken off because it left the budget.
+    work : float
+        Share of the full scene's work that is left; NaN when the trial was broken off.
+    kept : bool
+        Whether the scene does without it.
+    """
+
+    said: str
+    departure: float
+    work: float
+    kept: bool
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A scene that keeps to a budget.
+
+    Attributes
+    ----------
+    scene : Scene
+    budget, departure, own_error : float
+        What was allowed; the largest difference of a height from the full scene, the
+        controller acting on what it sees; and the estimated error of the integration. The
+        last two together are at most the first, m.
+    work : float
+        Share of the full scene's work that is left: cells times steps times the parts of a cell.
+    tried : tuple of Tried
+    """
+
+    scene: Scene
+    budget: float
+    departure: float
+    own_error: float
+    work: float
+    tried: tuple[Tried, ...]
+
+    @property
+    def error(self) -> float:
+        """What was then measured of the budget, m."""
+        return self.departure + self.own_error
+
+    @property
+    def left_out(self) -> list[str]:
+        """What the scene does without."""
+        return [one.said for one in self.tried if one.kept]
+
+
+def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
+    """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
+    simulation = scene.simulation
+    steps = simulation.steps
+    for fewer in range(1, steps):
+        if steps % fewer == 0:
+            step = simulation.control_period / fewer
+            said = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
+            yield Omission("steps", said, partial(_with_step, step=step))
+    for section, said in PARTS.items():
+        if getattr(scene, section) is not None:
+            yield Omission(section, said, partial(_without, section=section))
+    for band in (share * budget for share in BANDS):
+        if getattr(scene.control, "dead_band", math.inf) < band:
+            said = f"cells left alone within {band * 1e6:g} µm of their height"
+            yield Omission("cells", said, partial(_with_dead_band, band=band))
+
+
+def fitted(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
+    """Leave out of a scene what its results can do without.
+
+    Parameters
+    ----------
+    scene : Scene
+        The full model.
+    budget : float
+        Largest error of any height at any time, m: difference from the full model, and error of
+        the integration.
+    told : callable, optional
+        Told what is tried, before it is.
+
+    Raises
+    ------
+    ParameterError
+        When the budget is not above 0, or below the error of the full scene's own integration.
+    """
+    if not (math.isfinite(budget) and budget > 0.0):
+        raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
+    say = told or (lambda said: None)
+    say("the full scene")
+    own = _own_error(scene)
+    if own > budget:
+        hint = "Allow more, or take a shorter simulation.physics_step or the stepper 'richardson'."
+        rule = f"must be at least the error of the full scene's own integration, {own * 1e6:.2g} µm"
+        raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm", hint)
+    alone: list[tuple[Omission, Tried]] = []
+    for one in omissions(scene, budget):
+        say(one.said)
+        alone.append((one, Tried(one.said, *_departure(scene, one.leave_out(scene), budget), False)))
+    fits = [pair for pair in alone if pair[1].departure <= budget and pair[1].work < 1.0]
+    fits.sort(key=lambda pair: -(1.0 - pair[1].work) / (pair[1].departure + 1e-3 * budget))
+    best = Fitted(scene, budget, 0.0, own, 1.0, tuple(tried for _, tried in alone))
+    taken: list[Omission] = []
+    for one, _ in fits:
+        if any(one.kind == other.kind for other in taken):
+            continue
+        say(" + ".join(["together", one.said]))
+        less = one.leave_out(best.scene)
+        departure, work = _departure(scene, less, budget)
+        if departure > budget or work >= best.work:
+            continue
+        own = _own_error(less)
+        if departure + own <= budget:
+            taken.append(one)
+            best = replace(best, scene=less, departure=departure, own_error=own, work=work)
+    kept = {one.said for one in taken}
+    return replace(best, tried=tuple(one._replace(kept=one.said in kept) for one in best.tried))
+
+
+def _without(scene: Scene, section: str) -> Scene:
+    """Leave out a part."""
+    left: dict[str, Any] = {section: None}
+    return replace(scene, **left)
+
+
+def _with_step(scene: Scene, step: float) -> Scene:
+    """Integrate in longer steps."""
+    return replace(scene, simulation=replace(scene.simulation, physics_step=step))
+
+
+def _with_dead_band(scene: Scene, band: float) -> Scene:
+    """Let cells come to rest further from their commanded height."""
+    assert scene.control is not None
+    return replace(scene, control=replace(scene.control, dead_band=band))  # type: ignore[call-arg]
+
+
+def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
+    """Run two scenes in step.
+
+    Returns
+    -------
+    departure : float
+        Largest difference of a height, m; infinite as soon as it is beyond the budget.
+    work : float
+        Work of the second as a share of the first's.
+    """
+    apart, done = 0.0, np.zeros(2)
+    pair = [assemble(full), assemble(less)]
+    runs = (periods(one, full.trajectory.trajectory(), begin(one), full.periods) for one in pair)
+    weights = [_weight(scene, system) for scene, system in zip((full, less), pair, strict=True)]
+    for both in zip(*runs, strict=True):
+        done += [each * state.gathered.cells.size for each, state in zip(weights, both, strict=True)]
+        apart = max(apart, float(np.abs(both[0].row(0) - both[1].row(0)).max()))
+        if apart > budget:
+            return math.inf, math.nan
+    return apart, float(done[1] / done[0]) if done[0] else 1.0
+
+
+def _weight(scene: Scene, system: System) -> int:
+    """Return the work of a cell in a control period: steps times state rows, and parts that own no row."""
+    rows: int = system.rows.driven.stop + sum(getattr(scene, part) is not None for part in WITHOUT_ROWS)
+    return rows * scene.simulation.steps
+
+
+def _own_error(scene: Scene) -> float:
+    """Estimate how far the integration of a scene is from the exact solution, m of height."""
+    recorded = replace(scene, recorder=Recorder())
+    history = run(recorded).history
+    assert history is not None
+    errors = estimate_errors(recorded, history)
+    assert errors is not None
+    return errors.height

@@ -1,0 +1,197 @@
+"""Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
+
+Its folder is made once, gone on with after a stop, and worked in by one process at a time. What is left
+of its pieces is done by an executor; each is kept as soon as it is done.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, TypeVar
+
+from ..base.errors import DigiclayError, OutputError, one_line
+from ..base.file_lock import held
+from ..base.run_folder import busy, inside, lock_beside
+from ..base.unfinished import is_unfinished, remove_abandoned
+from ..base.whole_files import as_json, read_json, write_whole
+
+__all__ = ["Kind", "describe_error", "finish", "open_series"]
+
+#: The lock of whoever works in the folder.
+LOCK = ".lock"
+#: Seconds between two looks at whether somebody asked to stop.
+PAUSE = 0.1
+
+Piece = TypeVar("Piece")
+Outcome = TypeVar("Outcome")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a series is called, the file by which its folder is known, and the folders in it."""
+
+    name: str
+    mark: str
+    folders: Sequence[str]
+
+
+@contextmanager
+def open_series(
+    path: Path,
+    kind: Kind,
+    description: Mapping[str, Any],
+    refuse_another: Callable[[Any], None] | None = None,
+) -> Iterator[None]:
+    """Make a series' folder, or go on with one; nobody else may work in it until the block ends.
+
+    A description that cannot be read counts as none where nothing has been done: the disk was full.
+
+    Parameters
+    ----------
+    path : Path
+    kind : Kind
+    description : mapping
+        What is written to the file `kind.mark`.
+    refuse_another : callable, optional
+        Told the description that is there, None where it cannot be read; raises OutputError when the
+        folder cannot be gone on with. By default any of this kind can.
+
+    Raises
+    ------
+    OutputError
+        When it holds other things, cannot be written, leads elsewhere, or somebody else works in it.
+    """
+    with ExitStack() as until_the_end:
+        with ExitStack() as while_it_is_made:
+            try:
+                _make_folder(path, kind, while_it_is_made, until_the_end)
+                there = read_json(path / kind.mark)
+                if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
+                    refuse_another(there)
+                if there != description:
+                    write_whole(path / kind.mark, as_json(description))
+                for name in kind.folders:
+                    inside(path, name).mkdir(exist_ok=True)
+                    remove_abandoned(path / name)
+                remove_abandoned(path)
+            except OSError as error:
+                raise OutputError(f"{path} cannot be used: {error.strerror or error}.") from None
+        yield
+
+
+def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_end: ExitStack) -> None:
+    """Make the folder, if there is none, and lock it."""
+    if path.exists() and not path.is_dir():
+        raise OutputError(f"{path} is a file: choose another folder with --out.")
+    above = [folder for folder in (path, *path.resolve().parents) if not folder.exists()]
+    if not path.exists() or os.access(path.resolve().parent, os.W_OK):
+        # A run of this name cannot end in between, nor one begin.
+        while_it_is_made.enter_context(held(lock_beside(path), busy(path, "being written")))
+    for folder in reversed(above):  # the innermost goes first
+        until_the_end.callback(_remove_empty, folder)
+    path.mkdir(parents=True, exist_ok=True)
+    if any(path.iterdir()) and not _is_ours(path, kind):
+        raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
+    until_the_end.enter_context(held(path / LOCK, busy(path, "being worked in")))
+
+
+def _remove_empty(folder: Path) -> None:
+    """Take away a folder that nothing was written into."""
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _is_ours(path: Path, kind: Kind) -> bool:
+    """Tell whether a folder is of this kind, or is left of one that did not come so far."""
+    return (path / kind.mark).is_file() or _is_bare(path, kind)
+
+
+def _is_bare(path: Path, kind: Kind) -> bool:
+    """Tell whether nothing has been done in a folder: there is but the frame of a series."""
+    for found in path.iterdir():
+        frame = found.name in (LOCK, kind.mark) or is_unfinished(found)
+        if not frame and not (found.name in kind.folders and found.is_dir() and not any(found.iterdir())):
+            return False
+    return True
+
+
+def finish(
+    executor: Executor,
+    task: Callable[[Any], Outcome],
+    pieces: Iterable[tuple[Piece, Any]],
+    keep: Callable[[Piece, Outcome], None],
+    fail: Callable[[Piece, str], None],
+    *,
+    stopped: Callable[[], bool],
+) -> None:
+    """Have an executor do what is left of a series.
+
+    Results come back by value: who does the work needs nothing of this machine.
+
+    Parameters
+    ----------
+    executor : Executor
+        Any.
+    task : callable
+        What it runs, in a form it can hand on.
+    pieces : iterable of tuple
+        Each piece, and the argument that the task gets for it.
+    keep : callable
+        Told of each piece that is done, and of what the task returned.
+    fail : callable
+        Told of each piece for which the task raised an error, and of that error in one line.
+    stopped : callable
+        Asked all the time; after a stop nothing more is begun, and what runs is waited for.
+
+    Raises
+    ------
+    OutputError
+        When the executor itself breaks down.
+    """
+    arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
+    waiting: dict[Future[Outcome], Piece] = {}
+    try:
+        for piece, argument in pieces:
+            future = executor.submit(task, argument)
+            waiting[future] = piece
+            future.add_done_callback(arrived.put)
+        while waiting:
+            if stopped():
+                for future in waiting:
+                    future.cancel()
+            try:
+                future = arrived.get(timeout=PAUSE)
+            except Empty:
+                continue
+            piece = waiting.pop(future)
+            if future.cancelled():
+                continue
+            try:
+                outcome = future.result()
+            except BrokenExecutor:
+                raise
+            except Exception as error:  # the other pieces are worth having
+                fail(piece, describe_error(error))
+            else:
+                keep(piece, outcome)
+    except BrokenExecutor:
+        rule = "A worker died, perhaps for lack of memory; what was done is kept."
+        raise OutputError(f"{rule} Run the same again with fewer --workers.") from None
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def describe_error(error: Exception) -> str:
+    """Return in one line what went wrong; an error that no user can cause is named by its kind."""
+    if isinstance(error, DigiclayError):
+        return one_line(error)
+    if isinstance(error, MemoryError):
+        return "There is not enough memory."
+    return f"{type(error).__name__}: {one_line(error)}"

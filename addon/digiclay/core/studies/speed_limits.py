@@ -1,0 +1,215 @@
+"""Largest tracking speed of a control method: a straight drag or a lift, with a bisection on its speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+from ..metrics.finger_path import lag, sum_cells
+from ..metrics.force import rfd
+from ..model.set_point import asked
+from ..scene.schema import Path, Scene, Waypoint
+from .trials import Trial, trial
+
+__all__ = ["Criterion", "Drag", "Follows", "Lift", "followed", "largest", "largest_speed"]
+
+#: How long the finger rests at the ends of a phase, s.
+REST = 0.3
+
+
+@dataclass(frozen=True)
+class Criterion(Parameters):
+    """When a finger counts as followed: never lost, always touched, its blister near, its force near."""
+
+    lag: float = quantity(3e-3, "largest lag of the blister, a pitch", unit="m", above=0.0)
+    deviation: float = quantity(0.2, "largest RFD, half of Method I's set point", unit="N", above=0.0)
+
+    def __str__(self) -> str:
+        return (
+            "the finger is never lost and never without contact, its lag stays below "
+            f"{self.lag * 1e3:g} mm, the RFD below {self.deviation:g} N"
+        )
+
+
+@dataclass(frozen=True)
+class Follows:
+    """How well a finger was followed in the judged part of a trial.
+
+    Attributes
+    ----------
+    speed : float
+        m/s.
+    losses : int
+        How often it was lost.
+    loss_share : float
+        Share of the time without contact.
+    lag : float
+        Largest distance of the blister, m; infinite without contact.
+    rfd : float
+        N, over all rows that ask for a force, those without contact too.
+    """
+
+    speed: float
+    losses: int
+    loss_share: float
+    lag: float
+    rfd: float
+
+    def meets(self, criterion: Criterion) -> bool:
+        """Tell whether this counts as followed."""
+        held = self.losses == 0 and self.loss_share == 0.0
+        return held and self.lag < criterion.lag and self.rfd < criterion.deviation
+
+
+@dataclass(frozen=True)
+class Drag(Parameters):
+    """Press, raise or sink a blister, then drag it level and straight along x."""
+
+    press: float = quantity(4.5e-3, "how deep the first press goes", unit="m", above=0.0)
+    height: float = quantity(
+        13.5e-3, "finger above the bed at rest while it drags; below 0: into it", unit="m"
+    )
+    approach: float = quantity(3e-3, "speed up or down to that height", unit="m/s", above=0.0)
+    length: float = quantity(42e-3, "how far it drags", unit="m", above=0.0)
+
+    def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
+        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
+        left, right, down, level = (
+            -0.5 * self.length,
+            0.5 * self.length,
+            rest - self.press,
+            rest + self.height,
+        )
+        start = 1.3 + max(abs(level - down) / self.approach, REST) + REST
+        end = start + self.length / speed
+        points = (
+            (0.0, left, rest + 1e-3),
+            (1.0, left, down),
+            (1.3, left, down),
+            (start - REST, left, level),
+            (start, left, level),
+            (end, right, level),
+            (end + REST, right, level),
+        )
+        return _through(points, "linear"), start, end
+
+
+@dataclass(frozen=True)
+class Lift(Parameters):
+    """Press, then lift straight up, gently at first and at last; its speed is the greatest on the way."""
+
+    press: float = quantity(4.5e-3, "how deep the first press goes", unit="m", above=0.0)
+    rise: float = quantity(18e-3, "how far it lifts", unit="m", above=0.0)
+
+    def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
+        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
+        down, start = rest - self.press, 2.0
+        # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
+        end = start + 1.5 * self.rise / speed
+        points = (
+            (0.0, 0.0, rest + 1e-3),
+            (1.0, 0.0, down),
+            (start, 0.0, down),
+            (end, 0.0, down + self.rise),
+            (end + REST, 0.0, down + self.rise),
+        )
+        return _through(points, "smooth"), start, end
+
+
+def _through(points: tuple[tuple[float, float, float], ...], interpolation: str) -> Path:
+    """Return a path through times, s, and x and z, m."""
+    return Path(interpolation, tuple(Waypoint(time=t, position=(x, 0.0, z)) for t, x, z in points))
+
+
+def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Trial]:
+    """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it."""
+    _refuse_small(scene, way)
+    path, start, end = way.path(speed, scene.actuator.rest_height)
+    shorter = replace(scene.simulation, duration=0.0)
+    done = trial(replace(scene, trajectory=path, simulation=shorter))
+    part = done.between(start, end)
+    sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
+    behind, wanted = lag(sums, part["fingertip"]), asked(scene.set_point, sums.following)
+    deviates = rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
+    losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
+    judged = Follows(
+        speed,
+        losses,
+        float(np.mean(total <= 0.0)),
+        float(behind.max()) if len(behind) else float("inf"),
+        float("inf") if deviates is None else deviates,
+    )
+    return judged, done
+
+
+def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
+    """Refuse a bed the finger would leave."""
+    needed = way.length if isinstance(way, Drag) else 0.0
+    wide = (scene.layout.columns - 1) * scene.layout.pitch
+    if wide < needed:
+        rule = f"must make the bed at least as wide as the drag, {needed:g} m"
+        raise ParameterError("layout", "columns", rule, f"{wide:g} m")
+
+
+def largest(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
+    """Return the largest value known to hold, to within a resolution, by bisection.
+
+    Parameters
+    ----------
+    holds : callable
+        Whether a value holds; up to some value it does, beyond it does not.
+    low, high : float
+        Where to look.
+    resolution : float
+        Above 0.
+
+    Returns
+    -------
+    float or None
+        A value that held; `high` if that does; None if `low` does not.
+    """
+    if not holds(low):
+        return None
+    if holds(high):
+        return high
+    while high - low > resolution:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def largest_speed(
+    scene: Scene,
+    way: Drag | Lift,
+    criterion: Criterion,
+    *,
+    low: float = 2e-3,
+    high: float = 40e-3,
+    resolution: float = 0.5e-3,
+    told: Callable[[Follows], None] | None = None,
+) -> float | None:
+    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `largest`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its device and method; its trajectory is left aside.
+    way : Drag or Lift
+    criterion : Criterion
+    low, high, resolution : float
+        m/s.
+    told : callable, optional
+        Told of every speed tried.
+    """
+
+    def holds(speed: float) -> bool:
+        judged, _ = followed(scene, way, speed)
+        if told:
+            told(judged)
+        return judged.meets(criterion)
+
+    return largest(holds, low, high, resolution)

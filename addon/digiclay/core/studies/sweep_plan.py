@@ -1,0 +1,134 @@
+"""Folder of a sweep: its definition, one small file a finished point, and the table of all."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import OutputError
+from ..base.whole_files import as_json, read_json, write_whole
+from ..scene.toml_table import text
+from .axes import Axis, Column, Point
+from .evaluation import FIGURES, Record
+from .series import Kind, open_series
+
+__all__ = ["MARK", "Folder", "format_table", "make_grid", "open_sweep"]
+
+#: The file by which a folder is known as a sweep's, and the folder of its points.
+MARK, POINTS = "sweep.json", "points"
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Where a sweep is kept."""
+
+    path: Path
+
+    def read_records(self) -> dict[int, Record]:
+        """Return what is kept of the finished points, by their index."""
+        records = {}
+        for path in self.path.glob(f"{POINTS}/*.json"):
+            record = read_json(path)  # a file that cannot be read is a point to be done again
+            if path.stem.isdecimal() and record is not None and record.keys() & {"figures", "error"}:
+                records[int(path.stem)] = record
+        return records
+
+    def keep(self, point: Point, axes: Sequence[Axis], record: Record) -> None:
+        """Write the file of a finished point, whole or not at all."""
+        values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
+        write_whole(self.path / POINTS / f"{point.index:06d}.json", as_json({"values": values, **record}))
+
+
+@contextmanager
+def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str) -> Iterator[Folder]:
+    """Make a sweep's folder, or go on with one that holds the same sweep; nobody else works in it meanwhile.
+
+    Parameters
+    ----------
+    path : Path
+    points : sequence of Point
+        All of the sweep.
+    axes : sequence of Axis
+    version : str
+        Of digiclay: another one may come to other figures.
+
+    Raises
+    ------
+    OutputError
+        When it holds anything else, cannot be written, or another process works in it.
+    """
+    identity = hashlib.sha256(version.encode())
+    for point in points:
+        identity.update((text(point.scene) if point.scene else point.error).encode())
+    description = {
+        "digiclay": version,
+        "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
+        "points": len(points),
+        "identity": identity.hexdigest(),
+    }
+
+    def refuse_another(there: Any) -> None:
+        if there == description:
+            return
+        try:
+            varied = " and ".join(one["key"] for one in there["axes"])
+            said = f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
+        except (KeyError, TypeError):
+            said = f"its {MARK} cannot be read"
+        raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
+
+    with open_series(path, Kind("sweep", MARK, (POINTS,)), description, refuse_another):
+        yield Folder(path)
+
+
+def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
+    """Return a figure at all points, one dimension an axis; NaN where there is none.
+
+    Parameters
+    ----------
+    records : mapping of int to Record
+        By the index of their point.
+    axes : sequence of Axis
+    name : str
+        A key of `evaluation.FIGURES`.
+    """
+    shape = [len(one.words) for one in axes]
+    values = np.full(int(np.prod(shape)), np.nan)
+    for index, record in records.items():
+        value = record.get("figures", {}).get(name)
+        values[index] = np.nan if value is None else value
+    return values.reshape(shape)
+
+
+def format_table(columns: Sequence[Column], records: Mapping[int, Record], names: Sequence[str]) -> str:
+    """Return the sweep as CSV: the axes, the figures asked for, and the error; SI units, in the header.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+    records : mapping of int to Record
+        Of every point, by its index.
+    names : sequence of str
+        Keys of `evaluation.FIGURES`.
+    """
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    units = [(one.key, one.unit) for one in columns] + [(name, FIGURES[name][0]) for name in names]
+    writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
+    for values, (_, record) in zip(
+        itertools.product(*(one.values for one in columns)), sorted(records.items()), strict=True
+    ):
+        figures = record.get("figures", {})
+        written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
+        writer.writerow([*values, *written, record.get("error", "")])
+    return lines.getvalue()

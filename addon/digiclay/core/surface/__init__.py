@@ -1,0 +1,1 @@
+"""Formed surfaces: skins over the pins, solids, bosses and creases."""

@@ -1,0 +1,239 @@
+"""Network of a skeleton: branches between ends and junctions, and the crests they form.
+
+A branch that does not reach out of the flank it stands on is none. At a junction the branches go on into each
+other where they do so straightest: a cross is two lines, and the third branch of a T ends at the other two.
+Where two lines run together for a short way, as in an eight of two circles, both take that way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .branches import Branch, End, Network, length_of, read
+
+__all__ = ["Chain", "chains", "reaches_out"]
+
+Floats = NDArray[np.float64]
+Pins = NDArray[np.int64]
+
+#: A free branch is shorter than this many half widths when it is only the flank.
+FLANK = 1.5
+#: Branches go on into each other when the cosine between their ways is above this: 66 degrees.
+STRAIGHT = 0.4
+#: Two lines run together for this many widths at most.
+TOGETHER = 3.0
+#: A line runs straight through a junction, from so many half widths before it to as many after it.
+THROUGH = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A line from pin to pin.
+
+    Attributes
+    ----------
+    points : ndarray (m, 2)
+        m; the first again at the end of a closed one.
+    closed : bool
+    joined : (bool, bool)
+        Whether the first and the last point are at a junction with another line.
+    nodes : frozenset of int
+        Junctions with other lines that it runs through, or ends at.
+    """
+
+    points: Floats
+    closed: bool
+    joined: tuple[bool, bool]
+    nodes: frozenset[int]
+
+
+def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) -> list[Chain]:
+    """Return the lines of a skeleton.
+
+    Parameters
+    ----------
+    beside : ndarray of int (k, 8 or 6)
+        Neighbours of all pins of the feature, -1 where there is none.
+    pins : ndarray of int (s,)
+        Those of the skeleton.
+    place : ndarray (k, 2)
+        m.
+    half : ndarray (s,)
+        Half the width of the feature at each pin of the skeleton, m.
+    pitch : float
+        m.
+    """
+    network = read(beside, pins, place, half)
+    _merge(network)
+    _open_small_loops(network)
+    _prune(network, pitch)
+    junctions = frozenset(node for node in range(len(network.place)) if len(network.ends(node)) > 2)
+    return list(_assembled(network, _joints(network), junctions))
+
+
+def reaches_out(points: Floats, half: float, pitch: float) -> bool:
+    """Tell whether a free branch is longer than the flank of the line it stands on.
+
+    Parameters
+    ----------
+    points : ndarray (m, 2)
+        Of the branch, m.
+    half : float
+        Half the width of the line it stands on, m.
+    pitch : float
+        m.
+    """
+    return length_of(points) > FLANK * half + 0.5 * pitch
+
+
+def _merge(network: Network) -> None:
+    """Make one junction of two that are no further apart than half the feature's width."""
+    merged = True
+    while merged:
+        merged = False
+        for number, branch in list(network.branches.items()):
+            one, two = branch.nodes
+            if one == two or min(len(network.ends(one)), len(network.ends(two))) < 3:
+                continue
+            if branch.length > max(network.half[one], network.half[two]):
+                continue
+            del network.branches[number]
+            network.place[one] = 0.5 * (network.place[one] + network.place[two])
+            network.half[one] = max(network.half[one], network.half[two])
+            for other in network.branches.values():
+                for end in (0, 1):
+                    if other.nodes[end] in (one, two):
+                        other.nodes[end] = one
+                        other.points = other.points.copy()
+                        other.points[-end] = network.place[one]
+            merged = True
+            break
+
+
+def _open_small_loops(network: Network) -> None:
+    """Take off what closes a loop that is smaller than the line it is in is wide."""
+    for number, branch in list(network.branches.items()):
+        one, two = branch.nodes
+        others = [k for k, b in network.branches.items() if k != number and set(b.nodes) == {one, two}]
+        about = 2.0 * np.pi * max(network.half[one], network.half[two])
+        if one == two:
+            small = branch.length < about
+        else:
+            small = any(network.branches[k].length + branch.length < about for k in others)
+        if small:
+            del network.branches[number]
+
+
+def _prune(network: Network, pitch: float) -> None:
+    """Take off free branches that are only the flank, the shortest first."""
+    while True:
+        _join_through(network)
+        short = []
+        for number, branch in network.branches.items():
+            for free, node in (branch.nodes, branch.nodes[::-1]):
+                at_junction = len(network.ends(free)) == 1 and len(network.ends(node)) > 2
+                if at_junction and not reaches_out(branch.points, network.half[node], pitch):
+                    short.append((branch.length, number))
+        if not short:
+            return
+        del network.branches[min(short)[1]]
+
+
+def _join_through(network: Network) -> None:
+    """Make one branch of two that meet where no other does."""
+    for node in range(len(network.place)):
+        ends = network.ends(node)
+        if len(ends) == 2 and ends[0][0] != ends[1][0]:
+            one, two = ends
+            points = np.concatenate([network.away(one)[::-1], network.away(two)[1:]])
+            nodes = [network.branches[k].nodes[1 - e] for k, e in ends]
+            del network.branches[two[0]]
+            network.branches[one[0]] = Branch(nodes, points)
+
+
+def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
+    """Return which end of a branch goes on into which, and the points in between."""
+    joints: dict[End, tuple[End, Floats]] = {}
+    nothing = np.empty((0, 2))
+    for number in list(network.branches):
+        _share(network, number, joints)
+    for node in range(len(network.place)):
+        ends = [end for end in network.ends(node) if end not in joints]
+        if len(ends) == 2 and len(network.ends(node)) == 2:
+            joints[ends[0]], joints[ends[1]] = (ends[1], nothing), (ends[0], nothing)
+            continue
+        ways = {end: network.way(end) for end in ends}
+        pairs = sorted((float(ways[a] @ ways[b]), a, b) for a, b in combinations(ends, 2))
+        for cosine, a, b in pairs:
+            if cosine < -STRAIGHT and a not in joints and b not in joints:
+                joints[a], joints[b] = (b, nothing), (a, nothing)
+    return joints
+
+
+def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]]) -> None:
+    """Let two lines run together along a branch when two at each of its ends go on into it."""
+    branch = network.branches[number]
+    one, two = branch.nodes
+    if one == two or branch.length > TOGETHER * 2.0 * max(network.half[one], network.half[two]):
+        return
+    sides = [[end for end in network.ends(node) if end[0] != number] for node in (one, two)]
+    if [len(side) for side in sides] != [2, 2] or any(end in joints for side in sides for end in side):
+        return
+    ways = [[network.way(end) for end in side] for side in sides]
+    for k in (0, 1):
+        if any(float(way @ network.way((number, k))) > -STRAIGHT for way in ways[k]):
+            return
+    cosines = {
+        order: sum(float(ways[0][k] @ ways[1][order[k]]) for k in (0, 1)) for order in permutations((0, 1))
+    }
+    order = min(cosines, key=lambda known: cosines[known])
+    for k in (0, 1):
+        a, b = sides[0][k], sides[1][order[k]]
+        joints[a], joints[b] = (b, branch.points), (a, branch.points[::-1])
+    del network.branches[number]
+
+
+def _assembled(
+    network: Network, joints: dict[End, tuple[End, Floats]], junctions: frozenset[int]
+) -> Iterable[Chain]:
+    """Give the lines that the branches make."""
+    free = [(k, e) for k in network.branches for e in (0, 1) if (k, e) not in joints]
+    used: set[int] = set()
+    for start in [*free, *((k, 0) for k in network.branches)]:
+        if start[0] in used:
+            continue
+        parts, end = [], start
+        nodes: set[int] = set()
+        while True:
+            used.add(end[0])
+            nodes.update(network.branches[end[0]].nodes)
+            parts.append(_without_nodes(network, end, joints))
+            last = (end[0], 1 - end[1])
+            if last not in joints or joints[last][0][0] in used:
+                break
+            end, between = joints[last]
+            parts.append(between)
+        closed = start in joints
+        if closed:
+            parts += [joints[last][1], parts[0][:1]]
+        joined = [len(network.ends(network.branches[k].nodes[e])) > 1 for k, e in (start, last)]
+        yield Chain(np.concatenate(parts), closed, (joined[0], joined[1]), junctions & nodes)
+
+
+def _without_nodes(network: Network, end: End, joints: dict[End, tuple[End, Floats]]) -> Floats:
+    """Return the points of a branch from one end on, without those in the junctions it runs through."""
+    points, branch = network.away(end), network.branches[end[0]]
+    kept = np.ones(len(points), bool)
+    for k in (0, 1):
+        node = branch.nodes[k]
+        if (end[0], k) in joints and len(network.ends(node)) > 2:
+            kept &= np.hypot(*(points - network.place[node]).T) > THROUGH * network.half[node]
+    middle = len(points) // 2
+    kept[middle] |= not kept.any()
+    left: Floats = points[kept]
+    return left

@@ -1,0 +1,206 @@
+"""Features of a formed surface: bosses and creases, found, measured and named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.quantity import Parameters, quantity
+from .crests import ridges
+from .feature_parts import Part, nearest, parts
+from .pin_lattice import Lattice
+from .regions import Region, components, cut, divided
+from .sheet import Sheet
+
+__all__ = ["Feature", "Finding", "find", "summary", "table"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Finding(Parameters):
+    """What counts as a feature."""
+
+    threshold: float = quantity(
+        0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", at_least=1e-6
+    )
+    smallest: int = quantity(3, "pins a feature has at least", at_least=1)
+
+
+#: What a person calls a feature, by its kind: with one crest, without, and without but flat.
+FORMS = {"boss": ("ridge", "mound", "plateau"), "crease": ("valley", "hollow", "basin")}
+#: A top is flat when more than half of what is above half its height is above this share of it.
+FLAT = 0.9
+#: Saddles and mounds count from so many thresholds on.
+DEEP = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A boss or a crease: a part of the skin more than the threshold off its former place.
+
+    Attributes
+    ----------
+    kind : {"boss", "crease"}
+    number : int
+        1 is the largest of its kind.
+    pins : ndarray of int (k,)
+        The pins in it, ascending.
+    region : Region
+        The part of the skin.
+    extreme : float
+        Largest height of a boss, or depth of a crease, off the former surface, m.
+    crests : tuple of ndarray (p, 3)
+        The lines along its top, or its bottom, m; the longest first. A closed one ends where it begins.
+    flat : bool
+        Whether most of its top is level.
+    """
+
+    kind: str
+    number: int
+    pins: NDArray[np.int64]
+    region: Region
+    extreme: float
+    crests: tuple[Floats, ...]
+    flat: bool
+
+    @property
+    def form(self) -> str:
+        """What a person calls it: ridge, mound, plateau; valley, hollow, basin; ring; or several of them."""
+        line, top, plain = FORMS[self.kind]
+        if not self.crests:
+            return plain if self.flat else top
+        if len(self.crests) > 1:
+            return f"{len(self.crests)} {line}s"
+        return "ring" if np.array_equal(self.crests[0][0], self.crests[0][-1]) else line
+
+    @property
+    def name(self) -> str:
+        """The name it has in files and in Blender."""
+        return f"{self.kind}_{self.number}"
+
+    @property
+    def area(self) -> float:
+        """Area in plan, m²."""
+        return self.region.area
+
+    @property
+    def volume(self) -> float:
+        """Volume between the surface now and before, m³."""
+        return self.region.volume
+
+    @property
+    def crest_length(self) -> float:
+        """Length of all crest lines, in space, m."""
+        return float(sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in self.crests))
+
+    def figures(self) -> dict[str, object]:
+        """Return what is listed of it, in SI units."""
+        return {
+            "name": self.name, "kind": self.kind, "form": self.form, "pins": self.pins.tolist(),
+            "area": self.area,
+            "height" if self.kind == "boss" else "depth": self.extreme, "volume": self.volume,
+            "crest_length": self.crest_length, "crests": [line.tolist() for line in self.crests],
+        }  # fmt: skip
+
+
+def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
+    """Return the features of a skin: bosses, then creases, the largest of each first.
+
+    Points belong together that the skin's triangles join; so two bosses that only touch at
+    the threshold are two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    finding : Finding, optional
+        Thresholds; by default its own defaults.
+    """
+    finding = finding or Finding()
+    lattice = Lattice.of(sheet.formed)
+    found = []
+    for kind, sign in (("boss", 1.0), ("crease", -1.0)):
+        some = sorted(_of_kind(sheet, finding, lattice, kind, sign), key=lambda one: -one.volume)
+        found += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
+    return found
+
+
+def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: float) -> Iterator[Feature]:
+    """Give the features of one kind, not yet numbered."""
+    off = sign * sheet.raised
+    inside = off > finding.threshold
+    faces = sheet.faces[inside[sheet.faces].any(axis=1)]
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    label = components(len(off), edges[inside[edges].all(axis=1)])
+    # All corners of a triangle that are inside are joined by it, and so have one label.
+    of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
+    at_pins = sign * sheet.formed.raised
+    pins = _by_label(np.where(inside[sheet.pins], label[sheet.pins], -1))
+    for name, block in _by_label(of_face).items():
+        mine = pins.get(name, np.empty(0, np.int64))
+        if len(mine) < finding.smallest:
+            continue
+        region = cut(sheet.place, sheet.former, off, faces[block], finding.threshold)
+        least = DEEP * finding.threshold
+        whole = ridges(lattice, mine, at_pins, sheet.formed.height, least)
+        every = [part for ridge in whole for part in parts(ridge, least)]
+        for part, own, piece in _shared_out(sheet, every, mine, region, finding.smallest):
+            lines = tuple(crest.points for crest in part.crests)
+            high = at_pins[own]
+            flat = np.mean(high[high >= 0.5 * high.max()] >= FLAT * high.max()) > 0.5
+            yield Feature(kind, 0, own, piece, float(piece.off.max()), lines, bool(flat))
+
+
+def _shared_out(
+    sheet: Sheet, every: list[Part], pins: NDArray[np.int64], region: Region, smallest: int
+) -> Iterator[tuple[Part, NDArray[np.int64], Region]]:
+    """Give each part its pins and its piece of a region; one with too few pins goes to those beside it."""
+    place = sheet.formed.position[pins]
+    while len(every) > 1:
+        owner = np.argmin(nearest(place, every), axis=0)
+        count = np.bincount(owner, minlength=len(every))
+        if count.min() >= smallest:
+            break
+        del every[int(np.argmin(count))]
+    rest: Region | None = region
+    while len(every) > 1 and rest is not None:
+        away = nearest(rest.place, every)
+        piece, rest = divided(rest, away[:-1].min(axis=0) - away[-1])
+        if piece is not None:
+            yield every[-1], pins[owner == len(every) - 1], piece
+        every = every[:-1]
+    if rest is not None:
+        yield every[0], pins if rest is region else pins[owner == 0], rest
+
+
+def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
+    """Return for each label from 0 on where it stands, ascending."""
+    order = np.argsort(label, kind="stable")
+    names, starts, counts = np.unique(label[order], return_index=True, return_counts=True)
+    every = zip(names.tolist(), starts.tolist(), counts.tolist(), strict=True)
+    return {name: order[start : start + count] for name, start, count in every if name >= 0}
+
+
+def table(features: list[Feature]) -> list[tuple[str, ...]]:
+    """Return what a person reads: a head, and a row of texts a feature, in mm."""
+    head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    rows = [
+        (
+            one.name, one.form, str(len(one.pins)), f"{one.area * 1e6:.1f}", f"{one.extreme * 1e3:.2f}",
+            f"{one.crest_length * 1e3:.1f}", f"{one.volume * 1e9:.0f}",
+        )
+        for one in features
+    ]  # fmt: skip
+    return [head, *rows]
+
+
+def summary(features: list[Feature]) -> str:
+    """Return how many there are in a few words."""
+    counts = [(sum(one.kind == kind for one in features), kind) for kind in ("boss", "crease")]
+    return " and ".join(
+        f"{n} {kind}{'' if n == 1 else 'es' if kind == 'boss' else 's'}" for n, kind in counts
+    )

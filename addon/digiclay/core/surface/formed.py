@@ -1,0 +1,142 @@
+"""Formed surface: the pins now and before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import OutputError, ParameterError
+from .skin_mesh import check_heights, grid_shape
+
+__all__ = ["Formed", "of_history"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """All pins of a bed, row by row.
+
+    Attributes
+    ----------
+    position : ndarray (n, 2)
+        Axes of the pins, m.
+    height : ndarray (n,)
+        Pin tops, m.
+    former : ndarray (n,)
+        The same before the surface was formed, m; one number for all will do.
+    force : ndarray (n,)
+        Force on each pin, N.
+    mode : ndarray of int (n,)
+        Codes of `modes.Mode`.
+    rows, columns : int
+        Found from the positions.
+
+    Raises
+    ------
+    ParameterError
+        On fewer than 2 x 2 pins, arrays that do not fit, numbers that are not finite, or pins
+        out of order.
+    """
+
+    position: Floats
+    height: Floats
+    former: Floats
+    force: Floats
+    mode: NDArray[np.int64]
+    rows: int
+    columns: int
+
+    @classmethod
+    def of(
+        cls, position: ArrayLike, height: ArrayLike, former: ArrayLike, force: ArrayLike, mode: ArrayLike
+    ) -> Formed:
+        """Check and take the arrays.
+
+        Parameters
+        ----------
+        position : array_like (n, 2)
+            Axes of the pins, row by row, m.
+        height : array_like (n,)
+            Pin tops, m.
+        former : array_like (n,) or float
+            The same before the surface was formed, m.
+        force : array_like (n,) or float
+            N.
+        mode : array_like of int (n,) or int
+            Codes of `modes.Mode`.
+        """
+        rows, columns = grid_shape(position)
+        place, top = check_heights(position, height, rows, columns)
+        _, before = check_heights(place, np.broadcast_to(former, top.shape), rows, columns, "former")
+        _, pressed = check_heights(place, np.broadcast_to(force, top.shape), rows, columns, "force")
+        codes = np.broadcast_to(np.asarray(mode, np.int64), top.shape)
+        return cls(place, top, before, pressed, codes, rows, columns)
+
+    @property
+    def pitch(self) -> float:
+        """Distance between neighbours in a row, m."""
+        return float(np.hypot(*(self.position[1] - self.position[0])))
+
+    @property
+    def shift(self) -> float:
+        """How far every other row is shifted the way the columns run, m; 0 in an aligned bed."""
+        way = np.sign(self.position[1, 0] - self.position[0, 0])
+        shift = float(way * (self.position[self.columns, 0] - self.position[0, 0]))
+        return shift if abs(shift) > 1e-3 * self.pitch else 0.0
+
+    @property
+    def row_spacing(self) -> float:
+        """Distance between rows, m."""
+        return float(abs(self.position[self.columns, 1] - self.position[0, 1]))
+
+    def nearest(self, place: Floats) -> NDArray[np.int64]:
+        """Return the pin in the nearest row that is nearest to each of some places, m, shape (k, 2)."""
+        across = self.position[self.columns, 1] - self.position[0, 1]
+        along = self.position[1, 0] - self.position[0, 0]
+        row = np.clip(np.rint((place[:, 1] - self.position[0, 1]) / across), 0, self.rows - 1).astype(
+            np.int64
+        )
+        first = self.position[row * self.columns, 0]
+        column = np.clip(np.rint((place[:, 0] - first) / along), 0, self.columns - 1).astype(np.int64)
+        pins: NDArray[np.int64] = row * self.columns + column
+        return pins
+
+    @property
+    def raised(self) -> Floats:
+        """How far each pin is above where it was before, m."""
+        return self.height - self.former
+
+
+def of_history(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
+    """Return one row of a history as a formed surface.
+
+    Parameters
+    ----------
+    history : mapping of arrays
+        `position`, `height`, `force` and `mode` as in ``history.npz``.
+    row : int
+        Negative rows count from the last one.
+    former : int or float
+        The row that tells what was before (an int), or one height of all pins, m (a float).
+
+    Raises
+    ------
+    OutputError
+        When the history has no such row.
+    ParameterError
+        As `Formed`.
+    """
+    count = len(history["height"])
+    for name, wanted in (("row", row), ("former", former)):
+        if isinstance(wanted, int) and not -count <= wanted < count:
+            raise OutputError(f"The history has {count} rows, 0 to {count - 1} (got {wanted} as {name}).")
+    before = history["height"][former] if isinstance(former, int) else former
+    if isinstance(former, float) and not np.isfinite(former):
+        raise ParameterError("Export", "former", "must be a finite height", f"{former} m")
+    arrays = (history[name][row] for name in ("force", "mode"))
+    return Formed.of(history["position"], history["height"][row], before, *arrays)

@@ -1,0 +1,204 @@
+"""Stepped bed as one printable body: a prism for every pin.
+
+The parts are those that are nearest to a pin: squares in an aligned bed, hexagons in a shifted one. Where
+neighbours differ in height a wall stands between them. Two squares that meet at a corner only, and are
+both higher than the other two there, would touch along a line without thickness, which no printer can
+make: they are joined by a bridge as narrow as `BRIDGE`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .formed import Formed
+from .skin_mesh import BASE_THICKNESS, base_level
+
+__all__ = ["BRIDGE", "Parts", "parts", "pins_solid"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Codes = NDArray[np.int64]
+
+#: Half the width of a bridge, in pitches along x and rows along y.
+BRIDGE = 0.05
+#: Who is beyond the edge of the bed.
+NOBODY = -1
+#: Heights above the base are taken to the nearest multiple of this, m: a wall lower than a file's float32
+#: can hold would have no area there.
+STEP = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The bed divided into parts, one a pin; the sides of a part stand one after the other.
+
+    Attributes
+    ----------
+    corner : ndarray (k, 2)
+        Where the parts meet, m.
+    start, end : ndarray of int (e,)
+        Corners of each side of each part; the part is to the left.
+    pin : ndarray of int (e,)
+        Whose side it is.
+    twin : ndarray of int (e,)
+        The same side seen from the part beyond; -1 at the edge of the bed.
+    """
+
+    corner: Floats
+    start: Codes
+    end: Codes
+    pin: Codes
+    twin: Codes
+
+
+def parts(formed: Formed) -> Parts:
+    """Divide a bed."""
+    corner, loops = _squares(formed) if not formed.shift else _hexagons(formed)
+    # Corners of one loop that coincide are one corner: the loop of a square has two at each.
+    start, end = loops.ravel(), np.roll(loops, -1, axis=1).ravel()
+    pin = np.repeat(np.arange(len(loops)), loops.shape[1])
+    real = start != end
+    start, end, pin = start[real], end[real], pin[real]
+    size = len(corner)
+    sides = start * size + end
+    order = np.argsort(sides)
+    found = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
+    twin = order[found]
+    return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, NOBODY))
+
+
+def pins_solid(
+    formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
+) -> tuple[Floats, Indices, Codes]:
+    """Return the stepped bed, closed.
+
+    Parameters
+    ----------
+    formed : Formed
+    base, base_thickness : float
+        As for `skin_mesh.solid`.
+
+    Returns
+    -------
+    vertices : ndarray (v, 3)
+        m; first the middle of each pin's top in their order, to 0.1 µm.
+    faces : ndarray of int (f, 3)
+        Counter-clockwise seen from outside.
+    pin : ndarray of int (f,)
+        Whose top, wall or underside a face is.
+    """
+    level = base_level(formed.height, base=base, base_thickness=base_thickness)
+    steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
+    height = level + steps * STEP
+    made, n = parts(replace(formed, height=height)), len(steps)
+    # Each corner has a vertex at the height of every part about it, and one of the base.
+    k, above = len(made.corner), int(steps.max()) + 1
+    keys = np.concatenate([made.start * above + steps[made.pin], np.arange(k) * above])
+    names, number = np.unique(keys, return_inverse=True)
+    number = number.ravel() + 2 * n
+    own, ground = number[: len(made.start)], number[len(made.start) :]
+    at, up = np.divmod(names, above)
+    middle = np.column_stack([formed.position, height])
+    below = np.column_stack([formed.position, np.full(n, level)])
+    vertices = np.concatenate([middle, below, np.column_stack([made.corner[at], level + up * STEP])])
+    ahead = own[_following(made.pin)]
+    top = np.stack([made.pin, own, ahead], axis=1).astype(np.int32)
+    bottom = np.stack([made.pin + n, ground[made.end], ground[made.start]], axis=1).astype(np.int32)
+    walls, whose = _walls(made, steps, own, ahead, ground)
+    return vertices, np.concatenate([top, bottom, walls]), np.concatenate([made.pin, made.pin, whose])
+
+
+def _following(pin: Codes) -> Codes:
+    """Return for each side the next one of its part."""
+    following = np.arange(1, len(pin) + 1)
+    last = np.flatnonzero(np.diff(pin, append=-1) != 0)
+    following[last] = np.concatenate([[0], last[:-1] + 1])
+    return following
+
+
+def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -> tuple[Indices, Codes]:
+    """Return the triangles of the walls a part has above its neighbours, and whose they are.
+
+    The vertices of a corner have numbers in the order of their heights, so that those between the
+    neighbour's height and one's own stand in line.
+    """
+    other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
+    side = np.flatnonzero(steps[made.pin] > other)
+    twin = made.twin[side]
+    # The feet of the wall: the neighbour's vertices, or beyond the bed those of the base.
+    left = np.where(twin >= 0, ahead[twin], ground[made.start[side]])
+    right = np.where(twin >= 0, own[twin], ground[made.end[side]])
+    i, step = _counted(own[side] - left)
+    one = np.stack([left[i] + step, right[i], left[i] + step + 1], axis=1).astype(np.int32)
+    j, step = _counted(ahead[side] - right)
+    two = np.stack([right[j] + step, right[j] + step + 1, own[side][j]], axis=1).astype(np.int32)
+    return np.concatenate([one, two]), made.pin[side][np.concatenate([i, j])]
+
+
+def _counted(counts: Codes) -> tuple[Codes, Codes]:
+    """Return each index as often as its count says, and which time it is."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    return index, np.arange(len(index)) - first[index]
+
+
+def _squares(formed: Formed) -> tuple[Floats, Codes]:
+    """Return corners and loops of an aligned bed: where four parts meet are two corners, mostly the same."""
+    rows, columns = formed.rows, formed.columns
+    place = formed.position.reshape(rows, columns, 2)
+    step_x, step_y = place[0, 1, 0] - place[0, 0, 0], place[1, 0, 1] - place[0, 0, 1]
+    x = place[0, 0, 0] + step_x * (np.arange(columns + 1) - 0.5)
+    y = place[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
+    corner = np.stack(np.meshgrid(x, y), axis=-1)
+    top = formed.height.reshape(rows, columns)
+    a, b, c, d = top[:-1, :-1], top[:-1, 1:], top[1:, 1:], top[1:, :-1]
+    ac = np.minimum(a, c) > np.maximum(b, d)
+    bd = np.minimum(b, d) > np.maximum(a, c)
+    apart = np.zeros((rows + 1, columns + 1), bool)
+    apart[1:-1, 1:-1] = ac | bd
+    # The lower one stands towards -y, and towards +x where a and c are joined, towards -x where b and d are.
+    lean = np.zeros(apart.shape)
+    lean[1:-1, 1:-1] = np.where(ac, 1.0, np.where(bd, -1.0, 0.0))
+    away = BRIDGE * np.stack([lean * step_x, -np.abs(lean) * step_y], axis=-1)
+    lower = np.arange(apart.size).reshape(apart.shape)
+    upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
+    corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
+    joined_ac, joined_bd = lean > 0.0, lean < 0.0
+    # What a, b, c and d have of the meeting, in the order of their loops.
+    of_a = lower, np.where(joined_ac, upper, lower)
+    of_b = np.where(joined_bd, upper, lower), lower
+    of_c = upper, np.where(joined_ac, lower, upper)
+    of_d = np.where(joined_bd, lower, upper), upper
+    loops = np.stack(
+        [
+            *(one[:-1, :-1] for one in of_c), *(one[:-1, 1:] for one in of_d),
+            *(one[1:, 1:] for one in of_a), *(one[1:, :-1] for one in of_b),
+        ],
+        axis=-1,
+    ).reshape(rows * columns, 8)  # fmt: skip
+    return corners, loops if step_x * step_y > 0.0 else loops[:, ::-1]
+
+
+def _hexagons(formed: Formed) -> tuple[Floats, Codes]:
+    """Return corners and loops of a bed whose rows are shifted by half a pitch."""
+    rows, columns = formed.rows, formed.columns
+    pitch = formed.position[1, 0] - formed.position[0, 0]
+    spacing = formed.position[columns, 1] - formed.position[0, 1]
+    near = (spacing**2 - pitch**2 / 4.0) / (2.0 * spacing)
+    side = 1 if formed.shift > 0.0 else -1
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    # Corners between two rows stand half a pitch apart; those of a pin are numbers q - 1, q and q + 1.
+    width = 2 * columns + 4
+    q = 2 * column + (row % 2) * side + 2
+    below, above = row * width + q, (row + 1) * width + q
+    loops = np.stack([below - 1, below, below + 1, above + 1, above, above - 1], axis=1)
+    x = np.array([-0.5, 0.0, 0.5, 0.5, 0.0, -0.5]) * pitch
+    y = np.array([-near, near - spacing, -near, near, spacing - near, near])
+    corner = np.empty(((rows + 1) * width, 2))
+    corner[loops] = formed.position[:, None] + np.column_stack([x, y])
+    used, loops = np.unique(loops, return_inverse=True)
+    loops = loops.reshape(-1, 6)
+    return corner[used], loops if pitch * spacing > 0.0 else loops[:, ::-1]

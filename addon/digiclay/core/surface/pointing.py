@@ -1,0 +1,161 @@
+"""Intersection of a ray with the pins, and the contact of a fingertip pressed there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.fingertip import Fingertip, matrices
+from ..model.layout import Grid
+
+__all__ = ["ground", "meeting", "patch", "ray"]
+
+Floats = NDArray[np.float64]
+
+#: Steps a pitch at which a ray is looked at on its way over the bed.
+STEPS = 4
+#: How far behind the middle of a view without perspective its rays begin, in its own unit.
+BEHIND = 1e5
+
+
+def ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
+    """Return the ray through a place of a picture, in double precision throughout.
+
+    Blender's own function takes the difference of two places near the eye in single precision,
+    and is off by up to a pixel.
+
+    Parameters
+    ----------
+    lens : ndarray (4, 4)
+        From the camera's space to the picture's, with perspective or without.
+    seen : ndarray (4, 4)
+        From the wanted space to the camera's, which looks along -z.
+    screen : ndarray (2,)
+        The place: -1 to 1 from left to right and from below to above.
+
+    Returns
+    -------
+    origin, direction : ndarray (3,)
+        In the wanted space and its unit; the direction has length 1.
+    """
+    across = np.array([lens[0, 0], lens[1, 1]])
+    if lens[3, 2]:
+        eye, way = np.zeros(3), np.array([*((screen + lens[:2, 2]) / across), -1.0])
+    else:
+        eye, way = np.array([*((screen - lens[:2, 3]) / across), BEHIND]), np.array([0.0, 0.0, -1.0])
+    inverse = np.linalg.inv(seen)
+    way = inverse[:3, :3] @ way
+    return inverse[:3, :3] @ eye + inverse[:3, 3], way / np.linalg.norm(way)
+
+
+def meeting(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
+    """Return where a ray first meets the pins, taken as flat tops that leave no gaps.
+
+    Parameters
+    ----------
+    grid : Grid
+    height : ndarray (n,)
+        Heights of the pin tops, m.
+    origin, direction : ndarray (3,)
+        Of the ray, in the bed's space, m; the direction may have any length.
+
+    Returns
+    -------
+    ndarray (3,) or None
+        A point on a top, exact, or on the side of a pin, to a quarter of a pitch; None when the
+        ray passes by the bed or is no ray at all.
+    """
+    if not (np.isfinite(origin).all() and np.isfinite(direction).all() and direction.any()):
+        return None
+    direction = direction / np.abs(direction).max()
+    plan = grid.layout
+    half = np.array([plan.pitch, plan.row_spacing]) / 2
+    low = np.array([grid.x.min() - half[0], grid.y.min() - half[1], height.min()])
+    high = np.array([grid.x.max() + half[0], grid.y.max() + half[1], height.max()])
+    first, last = _inside(origin, direction, low, high)
+    if first > last:
+        return None
+    length = (last - first) * math.hypot(direction[0], direction[1])
+    count = 2 + math.ceil(STEPS * length / min(plan.pitch, plan.row_spacing))
+    times = np.linspace(first, last, count)
+    points = origin + times[:, None] * direction
+    points[-1, 2] = max(points[-1, 2], low[2])  # rounding must not let the ray slip below the lowest top
+    tops = height[grid.at(points[:, 0], points[:, 1])]
+    met = np.flatnonzero(points[:, 2] <= tops + 1e-12)
+    if not met.size:
+        return None
+    at = int(met[0])
+    start: Floats = points[max(0, at - 1)]
+    if at == 0:
+        return start
+    onto = (tops[at] - origin[2]) / direction[2] if direction[2] else -math.inf
+    found: Floats = origin + onto * direction if times[at - 1] <= onto <= times[at] else start
+    return found
+
+
+def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tuple[float, float]:
+    """Return when a ray enters and leaves a box; it never does where the first is after the last."""
+    first, last = 0.0, math.inf
+    for start, speed, near, far in zip(origin, direction, low, high, strict=True):
+        if speed == 0.0:
+            if not near <= start <= far:
+                return 1.0, 0.0
+            continue
+        times = sorted(((near - start) / speed, (far - start) / speed))
+        first, last = max(first, times[0]), min(last, times[1])
+    return first, last
+
+
+def ground(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
+    """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest.
+
+    Parameters
+    ----------
+    grid : Grid
+    height : ndarray (n,)
+        Heights of the pin tops, m.
+    x, y, radius : float
+        m.
+    """
+    cells = grid.disc(x, y, radius)
+    if not cells.size:
+        cells = grid.at(np.array([x]), np.array([y]))
+    return float(height[cells].mean())
+
+
+def patch(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
+    """Return the outline of what of a finger is less than a depth above its lowest point.
+
+    It is where the finger touches a plane it is pressed into so deep.
+
+    Parameters
+    ----------
+    finger : Fingertip
+    turn : ndarray (4,)
+        Its orientation, quaternion w, x, y, z.
+    depth : float
+        m; beyond the middle of the finger its widest section stays the outline.
+    count : int, optional
+        Number of points.
+
+    Returns
+    -------
+    ndarray (count, 2)
+        Counter-clockwise, m; the lowest point is the origin.
+    """
+    rotation = matrices(np.asarray(turn, np.float64)[None])[0]
+    axes = np.array([finger.length, finger.width, finger.height])
+    shape = rotation @ np.diag(axes**-2.0) @ rotation.T
+    spread = rotation @ np.diag(axes**2) @ rotation.T
+    half = math.sqrt(spread[2, 2])
+    level = min(max(depth, 0.0), half) - half  # height of the section over the middle
+    flat, tilt = shape[:2, :2], shape[:2, 2]
+    lean = np.linalg.solve(flat, tilt)
+    middle = -level * lean
+    square = 1.0 - level**2 * (shape[2, 2] - tilt @ lean)
+    angle = np.arange(count) * (2.0 * math.pi / count)
+    circle = np.sqrt(max(0.0, square)) * np.array([np.cos(angle), np.sin(angle)])
+    outline = np.linalg.solve(np.linalg.cholesky(flat).T, circle).T
+    return np.asarray(outline + middle + spread[:2, 2] / half)

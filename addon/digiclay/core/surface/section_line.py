@@ -1,0 +1,232 @@
+"""Line along the top of one feature, through the middle of its sections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .crest_network import Chain
+from .pin_lattice import Lattice, distance_to_level
+
+__all__ = ["LEVEL", "Field", "even", "smoothed"]
+
+Floats = NDArray[np.float64]
+
+#: As high as, to this share of the way up.
+LEVEL = 0.1
+#: Directions in which a half width is looked for.
+AROUND = 16
+#: Times a line is drawn through the middle of its sections.
+ROUNDS = 3
+#: Times the end of a line is looked for from where it was found last.
+ROUNDS_AT_END = 8
+#: A section this many times as wide as most is one through a junction, and says nothing of its middle.
+WIDE = 1.5
+#: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
+FALLEN = 0.75
+#: A line runs through the middle of its sections at this share of its height.
+MIDDLE = 0.7
+#: Shares of a smoothing step and of the step back.
+TO_AND_FRO = (0.5, -0.53)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """One feature's heights between the pins, and how far its flanks are away at most."""
+
+    lattice: Lattice
+    off: Floats
+    height: Floats
+    most: float
+
+    def at(self, place: Floats) -> Floats:
+        """Return how far the feature is off at places, m; 0 beyond the bed."""
+        return np.nan_to_num(self.lattice.at(self.off, place))
+
+    def falls(self, place: Floats, way: Floats, level: Floats) -> Floats:
+        """Return how far it is to where the feature falls to a level, m.
+
+        Parameters
+        ----------
+        place : ndarray (k, 2)
+            Where to start, m.
+        way : ndarray (k, 2)
+            Unit vectors.
+        level : ndarray (k,)
+            m.
+        """
+        return distance_to_level(self.lattice, self.off, place, way, level, self.most)
+
+    def half_widths(self, place: Floats) -> Floats:
+        """Return how far it is at least to where the feature falls to half its height at places, m."""
+        angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
+        ways = np.column_stack([np.cos(angles), np.sin(angles)])
+        k = len(place)
+        distance = self.falls(
+            np.repeat(place, AROUND, axis=0), np.tile(ways, (k, 1)), np.repeat(0.5 * self.at(place), AROUND)
+        )
+        least: Floats = np.minimum(distance.reshape(k, AROUND).min(axis=1), self.most)
+        return least
+
+    def line(self, chain: Chain) -> Floats | None:
+        """Return the line along the top that a chain of pins stands for, or none where it has no length."""
+        pitch = self.lattice.pitch
+        line = even(chain.points, pitch)
+        if line is None:
+            return None
+        line = smoothed(line, 2, chain.closed)
+        for _ in range(ROUNDS):
+            spread = even(self._centred(line, chain), pitch)
+            if spread is None:
+                return None
+            line = smoothed(spread, 1, chain.closed)
+        half = self.half_width(line, chain.closed)
+        for end in (0, 1):
+            if not (chain.closed or chain.joined[end]):
+                line = self._ended(line[::-1] if end == 0 else line, half)
+                line = line[::-1] if end == 0 else line
+                if len(line) < 2:
+                    return None
+        return line
+
+    def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
+        """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
+        ahead = np.gradient(line, axis=0) if len(line) > 2 else np.tile(line[-1] - line[0], (2, 1))
+        if closed:
+            ahead[0] = ahead[-1] = line[1] - line[-2]
+        ahead /= np.maximum(np.hypot(*ahead.T), 1e-12)[:, None]
+        aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+        level = share * self.at(line)
+        return aside, self.falls(line, aside, level), self.falls(line, -aside, level)
+
+    def _centred(self, line: Floats, chain: Chain) -> Floats:
+        """Return a line moved into the middle of its sections."""
+        aside, left, right = self._sections(line, chain.closed, MIDDLE)
+        wide = left + right
+        seen = np.isfinite(wide)
+        if not seen.any():
+            return line
+        seen &= wide <= WIDE * float(np.median(wide[seen]))
+        # Across a junction the line goes on as it does beside it.
+        known = np.flatnonzero(seen)
+        shift = np.interp(np.arange(len(line)), known, 0.5 * (left[known] - right[known]))
+        shift = np.clip(shift, -self.lattice.pitch, self.lattice.pitch)
+        for end in (0, 1):
+            if chain.joined[end] and not chain.closed:
+                shift[-end] = 0.0
+        return line + shift[:, None] * aside
+
+    def half_width(self, line: Floats, closed: bool) -> float:
+        """Return half the width at half the height, the median along a line.
+
+        Parameters
+        ----------
+        line : ndarray (m, 2)
+            m.
+        closed : bool
+            Whether its ends are joined.
+        """
+        _, left, right = self._sections(line, closed, 0.5)
+        # Along the edge of the bed a feature has one flank only.
+        half = np.where(np.isfinite(left + right), 0.5 * (left + right), np.minimum(left, right))
+        seen = np.isfinite(half)
+        return float(np.median(half[seen])) if seen.any() else self.most
+
+    def _ended(self, line: Floats, half: float) -> Floats:
+        """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
+        pitch = self.lattice.pitch
+        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
+        around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        at_edge = bool(np.isnan(self.lattice.at(self.off, around)).any())
+        aside_at_end = half if at_edge else min(half, pitch)
+        kept = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
+        line, run = line[kept], run[kept]
+        back = max(0.0, run[-1] - max(2.0 * half, 2.0 * pitch))
+        from_there = np.array([np.interp(back, run, axis) for axis in line.T])
+        way = (line[-1] - from_there) / max(float(np.hypot(*(line[-1] - from_there))), 1e-12)
+        longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * way
+        path = np.concatenate([line, line[-1] + longer])
+        fine = even(path, pitch / 4.0)
+        assert fine is not None
+        known = self.lattice.at(self.off, fine)
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
+        beyond = np.flatnonzero(np.isnan(known))
+        last = int(beyond[0]) if len(beyond) else len(known)
+        end = float(run[-1])
+        for _ in range(ROUNDS_AT_END):
+            near = (along[:last] >= end - max(0.5 * half, pitch)) & (along[:last] <= end)
+            if not near.any():
+                break
+            level = float(known[:last][near].mean())
+            start = int(np.flatnonzero(near)[0])
+            fallen_to = np.minimum.accumulate(known[start:last])
+            again = (fallen_to < FALLEN * level) & (known[start:last] > fallen_to + LEVEL * level)
+            low = np.flatnonzero((known[start:last] < 0.5 * level) | again)
+            if not len(low):
+                end = float(along[last - 1])  # the feature goes on beyond the bed
+                break
+            k = start + int(low[0])
+            if again[k - start]:
+                k = start + int(np.argmin(known[start : k + 1]))
+            over, under = known[k - 1] - 0.5 * level, known[k] - 0.5 * level
+            share = over / (over - under) if k > start and under < 0.0 else 1.0
+            fallen = along[k - 1] + (along[k] - along[k - 1]) * share
+            at = int(np.flatnonzero(near)[-1])
+            aside = np.array([[-way[1], way[0]]])
+            sides = [
+                float(self.falls(fine[at : at + 1], s * aside, np.array([0.5 * level]))[0])
+                for s in (1.0, -1.0)
+            ]
+            wide = 0.5 * sum(sides) if np.isfinite(sides).all() else min(min(sides), half)
+            end = float(fallen) - min(wide, WIDE * half)
+        if end <= 0.0:
+            return line[:1]
+        kept = along < end - 0.25 * pitch
+        tip = np.array([np.interp(end, along, axis) for axis in fine.T])
+        whole = even(np.concatenate([fine[kept], tip[None]]), pitch)
+        return line[:1] if whole is None else whole
+
+
+def even(points: Floats, step: float) -> Floats | None:
+    """Return points along a line at even steps, `step` apart at most; none of a line without length.
+
+    Parameters
+    ----------
+    points : ndarray (m, 2)
+        m.
+    step : float
+        m.
+    """
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    if run[-1] < 1e-9:
+        return None
+    at = np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1))
+    return np.column_stack([np.interp(at, run, axis) for axis in points.T])
+
+
+def smoothed(line: Floats, times: int, closed: bool) -> Floats:
+    """Return a line without its staircase; ends stay.
+
+    Each point goes towards the middle of those beside it and a little further back again, so that an arc does
+    not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
+
+    Parameters
+    ----------
+    line : ndarray (m, 2)
+        m.
+    times : int
+    closed : bool
+        Whether its ends are joined.
+    """
+    if len(line) < 4:
+        return line
+    for share in TO_AND_FRO * times:
+        pull = np.zeros_like(line)
+        pull[1:-1] = 0.5 * (line[:-2] + line[2:]) - line[1:-1]
+        if closed:
+            pull[[0, -1]] = 0.5 * (line[-2] + line[1]) - line[0]
+        line = line + share * pull
+    return line

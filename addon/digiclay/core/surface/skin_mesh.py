@@ -1,0 +1,270 @@
+"""Formed surface: a skin over the pin tops, and the closed solid under it.
+
+The skin is structured. Between two neighbouring rows every four pins, two of each row,
+make a cell of the skin that is cut in two along one of its diagonals. Nothing but the
+pins themselves decides which, so a mirrored or turned bed gives the mirrored or turned
+solid:
+
+1. The shorter diagonal in plan. In a staggered or hexagonal bed that is the zig-zag
+   between the rows, the same for any heights; its outer edge is left as it is.
+2. Both as long (an aligned bed): the one whose ends differ less in height, so that edges
+   run along a ridge or crease and not across it.
+3. Both as steep: the higher one. If they are as high too, the four pins are in one plane
+   and both cuts are the same surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import ParameterError
+
+__all__ = ["BASE_THICKNESS", "base_level", "check_heights", "grid_shape", "skin", "solid"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+#: Material left under the lowest pin top unless a base is asked for, m. Enough for a
+#: printed part to hold together, without 40 mm of plastic down to the bed's floor.
+BASE_THICKNESS = 3e-3
+
+#: Two diagonals are as long as each other when their squares agree to this fraction:
+#: far above rounding, far below the smallest difference of a known arrangement (staggered, 4/5).
+SAME_LENGTH = 1e-6
+#: Pins whose triangles are worked out at once, so that a large bed takes little more memory than its result.
+BAND = 1 << 16
+
+
+def grid_shape(position: ArrayLike) -> tuple[int, int]:
+    """Return the rows and columns of pins that are ordered row by row.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        Where the pins stand, m.
+
+    Returns
+    -------
+    rows, columns : int
+
+    Raises
+    ------
+    ParameterError
+        When the pins do not fill whole rows.
+    """
+    place = _pins(position)
+    if not len(place):
+        raise ParameterError("Surface", "position", "must hold at least one pin", "none")
+    spacing = float(np.hypot(*(place[1] - place[0]))) if len(place) > 1 else 1.0
+    other_row = np.flatnonzero(np.abs(place[:, 1] - place[0, 1]) > 0.1 * spacing)
+    columns = int(other_row[0]) if len(other_row) else len(place)
+    if len(place) % columns:
+        raise ParameterError("Surface", "position", f"must fill rows of {columns} pins", f"{len(place)} pins")
+    return len(place) // columns, columns
+
+
+def skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
+    """Return the triangles over the pin tops.
+
+    Parameters
+    ----------
+    position : array_like, shape (n, 2)
+        Where the pins stand, m; ordered row by row.
+    height : array_like, shape (n,)
+        Heights of the pin tops, m.
+    rows, columns : int
+        Pins along y and x, two of each at least; n = rows * columns.
+
+    Returns
+    -------
+    ndarray of int, shape (2 (rows - 1) (columns - 1), 3)
+        Indices of pins, counter-clockwise seen from above.
+
+    Raises
+    ------
+    ParameterError
+        On a single row or column, arrays that do not fit, numbers that are not finite, or
+        pins out of order.
+    """
+    place, top = check_heights(position, height, rows, columns)
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    clockwise = _plan_area(place, index[:2, :2].ravel()[None, :3])[0] < 0.0  # a mirrored bed
+    faces = np.empty((rows - 1, 2 * (columns - 1), 3), np.int32)
+    band = max(1, BAND // columns)
+    for row in range(0, rows - 1, band):
+        some = _triangles(place, top, index[row : row + band + 1])
+        some = some[:, ::-1] if clockwise else some
+        if not np.all(_plan_area(place, some) > 0.0):
+            raise ParameterError("Surface", "position", "must order the pins row by row", "pins out of order")
+        faces[row : row + band] = some.reshape(-1, 2 * (columns - 1), 3)
+    return faces.reshape(-1, 3)
+
+
+def _triangles(place: Floats, top: Floats, index: Indices) -> Indices:
+    """Return the triangles between some rows of pins, two for every four of them."""
+    # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the other.
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    along_ac = _cut_along_ac(place, top, a, b, c, d)
+    first = np.stack([a, b, np.where(along_ac, c, d)], axis=1)
+    second = np.stack([np.where(along_ac, a, b), c, d], axis=1)
+    triangles: Indices = np.stack([first, second], axis=1).reshape(-1, 3)
+    return triangles
+
+
+def solid(
+    position: ArrayLike,
+    height: ArrayLike,
+    rows: int,
+    columns: int,
+    *,
+    base: float | None = None,
+    base_thickness: float = BASE_THICKNESS,
+) -> tuple[Floats, Indices]:
+    """Return the closed solid between the skin and a flat base.
+
+    Its underside has the triangles of the skin, so the outline of both is the same and
+    the side walls stand upright. It keeps the bed's coordinates: the origin is the middle
+    of the bed's floor.
+
+    Parameters
+    ----------
+    position, height, rows, columns
+        As for `skin`.
+    base : float, optional
+        Height of the flat base, m; 0 is the bed's floor. By default `base_thickness` below the
+        lowest pin top.
+    base_thickness : float
+        Material under the lowest pin top, m; not used when `base` is given.
+
+    Returns
+    -------
+    vertices : ndarray, shape (2 n, 3)
+        m; the first n are the pin tops in their order, the others the points below them.
+    faces : ndarray of int, shape (4 (rows - 1) (columns - 1) + 4 (rows + columns - 2), 3)
+        Counter-clockwise seen from outside: first the skin, then the base, then the walls.
+
+    Raises
+    ------
+    ParameterError
+        As `skin`; also when the base is not below every pin top.
+    """
+    place, top = check_heights(position, height, rows, columns)
+    level = base_level(top, base=base, base_thickness=base_thickness)
+    over = skin(place, top, rows, columns)
+    n, faced = len(place), len(over)
+    vertices = np.empty((2 * n, 3))
+    vertices[:n, :2] = vertices[n:, :2] = place
+    vertices[:n, 2], vertices[n:, 2] = top, level
+    start = _outline(rows, columns)
+    if _plan_area(place, np.array([[0, 1, columns]]))[0] < 0.0:
+        start = start[::-1]
+    end = np.roll(start, -1)
+    walls = np.stack([end, start, start + n, end, start + n, end + n], axis=1).reshape(-1, 3)
+    faces = np.empty((2 * faced + len(walls), 3), np.int32)
+    faces[:faced], faces[2 * faced :] = over, walls
+    np.add(over[:, ::-1], n, out=faces[faced : 2 * faced])
+    return vertices, faces
+
+
+def base_level(
+    height: ArrayLike, *, base: float | None = None, base_thickness: float = BASE_THICKNESS
+) -> float:
+    """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest pin top.
+
+    Parameters
+    ----------
+    height : array_like
+        Pin tops, m.
+    base : float, optional
+        m; by default `base_thickness` counts.
+    base_thickness : float
+        m.
+
+    Raises
+    ------
+    ParameterError
+        When the base would not be below every pin top.
+    """
+    lowest = float(np.min(height))
+    if base is None:
+        if not (np.isfinite(base_thickness) and base_thickness > 0.0):
+            thickness = f"{base_thickness * 1e3:.6g} mm"
+            raise ParameterError("Surface", "base_thickness", "must be above 0 mm", thickness)
+        return lowest - base_thickness
+    if not (np.isfinite(base) and base < lowest):
+        rule = f"must be below the lowest pin top at {lowest * 1e3:.6g} mm"
+        hint = "Leave it out to get a base of a given thickness under that pin."
+        raise ParameterError("Surface", "base", rule, f"{base * 1e3:.6g} mm", hint)
+    return float(base)
+
+
+def _pins(position: ArrayLike) -> Floats:
+    """Return `position` as an array, or refuse its shape or a number in it."""
+    place = np.asarray(position, dtype=np.float64)
+    if place.ndim != 2 or place.shape[1] != 2:
+        raise ParameterError("Surface", "position", "must have two coordinates a pin", f"shape {place.shape}")
+    if not np.all(np.isfinite(place)):
+        raise ParameterError("Surface", "position", "must be finite", _first_bad(place.sum(axis=1)))
+    return place
+
+
+def check_heights(
+    position: ArrayLike, height: ArrayLike, rows: int, columns: int, name: str = "height"
+) -> tuple[Floats, Floats]:
+    """Return positions and one value a pin as arrays, or refuse what cannot carry a skin.
+
+    Parameters
+    ----------
+    position : array_like (n, 2)
+        Axes of the pins, row by row, m.
+    height : array_like (n,)
+        One value a pin.
+    rows, columns : int
+    name : str
+        What the message calls the values.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if rows < 2 or columns < 2:
+        raise ParameterError(
+            "Surface", "", "must have 2 x 2 pins at least to carry a skin", f"{rows} x {columns}"
+        )
+    place, top = _pins(position), np.asarray(height, dtype=np.float64)
+    if top.shape != (rows * columns,) or len(place) != rows * columns:
+        rule = f"must have one value for each of the {rows} x {columns} pins"
+        raise ParameterError("Surface", name, rule, f"{top.size} values at {len(place)} positions")
+    if not np.all(np.isfinite(top)):
+        raise ParameterError("Surface", name, "must be finite", _first_bad(top))
+    return place, top
+
+
+def _first_bad(values: Floats) -> str:
+    """Name the first value that is not finite."""
+    cell = int(np.flatnonzero(~np.isfinite(values))[0])
+    return f"{values[cell]} at cell {cell}"
+
+
+def _cut_along_ac(place: Floats, top: Floats, *corners: Indices) -> NDArray[np.bool_]:
+    """Tell which cells of the skin are cut from a to c, and not from b to d (rules above)."""
+    a, b, c, d = corners
+    ac, bd = (np.sum((place[i] - place[j]) ** 2, axis=1) for i, j in ((a, c), (b, d)))
+    steep_ac, steep_bd = np.abs(top[a] - top[c]), np.abs(top[b] - top[d])
+    by_height = (steep_ac < steep_bd) | ((steep_ac == steep_bd) & (top[a] + top[c] >= top[b] + top[d]))
+    chosen: NDArray[np.bool_] = np.where(np.abs(ac - bd) <= SAME_LENGTH * (ac + bd), by_height, ac < bd)
+    return chosen
+
+
+def _plan_area(place: Floats, faces: Indices) -> Floats:
+    """Return the area of each triangle seen from above, m²; negative when it runs clockwise."""
+    a, b, c = (place[faces[:, corner]] for corner in range(3))
+    area: Floats = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    return area
+
+
+def _outline(rows: int, columns: int) -> Indices:
+    """Return the outer pins: along the first row, up the last column, back, and down the first."""
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
