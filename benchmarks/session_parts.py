@@ -37,12 +37,13 @@ PARTS = {
 #: The part that files of the core belong to, by how their path below it begins. What a function takes counts
 #: for its file's part; what functions of other files take (numpy's, small helpers) counts for who calls them.
 FILES = {
-    "trajectory": "contact", "touch": "contact", "fingertip": "contact",
+    "model/trajectory": "contact", "model/touch": "contact", "model/fingertip": "contact",
     "control/": "control",
-    "steppers/": "integrate", "closed_form": "integrate", "strained": "integrate", "physics": "integrate",
-    "valve": "integrate", "conduit": "integrate", "contact": "integrate", "relaxation": "integrate",
-    "recorder": "observe",
-    "simulation": "the rest", "gathering": "the rest", "state": "the rest", "system": "the rest",
+    "steppers/": "integrate", "model/physics": "integrate", "model/valve": "integrate",
+    "model/lag": "integrate", "model/conduit": "integrate", "model/contact": "integrate",
+    "model/relaxation": "integrate",
+    "scene/recorder": "observe",
+    "engine/": "the rest",
 }  # fmt: skip
 CORE = Path(core.__file__).parent
 EXAMPLES = """\

@@ -1,4 +1,4 @@
-"""The layout's rules: levels of the core, what it may import, file sizes, no hosts, no machine's paths."""
+"""The layout's rules: packages of the core, their imports, file sizes, no hosts, no machine's paths."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
-from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -19,41 +18,22 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
 CORE = PACKAGE / "core"
 
-#: Modules of the core, level by level; a module imports from the levels above its own line only.
-LEVELS = (
-    "feature_region feature_skeleton feature_branches "
-    "body npz toml_text picture_size spline errors modes png closed_form filled some "
-    "control.travel metrics_signal set_point stack.columns processes safe_names",
-    "feature_network "
-    "keeping_memory quantity unfinished file_lock mesh_file_* mesh_in_limits surface control.transitions "
-    "metrics_path",
-    "mesh_in_placed mesh_in_checks mesh_in_obj whole_files "
-    "sample_file shape layout fluid delay supply actuator contact relaxation fingertip part_table "
-    "formed methods run_folder metrics_force metrics_trace control.servo control.blister "
-    "control.noise_floor",
-    "export mesh_in_gltf mesh_in_threemf shape_holes finger_range feature_lattice pins_solid skin_membrane "
-    "metrics series "
-    "heightmap_picture relief shape_text shots places valve valve_lag state trajectory control.tracking",
-    "feature_line "
-    "mesh_in stack.beds skins pointing heightmap shape_mesh shape_fit absent conduit touch recorder sensors",
-    "sheet feature_crest shape_file physics scene stack.control",
-    "feature_parts system observer steppers.bernoulli_plan steppers.explicit "
-    "control.bench control.master control.master_cell scene_table "
-    "control.drive control.neighbours control.shapes stack.physics strained",
-    "features steppers.bernoulli stack.gathering stack.fingers stack.bernoulli",
-    "feature_solids "
-    "gathering trace steppers.* control.replay control.virtual_master control.cell_states scene_file "
-    "control.elastic control.plastic control.viscous "
-    "control.push_pull control.force_display control.shape_display "
-    "stack.recording stack.traces stack.simulation",
-    "export_model finished simulation control.handover stack.virtual_master stack.behaviours",
-    "assembly form job_outputs axes",
-    "jobs accuracy keeping live stack.assembly",
-    "shadow session take",
-    "metrics_trial budget stack.session",
-    "metrics_speed evaluation",
-    "sweep",
-)
+#: The packages of the core, and which of the packages above its row each imports from.
+ROOMS = {
+    "base": "",
+    "model": "base",
+    "steppers": "base model",
+    "engine": "base model",
+    "surface": "base model",
+    "mesh_io": "base surface",
+    "shapes": "base model surface mesh_io",
+    "control": "base model shapes",
+    "metrics": "base model surface",
+    "scene": "base model engine shapes control",
+    "session": "base model engine control metrics scene",
+    "batch": "base model steppers engine control metrics scene session",
+    "studies": "base model engine mesh_io shapes control metrics scene session batch",
+}
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}
 MAX_LINES = 300
@@ -85,14 +65,6 @@ def core_modules() -> dict[str, Path]:
         parts = path.relative_to(CORE).with_suffix("").parts
         modules[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return modules
-
-
-def level(module: str) -> int | None:
-    """Return the level of a module of the core, or None when the table lacks it."""
-    for number, names in enumerate(LEVELS):
-        if any(fnmatch(module, name) for name in names.split()):
-            return number
-    return None
 
 
 def imports(path: Path, *, inside_functions: bool = True) -> Iterator[tuple[int, str, list[str]]]:
@@ -151,23 +123,28 @@ def lines_with(pattern: re.Pattern[str]) -> list[str]:
     return hits
 
 
-def test_every_core_module_has_a_level() -> None:
-    modules = [name for name, path in core_modules().items() if path.name != "__init__.py"]
-    assert modules
-    assert [name for name in modules if level(name) is None] == []
+def test_every_module_of_the_core_is_in_a_package_of_the_table() -> None:
+    assert {name.split(".")[0] for name in core_modules() if name} == set(ROOMS)
+    assert [path.name for path in CORE.glob("*.py")] == ["__init__.py"]
 
 
-def test_core_imports_go_strictly_down_a_level() -> None:
-    modules, wrong = core_modules(), []
+def test_a_package_of_the_core_imports_from_those_above_it_that_its_row_names() -> None:
+    modules = core_modules()
+    found: dict[str, set[str]] = {name: set() for name in ROOMS}
     for module, path in modules.items():
-        own = level(module)
-        for line, target in core_imports(module, path, set(modules)):
-            other = level(target)
-            # The front door of a package may show what is inside it.
-            door = path.name == "__init__.py" and target.startswith(f"{module}.")
-            if not door and (own is None or other is None or other >= own):
-                wrong.append(f"{path.relative_to(ROOT)}:{line}: {module} ({own}) imports {target} ({other})")
-    assert wrong == []
+        own = module.split(".")[0]
+        for _, target in core_imports(module, path, set(modules)):
+            found[own or "core"].add(target.split(".")[0])
+    above: list[str] = []
+    for name, row in ROOMS.items():
+        assert found[name] - {name} == set(row.split()), f"core/{name} has another row"
+        assert set(row.split()) <= set(above), f"core/{name} imports from below"
+        above.append(name)
+
+
+def test_no_module_has_the_name_of_its_package() -> None:
+    names = [name.split(".") for name in core_modules() if "." in name]
+    assert [name for name in names if name[-1] in name[:-1]] == []
 
 
 def package_imports() -> dict[str, set[str]]:

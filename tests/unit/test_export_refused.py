@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.core.base import whole_files
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, bodies
@@ -81,7 +82,7 @@ def test_a_folder_that_is_not_there_is_one_line(solid, tmp_path):
 def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
     (tmp_path / "taken").mkdir()
     with pytest.raises(OutputError, match=r"^Cannot write \S+taken: "):
-        mesh_writer.write_whole(tmp_path / "taken", b"content")
+        whole_files.write_whole(tmp_path / "taken", b"content")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
@@ -118,7 +119,7 @@ def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
 def test_exporting_needs_numpy_alone():
     script = (
         "import sys; sys.modules['trimesh'] = None\n"
-        "from digiclay.core import mesh_writer, export_model, formed\n"
+        "from digiclay.core.mesh_io import export_model\nfrom digiclay.core.surface import formed\n"
         "bed = formed.Formed.of([[0, 0], [1, 0], [0, 1], [1, 1]], [1, 1, 1, 2], 1, 0, 0)\n"
         "print(len(export_model.bodies(bed, export_model.Model())[0].faces))\n"
     )

@@ -128,7 +128,7 @@ def error_words(errors: tuple[float, float] | None) -> str:
 
 
 def force_words(force: float) -> str:
-    """Say how large the total force is, N, and when no finger presses so hard; see `core.model.finger_range`."""
+    """Say how large the total force is, N, and when beyond a finger's; see `core.model.finger_range`."""
     if force <= MOST_FORCE:
         return f"{force:.2f} N"
     return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"

@@ -121,7 +121,7 @@ class ShapeDisplayControl:
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Orders]:
-        """Set the heights of the move under way, and bring every cell to its own; see `interfaces.Controller`."""
+        """Set the heights of the move under way, and command every cell; see `interfaces.Controller`."""
         rest, target = self.actuator.rest_height, seen.target
         if memory.move < len(self.moves):
             memory, target = self._moved(memory, seen)
