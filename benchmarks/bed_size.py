@@ -96,7 +96,7 @@ def gathered_cells(side: int) -> list[int]:
     """Return how many cells take part in each control period."""
     known = scene(side)
     system = assemble(known)
-    run = periods(system, known.trajectory.trajectory(), begin(system), known.periods)
+    run = periods(system, known.trajectories(), begin(system), known.periods)
     return [state.gathered.cells.size for state in run]
 
 
@@ -118,7 +118,7 @@ def measured(side: int, repeats: int) -> Size:
         start: State = begin(system)
         built.append(time.perf_counter() - started)
         used, moments = time.process_time(), [time.perf_counter()]
-        for state in periods(system, known.trajectory.trajectory(), start, known.periods):
+        for state in periods(system, known.trajectories(), start, known.periods):
             moments.append(time.perf_counter())
             cells.append(state.gathered.cells.size)
         means.append((time.process_time() - used) / known.periods)

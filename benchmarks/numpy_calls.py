@@ -11,7 +11,7 @@ import statistics
 import sys
 import timeit
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.engine import simulation
 from digiclay.core.engine.system import System
-from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.model.trajectory import Trajectory, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 
@@ -169,7 +169,7 @@ def methods_noted() -> Iterator[None]:
         sys.setprofile(former)
 
 
-def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[list[int], Ledger]:
+def period_calls(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[list[int], Ledger]:
     """Return how many numpy calls each of the first `count` control periods makes, and which.
 
     The finger's poses are not counted: they are worked out for many periods at once.
@@ -177,15 +177,16 @@ def period_calls(system: System, trajectory: Trajectory, count: int) -> tuple[li
     Parameters
     ----------
     system : System
-    trajectory : Trajectory
+    trajectories : sequence of Trajectory
+        One a finger.
     count : int
     """
     system = dataclasses.replace(system, grid=_fields_counted(system.grid), plan=_fields_counted(system.plan))
     state = simulation.begin(system)
     several = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
     starts = np.arange(count)[:, None] * system.period
-    poses = trajectory.poses((starts + system.instants).ravel()).reshape(count, -1, 7)
-    ways = simulation.approaches(system, poses)
+    poses = sample_poses(trajectories, (starts + system.instants).ravel())
+    ways = simulation.approaches(system, poses.reshape(count, -1, len(trajectories), 7))
     Counted.ledger = ledger = Ledger()
     calls, before, state = [], 0, state._replace(**several)
     with methods_noted():
@@ -208,7 +209,7 @@ def floor(ledger: Ledger) -> dict[tuple[Any, ...], float]:
 def report(scene: Scene) -> Iterator[str]:
     """Give the lines of the table: calls a period by name, and what they alone take."""
     count = min(scene.periods, 2000)
-    calls, ledger = period_calls(assemble(scene), scene.trajectory.trajectory(), count)
+    calls, ledger = period_calls(assemble(scene), scene.trajectories(), count)
     alone = floor(ledger)
     number: Counter[str] = Counter()
     spent: defaultdict[str, float] = defaultdict(float)

@@ -125,7 +125,7 @@ class Line:
 
     def __init__(self, known: Problem) -> None:
         self.system = replaying(known.scene, known.commands)
-        self.finger = Finger(known.scene.trajectory.trajectory())
+        self.finger = Finger(known.scene.section("trajectory").trajectory())
         cell = self.system.cell
         assert cell.touch is not None
         self.cell: Any = cell

@@ -117,7 +117,7 @@ def _surface(period: float, step: float, stepper: str = "bernoulli") -> NDArray[
     """Return the heights at the end of the session's cut, with live control."""
     scene = live(CUT, period, step, stepper)
     system = assemble(scene)
-    for state in periods(system, scene.trajectory.trajectory(), begin(system), scene.periods):
+    for state in periods(system, scene.trajectories(), begin(system), scene.periods):
         heights = state.row(0)
     return heights
 

@@ -149,12 +149,12 @@ def problem(name: str, *, side: int | None = None) -> Problem:
     scene, held = live(name, side=side), PROBLEMS[name][3]
     system = assemble(scene)
     if held is None:
-        run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+        run = periods(system, scene.trajectories(), begin(system), scene.periods)
         commands = np.array([state.row(system.rows.command) for state in run])
     else:
         commands = np.full((scene.periods, scene.cells), held)
     system = replaying(scene, commands)
-    run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+    run = periods(system, scene.trajectories(), begin(system), scene.periods)
     return Problem(name, scene, commands, [(one.gathered.cells, one.gathered.near) for one in run])
 
 
@@ -187,7 +187,7 @@ def solved(scene: Scene, commands: Floats) -> Measured:
         Held for a control period each.
     """
     system = replaying(scene, commands)
-    run = periods(system, scene.trajectory.trajectory(), begin(system), scene.periods)
+    run = periods(system, scene.trajectories(), begin(system), scene.periods)
     rows = [(state.row(0), state.row(system.rows.force).sum()) for state in run]
     return Measured(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
 
@@ -204,10 +204,10 @@ def timed(scene: Scene, commands: Floats, repeats: int) -> float:
     """
     spent = []
     for _ in range(repeats):
-        system, trajectory = replaying(scene, commands), scene.trajectory.trajectory()
+        system, trajectories = replaying(scene, commands), scene.trajectories()
         start = begin(system)
         started = time.process_time()
-        for _ in periods(system, trajectory, start, scene.periods):
+        for _ in periods(system, trajectories, start, scene.periods):
             pass
         spent.append(time.process_time() - started)
     return float(np.median(spent))

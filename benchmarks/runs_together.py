@@ -74,9 +74,9 @@ def study(scene: Scene, name: str, count: int) -> list[Scene]:
         Runs.
     """
     section, key, low, high = STUDIES[name]
-    part: Any = getattr(scene, section)
+    part: Any = scene.section(section)
     shares = [low + (high - low) * (i + 0.5) / count for i in range(count)]
-    return [replace(scene, **{section: replace(part, **{key: getattr(part, key) * s})}) for s in shares]
+    return [scene.with_sections(**{section: replace(part, **{key: getattr(part, key) * s})}) for s in shares]
 
 
 def _spent(work: Callable[[], Any]) -> float:

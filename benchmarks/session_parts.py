@@ -132,12 +132,12 @@ def measured(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
     profile : cProfile.Profile, optional
         Takes down what each function took.
     """
-    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    system, trajectories = assemble(scene), scene.trajectories()
     state = simulation.begin(system)
     observe = Recording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
     with profile or nullcontext():
         started = perf_counter(), process_time()
-        for reached in simulation.periods(system, trajectory, state, scene.periods):
+        for reached in simulation.periods(system, trajectories, state, scene.periods):
             observe(reached)
         return Took(perf_counter() - started[0], process_time() - started[1])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ from digiclay.core.base.errors import DivergenceError
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
-from digiclay.core.model.fingertip import forms, underside
+from digiclay.core.model.fingertip import forms, require_one, underside
 from digiclay.core.model.physics import speeds
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
@@ -100,7 +100,7 @@ def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
     return "negative force" if force.min() < 0.0 else ""
 
 
-def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats, Floats, float]:
+def _played(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[Floats, Floats, float]:
     """Run; return heights and commands, (t, n), and the largest force, N.
 
     Raises
@@ -111,10 +111,14 @@ def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats,
     rows, heights, commands, most = system.rows, [], [], 0.0
     start = begin(system)
     before, bounded = start.row(0), system.stepper.name in BOUNDED
-    for state in periods(system, trajectory, start, count):
+    for state in periods(system, trajectories, start, count):
         height, force = state.row(0), state.row(rows.force)
         wrong = allowed_range(height, force, system.cell.actuator.stroke)
-        if bounded and not wrong and not _within_reach(system, trajectory, state.period - 1, before, height):
+        if (
+            bounded
+            and not wrong
+            and not _within_reach(system, trajectories, state.period - 1, before, height)
+        ):
             wrong = "a pin where none can be"
         assert not wrong, wrong
         before = height
@@ -124,10 +128,12 @@ def _played(system: System, trajectory: Trajectory, count: int) -> tuple[Floats,
     return np.array(heights), np.array(commands), most
 
 
-def _within_reach(system: System, trajectory: Trajectory, period: int, before: Floats, after: Floats) -> bool:
+def _within_reach(
+    system: System, trajectories: Sequence[Trajectory], period: int, before: Floats, after: Floats
+) -> bool:
     """Tell whether heights, (n,), are within `Speeds.reach` of those a control period before."""
     assert system.cell.touch is not None
-    poses = trajectory.poses(period * system.period + system.instants)
+    poses = require_one(trajectories).poses(period * system.period + system.instants)
     places = system.grid.place(np.arange(system.grid.count))
     under = underside(*forms(system.cell.touch.fingertip.outline(poses)), places)
     lowest, highest = speeds(system.cell).reach(before, under, system.period)
@@ -143,7 +149,7 @@ def period_of(step: float) -> float:
 def commands_of(case: Case) -> Floats:
     """Record the commands of a case, (t, n), each held for `HOLD`."""
     known = scene(CASES[EASY] if case.borrowed else case, "bernoulli", 1e-3, HOLD)
-    return case.factor * _played(assemble(known), known.trajectory.trajectory(), known.periods)[1]
+    return case.factor * _played(assemble(known), known.trajectories(), known.periods)[1]
 
 
 def live(case: Case, stepper: str, step: float) -> Floats:
@@ -157,18 +163,18 @@ def live(case: Case, stepper: str, step: float) -> Floats:
         Physics step, s.
     """
     known = scene(case, stepper, step, period_of(step))
-    return _played(assemble(known), known.trajectory.trajectory(), known.periods)[0]
+    return _played(assemble(known), known.trajectories(), known.periods)[0]
 
 
 def _replaying(
     case: Case, commands: Floats, stepper: str, step: float, period: float
-) -> tuple[System, Trajectory, int]:
+) -> tuple[System, Sequence[Trajectory], int]:
     """Return a case's system that plays commands, its path, and its number of periods."""
     known = scene(case, stepper, step, period)
     system = assemble(known)
     played = Replay(system.grid, np.repeat(commands, round(HOLD / period), axis=0))
     system = replace(system, controller=played, rows=replace(system.rows, control=0))
-    return system, known.trajectory.trajectory(), known.periods
+    return system, known.trajectories(), known.periods
 
 
 def replayed(case: Case, commands: Floats, stepper: str, step: float, period: float) -> Floats:
@@ -209,8 +215,8 @@ def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
     step : float
         Physics step, s.
     """
-    system, trajectory, count = _replaying(case, commands, "bernoulli", step, period_of(step))
-    return statistics.median(period_calls(system, trajectory, count // 2)[0])
+    system, trajectories, count = _replaying(case, commands, "bernoulli", step, period_of(step))
+    return statistics.median(period_calls(system, trajectories, count // 2)[0])
 
 
 def reference(case: Case, commands: Floats, step: float = FINE) -> tuple[Floats, float]:

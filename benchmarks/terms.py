@@ -80,8 +80,8 @@ def without(scene: Scene, term: str) -> Scene | None:
     if term == LONGER:
         simulation = replace(scene.simulation, physics_step=scene.simulation.control_period)
         return None if simulation == scene.simulation else replace(scene, simulation=simulation)
-    left_out: dict[str, Any] = {TERMS[term]: None}
-    return None if getattr(scene, TERMS[term]) is None else replace(scene, **left_out)
+    section = TERMS[term]
+    return None if scene.section(section) is None else scene.with_sections(**{section: None})
 
 
 def _run(scene: Scene, commands: Floats | None, repeats: int) -> Run:
@@ -96,7 +96,7 @@ def _run(scene: Scene, commands: Floats | None, repeats: int) -> Run:
         start = begin(system)
         rows = system.rows
         started = time.process_time()
-        for state in periods(system, scene.trajectory.trajectory(), start, scene.periods):
+        for state in periods(system, scene.trajectories(), start, scene.periods):
             if not repeat:
                 kept_rows.append((state.row(0), state.row(rows.force).sum(), state.row(rows.command)))
         if repeat:
@@ -119,7 +119,7 @@ def effect(scene: Scene, full: Run, repeats: int = 1) -> Effect:
     """
     alive, played = _run(scene, None, repeats), _run(scene, full.commands, 1)
     system = assemble(scene)
-    calls = period_calls(system, scene.trajectory.trajectory(), min(scene.periods, 400))[0]
+    calls = period_calls(system, scene.trajectories(), min(scene.periods, 400))[0]
     apart = [
         (float(np.abs(one.heights - full.heights).max()), float(np.abs(one.forces - full.forces).max()))
         for one in (played, alive)

@@ -16,6 +16,7 @@ from digiclay import bridge
 from digiclay.compat import bpy, scratch
 from digiclay.core.model.layout import Layout
 from digiclay.device import display, view
+from digiclay.device.instant import find_ellipsoid
 from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.waiting import blocking_reason
 from digiclay.operators.add_bed import add, select_only
@@ -116,11 +117,10 @@ def _move(bed: Any, count: int) -> None:
     turn = 2.0 * np.pi * count / ROUND
     session = running.of(bed)
     assert session is not None
-    assert session.scene.fingertip is not None
     rest = session.scene.actuator.rest_height
     down = min(count / (0.8 * WARM_UP), 1.0) * (DEPTH + 2e-3)
     pose = np.array([CIRCLE * np.cos(turn), CIRCLE * np.sin(turn), rest + 2e-3 - down, 1.0, 0.0, 0.0, 0.0])
-    bridge.place_fingertip(tip, pose, session.scene.fingertip)
+    bridge.place_fingertip(tip, pose, find_ellipsoid(session.scene))
     bpy.context.view_layer.update()
 
 

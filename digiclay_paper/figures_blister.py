@@ -58,7 +58,7 @@ def _section(axes: Any, done: Trial, look: tuple[str, str, float], name: str) ->
 
 def _finger(axes: Any, done: Trial, row: int) -> None:
     """Draw the fingertip's outline in the section."""
-    tip, x, z = done.scene.fingertip, *(done.history["fingertip"][row, [0, 2]] * MM)
+    tip, x, z = done.scene.section("fingertip"), *(done.history["fingertip"][row, [0, 2]] * MM)
     if tip is None:
         return
     turn = np.linspace(np.pi, 2.0 * np.pi, 91)

@@ -8,8 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from digiclay.core.model.trajectory import Path
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Path, Scene
+from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.trials import Trial
 
@@ -106,9 +107,10 @@ def _table(
 
 def _with_path(found: Scene, points: list[tuple[float, float]]) -> Scene:
     """Return a scene with another path."""
-    rest, first = found.actuator.rest_height, found.trajectory.waypoints[0]
+    rest, first = found.actuator.rest_height, found.section("trajectory").waypoints[0]
     way = tuple(replace(first, time=t, position=(0.0, 0.0, rest + z)) for t, z in points)
-    return replace(found, trajectory=Path("smooth", way), simulation=replace(found.simulation, duration=0.0))
+    lasting = replace(found.simulation, duration=0.0)
+    return found.with_sections(trajectory=Path("smooth", way), simulation=lasting)
 
 
 def slowed(session: Scene, factor: float) -> Scene:
@@ -119,12 +121,10 @@ def slowed(session: Scene, factor: float) -> Scene:
     session : Scene
     factor : float
     """
-    way = tuple(replace(point, time=factor * point.time) for point in session.trajectory.waypoints)
-    return replace(
-        session,
-        trajectory=replace(session.trajectory, waypoints=way),
-        simulation=replace(session.simulation, duration=0.0),
-    )
+    path = session.section("trajectory")
+    way = tuple(replace(point, time=factor * point.time) for point in path.waypoints)
+    lasting = replace(session.simulation, duration=0.0)
+    return session.with_sections(trajectory=replace(path, waypoints=way), simulation=lasting)
 
 
 def free_speed(session: Scene) -> float:
@@ -134,8 +134,9 @@ def free_speed(session: Scene) -> float:
 
 def fastest_lift(session: Scene) -> float:
     """Return the greatest speed upward on the ways a pin could follow on the whole, m/s."""
-    way, limit, highest = session.trajectory.trajectory(), free_speed(session), 0.0
-    for start, end in pairwise(session.trajectory.waypoints):
+    path, limit, highest = session.section("trajectory"), free_speed(session), 0.0
+    way = path.trajectory()
+    for start, end in pairwise(path.waypoints):
         span = end.time - start.time
         if (end.position[2] - start.position[2]) / span < limit:
             moments = np.linspace(start.time, end.time, 201)

@@ -107,8 +107,8 @@ def located(noise: float, radius: float | None, *, thresholds: bool) -> Located:
     if not thresholds:
         system = replace(system, controller=assemble(replace(case, sensors=None)).controller)
     places: list[tuple[float, float]] = []
-    losses, trajectory = 0, case.trajectory.trajectory()
-    for state in periods(system, trajectory, begin(system), case.periods):
+    losses, trajectories = 0, case.trajectories()
+    for state in periods(system, trajectories, begin(system), case.periods):
         master = state.memory
         assert isinstance(master, Master)
         losses = master.losses

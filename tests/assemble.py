@@ -24,11 +24,11 @@ from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.model.supply import Supply
-from digiclay.core.model.trajectory import Trajectory, level
+from digiclay.core.model.trajectory import Path, Trajectory, level
 from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.scene.schema import Path, Scene, Simulation
+from digiclay.core.scene.schema import Finger, Scene, Simulation
 from digiclay.core.session.snapshot import packed
 from digiclay.core.session.take import Take, states
 from numpy.typing import NDArray
@@ -84,16 +84,18 @@ def make_system(
     master = control if isinstance(control, VirtualMaster) else None
     given = {
         "actuator": Actuator(), "supply": Supply(), "fluid": Fluid(), "valve": Valve(), "conduit": Conduit(),
-        "valve_lag": ValveLag(), "fingertip": Fingertip(), "contact": Contact(), "relaxation": Relaxation(),
+        "valve_lag": ValveLag(),
     }  # fmt: skip
-    assert parts.keys() <= given.keys(), f"no such part: {parts.keys() - given.keys()}"
+    finger = {"fingertip": Fingertip(), "contact": Contact(), "relaxation": Relaxation()}
+    assert parts.keys() <= given.keys() | finger.keys(), f"no such part among {parts.keys()}"
+    fingers = (Finger(trajectory=Path.press(40e-3), **finger),)
     bed = layout or Layout()
     scene = Scene(
-        **{**given, **parts}, layout=bed, delay=Delay(dead_time), control=master,
+        **given, layout=bed, delay=Delay(dead_time), control=master,
         blister=(blister or fitting(bed)) if master else None, simulation=Simulation(period, step, stepper),
-        recorder=None, trajectory=Path.press(40e-3),
+        recorder=None, fingers=fingers,
     )  # fmt: skip
-    system = assemble(scene)
+    system = assemble(scene.with_sections(**parts))
     return replace(system, controller=control(period)) if callable(control) else system
 
 
@@ -150,7 +152,7 @@ def record(system: System, trajectory: Trajectory | Motion, count: int, state: S
     """Simulate `count` control periods and keep every row; row 0 is the state handed in."""
     state = state.copy() if state else begin(system)
     rows, modes, memory = [whole(state)], [], []
-    for state in periods(system, trajectory, state, count):  # noqa: B020
+    for state in periods(system, [trajectory], state, count):  # noqa: B020
         rows.append(whole(state))
         modes.append(state.mode())
         memory.append(state.memory)

@@ -25,9 +25,9 @@ from digiclay.core.base.toml_text import tables
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import advance, approaches, begin, periods
 from digiclay.core.engine.system import System
-from digiclay.core.model.trajectory import along
+from digiclay.core.model.trajectory import Path, Waypoint, along
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import OPTIONAL, SECTIONS, STEPPERS, UNASKED, Path, Waypoint, parameters
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, STEPPERS, UNASKED, parameters
 from digiclay.core.scene.toml_table import ABSENT, PRESETS, resolve, text
 from digiclay.core.session.run_scene import run
 from digiclay.core.session.snapshot import START, carried, packed, unpacked
@@ -150,7 +150,7 @@ def kept(method: str) -> tuple[System, bytes]:
     system = assemble(resolve({"layout": {"rows": 6, "columns": 10}, "control": {"method": method}}))
     places = ((0.0, 42e-3), (0.2, 37e-3))
     way = Path("linear", tuple(Waypoint(time=when, position=(0.0, 0.0, z)) for when, z in places))
-    *_, last = periods(system, way.trajectory(), begin(system), 50)
+    *_, last = periods(system, [way.trajectory()], begin(system), 50)
     return system, packed(system, last)
 
 
@@ -189,7 +189,7 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
 def state(chance: np.random.Generator) -> None:
     """Take up a crafted state and go on from it, or have it refused."""
     system, data = kept(list(METHODS)[chance.integers(len(METHODS))])
-    finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1))
+    finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
     for take_up in (unpacked, carried):
         found = take_up(system, crafted(chance, data))
         for _ in range(PERIODS):

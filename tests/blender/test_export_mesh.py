@@ -181,7 +181,7 @@ def test_a_session_tells_its_forces_whether_they_are_drawn_or_not(bed):
     scene = properties.scene_of(bed)
     system = assemble(scene)
     finger = np.array([1.5e-3, 1.5e-3, 0.038, 1.0, 0.0, 0.0, 0.0])
-    state = step(system, begin(system), np.tile(finger, (len(system.instants), 1)))
+    state = step(system, begin(system), np.tile(finger, (len(system.instants), 1, 1)))
     view.show_state(bed, system, state)
     force = state.row(system.rows.force).copy()
     assert force.max() > 1e-3

@@ -26,8 +26,12 @@ def test_every_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"session:{name}", take=False) == {"FINISHED"}
     bed, wanted = bpy.context.object, load(find(name))
     made = properties.scene_of(bed)
-    assert (made.layout, made.control, made.fingertip) == (wanted.layout, wanted.control, wanted.fingertip)
-    start = wanted.trajectory.waypoints[0].position
+    assert (made.layout, made.control, made.section("fingertip")) == (
+        wanted.layout,
+        wanted.control,
+        wanted.section("fingertip"),
+    )
+    start = wanted.section("trajectory").waypoints[0].position
     # 32 bits of a few tenths of a Blender unit.
     assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - start).max() < 1e-7
     # What a scene needs from elsewhere is in the .blend.

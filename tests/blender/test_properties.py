@@ -36,8 +36,8 @@ def thing(layout: Layout | None = None) -> Any:
 
 def told(bed: Any, scene: Scene) -> Scene:
     """Return a scene as a bed's settings can tell it: its name, and no words or path of its own."""
-    path = resolve({"actuator": {"rest_height": scene.actuator.rest_height}}).trajectory
-    return dataclasses.replace(scene, name=bed.name, description="", trajectory=path)
+    path = resolve({"actuator": {"rest_height": scene.actuator.rest_height}}).section("trajectory")
+    return scene.with_sections(name=bed.name, description="", trajectory=path)
 
 
 def test_the_settings_of_a_new_bed_are_the_scene_of_an_empty_scene_file() -> None:

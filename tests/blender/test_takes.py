@@ -43,9 +43,9 @@ def taken(count: int = COUNT) -> tuple[Take, Floats]:
     first, heights = packed(system, state), [state.row(0)]
     poses = np.tile([0.0, 0.0, 0.0, *LEVEL], (count + 1, 1))
     poses[:, 2] = np.linspace(41e-3, 35e-3, count + 1)
-    for state in lived(system, state, poses):  # noqa: B020
+    for state in lived(system, state, poses[:, None]):  # noqa: B020
         heights.append(state.row(0))
-    return Take(made, first, poses, packed(system, state)), np.array(heights)
+    return Take(made, first, poses[:, None], packed(system, state)), np.array(heights)
 
 
 @pytest.fixture
@@ -53,7 +53,9 @@ def bed() -> Any:
     """Return a bed in the open file."""
     made = scene()
     bpy.context.scene.render.fps = 40  # a frame is five control periods
-    return view.build(Instant.at_rest(made.layout, made.actuator, made.fingertip), bpy.context.collection)
+    return view.build(
+        Instant.at_rest(made.layout, made.actuator, made.section("fingertip")), bpy.context.collection
+    )
 
 
 def shown(bed: Any, frame: float) -> Floats:
@@ -152,7 +154,7 @@ def test_the_fingertip_follows_its_keyframes(bed: Any) -> None:
     baked(bed, take)
     bpy.context.scene.frame_set(1 + 12)
     # Locations are float32.
-    assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, :3]).max() < 1e-7
+    assert np.abs(bridge.pose(view.fingertip_of(bed))[:3] - take.poses[60, 0, :3]).max() < 1e-7
 
 
 def test_baking_again_replaces_the_bake(bed: Any) -> None:
@@ -178,7 +180,9 @@ def test_freeing_a_bake_leaves_nothing_of_it(bed: Any) -> None:
 def other_bed() -> Any:
     """Return a second bed in the open file."""
     made = scene()
-    return view.build(Instant.at_rest(made.layout, made.actuator, made.fingertip), bpy.context.collection)
+    return view.build(
+        Instant.at_rest(made.layout, made.actuator, made.section("fingertip")), bpy.context.collection
+    )
 
 
 def same_action(bed: Any) -> Any:
@@ -239,7 +243,7 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
     bpy.context.scene.frame_set(3)
     *_, poses = bake.sampled(bpy.context.scene, bed, 1, 21, 5e-3)
     # 20 frames at 40 a second are 100 periods; a subframe is read to 1e-4 of a frame or better.
-    assert np.abs(poses[:, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
+    assert np.abs(poses[:, 0, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
     assert bpy.context.scene.frame_current == 3
 
 

@@ -14,9 +14,9 @@ from digiclay.core.model.contact import Contact
 from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.physics import speeds
-from digiclay.core.model.trajectory import Trajectory
+from digiclay.core.model.trajectory import Path, Trajectory, Waypoint
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Path, Scene, Waypoint
+from digiclay.core.scene.schema import Scene
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def way(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> Trajectory:
 def taken(scene: Scene, points: tuple[Waypoint, ...]) -> Scene:
     """Return a scene whose finger takes this straight way, and that lasts as long."""
     lasting = replace(scene.simulation, duration=points[-1].time)
-    return replace(scene, trajectory=Path("linear", points), simulation=lasting)
+    return scene.with_sections(trajectory=Path("linear", points), simulation=lasting)
 
 
 def half_shut(t: float, x: Floats, y: Floats) -> Floats:
@@ -158,7 +158,7 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
         shut = [replace(one, control=None, blister=None) for one in scenes]
         still = {number: result.history["height"].copy() for number, result in run_together(shut)}
     for number, scene in enumerate(scenes):
-        system, finger = assemble(scene), scene.trajectory.trajectory()
+        system, finger = assemble(scene), scene.section("trajectory").trajectory()
         assert_within_reach(system, finger, found[number])
         assert np.all(still[number] == 40e-3)
 

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from tests.assemble import path
 
 SYSTEM = assemble(resolve({"layout": {"rows": 6, "columns": 10}}))
-*_, LAST = periods(SYSTEM, path((0, 0, 0, 42), (0.2, 0, 0, 37)), begin(SYSTEM), 50)
+*_, LAST = periods(SYSTEM, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(SYSTEM), 50)
 KEPT = packed(SYSTEM, LAST)
-FINGER = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1))
+FINGER = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
 
 
 def goes_on(state: State) -> bool:
@@ -76,7 +76,7 @@ def test_any_bytes_are_noticed(some: bytes) -> None:
 def test_a_state_anywhere_in_a_session_is_taken_up_exactly(spots: list[tuple[int, int]]) -> None:
     times = np.linspace(0.0, 0.4, len(spots))
     way = path(*[(t, x / 10, 0, z / 10) for t, (x, z) in zip(times, spots, strict=True)])
-    for state in periods(SYSTEM, way, begin(SYSTEM), 80):
+    for state in periods(SYSTEM, [way], begin(SYSTEM), 80):
         if state.period % 20 == 0:
             data = packed(SYSTEM, state)
             again = unpacked(SYSTEM, data)

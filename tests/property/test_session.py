@@ -114,8 +114,8 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(
     system, path = bed(control=VirtualMaster()), finger(spots)
     state = record(system, path, when).last if when else begin(system)
     kept = state.copy()
-    once = step(system, state, path.poses(state.period * 5e-3 + system.instants))
-    again = step(system, state, path.poses(state.period * 5e-3 + system.instants))
+    once = step(system, state, path.poses(state.period * 5e-3 + system.instants)[:, None])
+    again = step(system, state, path.poses(state.period * 5e-3 + system.instants)[:, None])
     for name in ("rows", "modes", "aged"):
         assert np.array_equal(getattr(state, name), getattr(kept, name)), name
     for name in ("cells", "block", "mode"):

@@ -25,7 +25,7 @@ SCENE = sample("ridge_mound_valley")
 def session() -> Run:
     """The whole session at the default step."""
     system = assemble(SCENE)
-    return system, record(system, SCENE.trajectory.trajectory(), SCENE.periods)
+    return system, record(system, SCENE.section("trajectory").trajectory(), SCENE.periods)
 
 
 def between(session: Run, start: float, end: float) -> tuple[Floats, Floats]:
@@ -34,7 +34,7 @@ def between(session: Run, start: float, end: float) -> tuple[Floats, Floats]:
     rows = (run.time >= start) & (run.time < end) & (run.force.sum(axis=1) > 0.0)
     total = run.force[rows].sum(axis=1)
     centroid = run.force[rows] @ system.grid.positions / total[:, None]
-    finger = SCENE.trajectory.trajectory().poses(run.time[rows])[:, :2]
+    finger = SCENE.section("trajectory").trajectory().poses(run.time[rows])[:, :2]
     return total, np.hypot(*(centroid - finger).T)
 
 

@@ -129,7 +129,7 @@ def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
     system, way = _system(scene("viscous", recovery_time=1e6, side=17))
     sums = [
         (state.row(system.rows.target) - REST).sum()
-        for state in periods(system, way, begin(system), 700)
+        for state in periods(system, [way], begin(system), 700)
         if state.period * PERIOD >= 2.1
     ]
     # 1.4 s of 1e6 s, 1.4e-6; rounding.
@@ -139,7 +139,7 @@ def test_what_spreads_in_a_viscous_bed_is_not_lost() -> None:
 
 def _system(made: Scene) -> tuple[System, Any]:
     """Return a scene's system and the finger's way."""
-    return assemble(made), made.trajectory.trajectory()
+    return assemble(made), made.section("trajectory").trajectory()
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
@@ -149,7 +149,7 @@ def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str
     for factor in (1.0, 4.0):
         system, way = _system(made)
         wider = replace(system.controller, margin=factor * system.controller.margin)
-        *_, last = periods(replace(system, controller=wider), way, begin(system), 600)
+        *_, last = periods(replace(system, controller=wider), [way], begin(system), 600)
         ends.append((last.row(0), last.row(system.rows.target)))
     (narrow, asked), (wide, asked_wide) = ends
     # Beyond the border the displacement is below a tenth of the dead band: commanded heights differ by no
@@ -166,7 +166,7 @@ def test_a_viscous_bed_ends_at_rest() -> None:
 
 def test_a_viscous_bed_that_has_recovered_costs_nothing() -> None:
     system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
-    *_, last = periods(system, way, begin(system), 1200)
+    *_, last = periods(system, [way], begin(system), 1200)
     assert last.gathered.cells.size == 0
     assert np.all(last.row(system.rows.target) == REST)
 
@@ -202,7 +202,7 @@ def test_push_pull_runs_alike_whatever_the_force_sensors_say() -> None:
 
     system, way = _system(scene("push_pull"))
     blind = replace(system, sensors=Blind())
-    ends = [list(periods(one, way, begin(one), 600))[-1].row(0) for one in (system, blind)]
+    ends = [list(periods(one, [way], begin(one), 600))[-1].row(0) for one in (system, blind)]
     assert np.array_equal(*ends)
 
 

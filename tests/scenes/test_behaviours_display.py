@@ -102,8 +102,8 @@ def test_a_small_step_settles_as_quickly_as_digital_clay_s_hardware() -> None:
 
 def test_a_finished_display_costs_nothing() -> None:
     made = scene(refresh="approximate_gradual")
-    system, way = assemble(made), made.trajectory.trajectory()
-    *_, last = periods(system, way, begin(system), 2000)
+    system, way = assemble(made), made.section("trajectory").trajectory()
+    *_, last = periods(system, [way], begin(system), 2000)
     assert last.gathered.cells.size == 0
 
 

@@ -36,7 +36,7 @@ def cut(name: str) -> Scene:
 
 def heights(scene: Scene) -> NDArray[np.float64]:
     """Return all heights of a run, (t, n), m."""
-    return record(assemble(scene), scene.trajectory.trajectory(), scene.periods).height
+    return record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods).height
 
 
 @cache

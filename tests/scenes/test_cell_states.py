@@ -20,7 +20,7 @@ def lasting(scene: Scene) -> State:
     """Run a scene to its end and return the last state."""
     system = assemble(scene)
     state = begin(system)
-    *_, last = periods(system, scene.trajectory.trajectory(), state, scene.periods)
+    *_, last = periods(system, scene.trajectories(), state, scene.periods)
     return last
 
 

@@ -174,7 +174,7 @@ def unpack(flat: Floats, count: int, near: int) -> tuple[Floats, Floats, Floats]
 def session() -> tuple[Record, Floats, Floats]:
     """The session by the core, and its heights and forces by SciPy."""
     scene = sample("ridge_mound_valley")
-    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    system, trajectory = assemble(scene), scene.section("trajectory").trajectory()
     run = record(system, trajectory, round(trajectory.duration / system.period))
     return (run, *integrate(numbers(), spline(trajectory), system, run))
 

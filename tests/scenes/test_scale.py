@@ -21,7 +21,7 @@ def test_as_many_cells_take_part_on_40000_pins_as_on_625() -> None:
 def test_a_period_on_40000_pins_takes_the_numpy_calls_of_one_on_625() -> None:
     def calls(side: int) -> list[int]:
         known = scene(side)
-        return period_calls(assemble(known), known.trajectory.trajectory(), 120)[0]
+        return period_calls(assemble(known), known.trajectories(), 120)[0]
 
     small = calls(SMALL)
     assert min(small) >= 0

@@ -108,8 +108,8 @@ def test_the_method_shape_display_shows_the_scenes_shape_in_its_own_way() -> Non
 
 def test_a_shape_that_stands_costs_nothing() -> None:
     made = scene("virtual_master")
-    system, way = assemble(made), made.trajectory.trajectory()
-    *_, last = periods(system, way, begin(system), round(SHOWN / PERIOD))
+    system, way = assemble(made), made.section("trajectory").trajectory()
+    *_, last = periods(system, [way], begin(system), round(SHOWN / PERIOD))
     assert last.gathered.cells.size == 0
 
 
@@ -127,11 +127,11 @@ def test_a_session_without_a_shape_is_what_it_was_before() -> None:
 def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) -> None:
     # While the shape is coming up, and while the finger presses it.
     made = scene(method)
-    system, way = assemble(made), made.trajectory.trajectory()
-    (state,) = deque(periods(system, way, begin(system), round(moment / PERIOD)), maxlen=1)
+    system, way = assemble(made), made.section("trajectory").trajectory()
+    (state,) = deque(periods(system, [way], begin(system), round(moment / PERIOD)), maxlen=1)
     again = unpacked(system, packed(system, state))
-    (one,) = deque(periods(system, way, state, 40), maxlen=1)
-    (other,) = deque(periods(system, way, again, 40), maxlen=1)
+    (one,) = deque(periods(system, [way], state, 40), maxlen=1)
+    (other,) = deque(periods(system, [way], again, 40), maxlen=1)
     assert np.array_equal(one.row(0), other.row(0))
     assert packed(system, one) == packed(system, other)
 

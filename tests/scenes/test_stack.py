@@ -12,7 +12,8 @@ from digiclay.core.base.errors import DivergenceError, ParameterError
 from digiclay.core.batch.packing import STACKED, structure, why_not
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS
-from digiclay.core.scene.schema import Scene, Waypoint
+from digiclay.core.model.trajectory import Waypoint
+from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, sample
@@ -25,9 +26,9 @@ def moved(known: Scene, x: float, z: float) -> Scene:
     """Return a scene whose finger takes the same way elsewhere, m."""
     points = tuple(
         replace(point, position=(point.position[0] + x, point.position[1], point.position[2] + z))
-        for point in known.trajectory.waypoints
+        for point in known.section("trajectory").waypoints
     )
-    return replace(known, trajectory=replace(known.trajectory, waypoints=points))
+    return known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
 
 
 def together(scenes: Sequence[Scene]) -> list[Any]:
@@ -157,9 +158,8 @@ def test_a_finger_that_comes_back_finds_the_pulp_as_relaxed_as_alone() -> None:
         for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))
     )
     known = sample("tap", "control.method=plastic")
-    twice = replace(
-        known,
-        trajectory=replace(known.trajectory, waypoints=points),
+    twice = known.with_sections(
+        trajectory=replace(known.section("trajectory"), waypoints=points),
         simulation=replace(known.simulation, duration=0.9),
     )
     scenes = [twice, moved(twice, 1e-3, -0.5e-3)]

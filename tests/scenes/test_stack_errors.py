@@ -43,13 +43,17 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
 @pytest.mark.parametrize("method", STACKED)
 def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
-    first, *others = known.trajectory.waypoints
+    first, *others = known.section("trajectory").waypoints
     scenes = []
     for i in range(3):
         x, y, z = first.position
         way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
         lasting = replace(known.simulation, duration=0.7 + 0.2 * i)
-        scenes.append(replace(known, trajectory=replace(known.trajectory, waypoints=way), simulation=lasting))
+        scenes.append(
+            known.with_sections(
+                trajectory=replace(known.section("trajectory"), waypoints=way), simulation=lasting
+            )
+        )
     assert_estimated_as_alone(scenes)
 
 
@@ -87,9 +91,9 @@ def test_pins_on_their_end_stops_are_as_exact_as_alone() -> None:
     known = sample("tap", "actuator.rest_height=1.5e-3", *settings)
     points = tuple(
         replace(point, position=(*point.position[:2], point.position[2] - 39e-3))
-        for point in known.trajectory.waypoints
+        for point in known.section("trajectory").waypoints
     )
-    low = replace(known, trajectory=replace(known.trajectory, waypoints=points))
+    low = known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
     assert_estimated_as_alone([low, replace(low, actuator=replace(low.actuator, rest_height=1e-3))])
 
 

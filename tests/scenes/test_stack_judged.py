@@ -50,13 +50,17 @@ def assert_as(found: Any, alone: Any) -> None:
 @pytest.mark.parametrize("method", STACKED)
 def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=2.5")
-    first, *others = known.trajectory.waypoints
+    first, *others = known.section("trajectory").waypoints
     scenes = []
     for i in range(3):
         x, y, z = first.position
         way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
         lasting = replace(known.simulation, duration=1.5 - 0.2 * i)
-        scenes.append(replace(known, trajectory=replace(known.trajectory, waypoints=way), simulation=lasting))
+        scenes.append(
+            known.with_sections(
+                trajectory=replace(known.section("trajectory"), waypoints=way), simulation=lasting
+            )
+        )
     assert_judged_as_alone(scenes)
 
 
@@ -109,9 +113,9 @@ def test_a_run_that_diverges_is_told_and_the_others_are_judged() -> None:
     known = sample("slow_press", "simulation.stepper=euler", *long)
     points = tuple(
         replace(point, position=(*point.position[:2], point.position[2] + 20e-3))
-        for point in known.trajectory.waypoints
+        for point in known.section("trajectory").waypoints
     )
-    away = replace(known, trajectory=replace(known.trajectory, waypoints=points))
+    away = known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
     found = judged([away, known])
     assert isinstance(found[1], DivergenceError)
     assert_as(found[0], run(away))

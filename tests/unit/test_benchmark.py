@@ -61,16 +61,16 @@ def test_methods_of_plain_arrays_are_counted(ledger: Ledger) -> None:
 def test_the_products_of_a_period_are_all_counted() -> None:
     # Python's own profiler says how often the core asks for a product.
     scene, asked = sample("ridge_mound_valley"), 0
-    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    system, trajectories = assemble(scene), scene.trajectories()
 
     def noted(frame: FrameType, event: str, called: object) -> None:
         nonlocal asked
         asked += event == "c_call" and getattr(called, "__name__", "") == "dot"
 
-    calls, counted = period_calls(system, trajectory, 300)
+    calls, counted = period_calls(system, trajectories, 300)
     sys.setprofile(noted)
     try:
-        for _ in periods(system, trajectory, begin(system), 300):
+        for _ in periods(system, trajectories, begin(system), 300):
             pass
     finally:
         sys.setprofile(None)
@@ -167,11 +167,11 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(term: str) -> None:
     scene = sample("tap")
     less = without(scene, term)
     section = TERMS[term]
-    if getattr(scene, section) is None:
+    if scene.section(section) is None:
         assert less is None
     else:
         assert less is not None
-        assert replace(less, **{section: getattr(scene, section)}) == scene
+        assert less.with_sections(**{section: scene.section(section)}) == scene
 
 
 def test_the_longer_step_is_the_control_period() -> None:

@@ -20,8 +20,8 @@ from benchmarks.runs_together import STUDIES, Size, study
 def test_the_runs_of_a_study_differ_and_stand_together(name: str) -> None:
     scenes = study(load(find("tap")), name, LEAST)
     section, key, low, high = STUDIES[name]
-    usual = getattr(getattr(load(find("tap")), section), key)
-    values = np.array([getattr(getattr(scene, section), key) for scene in scenes])
+    usual = getattr(load(find("tap")).section(section), key)
+    values = np.array([getattr(scene.section(section), key) for scene in scenes])
     assert np.all(np.diff(values) > 0.0)
     assert low * usual < values[0] < values[-1] < high * usual
     assert len({structure(scene) for scene in scenes}) == 1

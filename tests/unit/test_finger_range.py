@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
 from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, beyond_words, largest_indentation
 from digiclay.core.model.fingertip import Fingertip
-from digiclay.core.scene.schema import Path, Scene, Waypoint
+from digiclay.core.model.trajectory import Path, Waypoint
+from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run
 from digiclay.overlay.sections import force_words
 
@@ -21,7 +20,7 @@ def pressed(depth: float, **parts: object) -> Result:
     points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
     way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z)) for time, z in points))
     known: Scene = sample("tap", "simulation.duration=0.15")
-    return run(replace(known, trajectory=way, **{"control": None, "blister": None, **parts}))
+    return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def system_of(method: str = "virtual_master", **tables: Any) -> System:
 
 def run(system: System, state: State, count: int) -> State:
     """Return the state some periods later."""
-    *_, last = periods(system, PRESS, state, count)
+    *_, last = periods(system, [PRESS], state, count)
     return last
 
 
@@ -232,7 +232,7 @@ def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None
     state = carried(other, data)
     assert np.array_equal(state.row(0), before)
     # Nothing calls the pins back: without a finger they stay where they are.
-    *_, later = periods(other, path((0.0, 0, 0, 500)), state, 40)
+    *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
     assert np.array_equal(later.row(0), before)
 
 

@@ -93,23 +93,23 @@ def test_the_clock_does_not_grow() -> None:
 
 
 def pose(x: float = 0.0, z: float = 0.05) -> Floats:
-    """Return a level finger's pose, m."""
-    return np.array([x, 0.0, z, *LEVEL])
+    """Return a level finger's pose, m, as that of the only one."""
+    return np.array([[x, 0.0, z, *LEVEL]])
 
 
 def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
-    start, end = pose(), np.array([0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0])
+    start, end = pose(), np.array([[0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0]])
     path = way(start, end, 7)
-    assert path.shape == (8, 7)
+    assert path.shape == (8, 1, 7)
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(np.diff(path[:, :3], axis=0), [(end - start)[:3] / 7] * 7, atol=1e-16)
+    np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
 
 
 def test_ways_worked_out_together_are_those_worked_out_one_by_one() -> None:
     random = np.random.default_rng(2)
-    poses = random.normal(size=(40, 7))
-    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1)[:, None]
+    poses = random.normal(size=(40, 2, 7))
+    poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1)[..., None]
     parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
     alone = [between(a, b, parts) for a, b in pairwise(poses)]
     assert np.array_equal(along(poses, parts), alone)
@@ -133,7 +133,7 @@ def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() 
     ],
 )
 def test_a_finger_stays_where_a_finger_can_be(given: tuple[float, ...], wanted: tuple[float, ...]) -> None:
-    at = pose()
+    (at,) = pose()
     at[:3] = given
     assert reachable(at, 0.1)[:3].tolist() == list(wanted)
 
@@ -156,7 +156,7 @@ def test_a_trace_spans_ten_seconds_also_with_a_short_control_period() -> None:
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     press = path((0, 0, 0, 42), (0.2, 0, 0, 36))
     system = assemble(resolve({}))
-    *_, state = periods(system, press, begin(system), 60)
+    *_, state = periods(system, [press], begin(system), 60)
     middle, corner = 312, 0
     assert np.isin([middle, corner], state.gathered.cells).tolist() == [True, False]
     trace = picked(begun(PERIOD), [middle, corner], system.grid.count)
@@ -174,7 +174,7 @@ def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
 
 def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
     press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
-    *_, state = periods(SYSTEM, press, begin(SYSTEM), 10)
+    *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
     held, asked = state.gathered, SetPoint(0.04, per_cell=True)
     held.mode[:] = Mode.REST
     assert np.isnan(row(SYSTEM, state, asked, ())[2])

@@ -48,7 +48,7 @@ def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) 
     played = scripted(lambda time, x, y: command_in(round(time / PERIOD)))
     system = replace(assemble(known), controller=played(PERIOD))
     true, read = [0.0], [0.0]
-    for state in periods(system, known.trajectory.trajectory(), begin(system), count):
+    for state in periods(system, known.trajectories(), begin(system), count):
         true.append(float(state.row(system.rows.force)[0]))
         read.append(sensed(system, state))
     return np.array(true), np.array(read)

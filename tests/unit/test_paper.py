@@ -111,7 +111,10 @@ def test_a_slowed_session_takes_as_many_times_as_long() -> None:
     session = load(find(SESSION))
     slow = scenes.slowed(session, 1.5)
     assert slow.simulation.duration == pytest.approx(1.5 * session.simulation.duration)
-    assert slow.trajectory.waypoints[3].position == session.trajectory.waypoints[3].position
+    assert (
+        slow.section("trajectory").waypoints[3].position
+        == session.section("trajectory").waypoints[3].position
+    )
 
 
 def test_the_fastest_lift_of_a_slowed_session_is_as_many_times_slower() -> None:

@@ -150,7 +150,7 @@ def test_rows_written_together_are_those_of_the_states_one_by_one(every: int) ->
     start = begin(system)
     recording = Recording(Recorder(every), system.rows, start, scene.periods)
     height, force, command, mode = [start.row(0)], [start.row(system.rows.force)], [], []
-    for state in periods(system, scene.trajectory.trajectory(), start, scene.periods):
+    for state in periods(system, scene.trajectories(), start, scene.periods):
         recording.observe(state)
         if (state.period - 1) % every == 0:
             command.append(state.row(system.rows.command))

@@ -24,12 +24,12 @@ def test_an_empty_file_is_a_whole_scene() -> None:
 
 def test_every_section_but_those_nobody_asked_for_has_a_part_in_the_scene() -> None:
     scene = resolve({})
-    assert tuple(name for name in SECTIONS if getattr(scene, name) is None) == UNASKED
+    assert tuple(name for name in SECTIONS if scene.section(name) is None) == UNASKED
 
 
 def test_a_scene_without_a_path_presses_once_below_the_rest_height() -> None:
     scene = section("actuator", rest_height=0.03)
-    lowest = min(point.position[2] for point in scene.trajectory.waypoints)
+    lowest = min(point.position[2] for point in scene.section("trajectory").waypoints)
     assert 0.0 < lowest < 0.03
 
 
@@ -41,7 +41,7 @@ def test_a_quantity_may_be_written_with_a_unit() -> None:
 
 
 def test_a_list_of_quantities_may_be_written_with_units() -> None:
-    relaxation = section("relaxation", times=["4 ms", 0.07, "1.4 s"]).relaxation
+    relaxation = section("relaxation", times=["4 ms", 0.07, "1.4 s"]).section("relaxation")
     assert relaxation is not None
     assert relaxation.times == pytest.approx((4e-3, 0.07, 1.4), rel=1e-15)
 
@@ -55,8 +55,8 @@ def test_a_preset_changes_what_it_says_and_nothing_else(preset: str) -> None:
     asked: dict[str, Any] = {name: {} for name in UNASKED}
     changed, plain = resolve({"preset": preset, **asked}), resolve(asked)
     for name in PARTS:
-        wanted = replace(getattr(plain, name), **PRESETS[preset].get(name, {}))
-        assert getattr(changed, name) == wanted
+        wanted = replace(plain.section(name), **PRESETS[preset].get(name, {}))
+        assert changed.section(name) == wanted
 
 
 def test_the_file_wins_over_the_preset() -> None:
@@ -65,25 +65,25 @@ def test_the_file_wins_over_the_preset() -> None:
 
 
 def test_a_hexagonal_bed_shares_the_force_among_more_cells() -> None:
-    contact = section("layout", arrangement="hexagonal").contact
+    contact = section("layout", arrangement="hexagonal").section("contact")
     assert contact is not None
     assert contact.share == 0.29
 
 
 def test_the_file_wins_over_the_share_of_a_hexagonal_bed() -> None:
-    contact = resolve({"layout": {"arrangement": "hexagonal"}, "contact": {"share": 0.3}}).contact
+    contact = resolve({"layout": {"arrangement": "hexagonal"}, "contact": {"share": 0.3}}).section("contact")
     assert contact is not None
     assert contact.share == 0.3
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
 def test_an_optional_part_can_be_left_out(name: str) -> None:
-    assert getattr(resolve({name: "absent"}), name) is None
+    assert resolve({name: "absent"}).section(name) is None
 
 
 @pytest.mark.parametrize(("name", "other"), NEEDS.items())
 def test_a_part_leaves_together_with_the_one_it_needs(name: str, other: str) -> None:
-    assert getattr(resolve({other: "absent"}), name) is None
+    assert resolve({other: "absent"}).section(name) is None
 
 
 def test_the_duration_is_the_trajectorys_unless_it_is_given() -> None:
@@ -281,7 +281,7 @@ def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table: dict[str, A
 def test_a_written_scene_names_every_parameter() -> None:
     scene = resolve({name: {} for name in UNASKED})
     tables = tomllib.loads(text(scene))
-    missing = [(name, key) for name in PARTS for key in vars(getattr(scene, name)) if key not in tables[name]]
+    missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
     assert missing == []
 
 

@@ -69,7 +69,9 @@ def test_a_setting_may_be_a_text_without_quotes(tmp_path: Path) -> None:
 
 
 def test_a_setting_may_be_a_list(tmp_path: Path) -> None:
-    relaxation = scene(tmp_path, "", relaxation__times="[1.0]", relaxation__weights="[1, 1]").relaxation
+    relaxation = scene(tmp_path, "", relaxation__times="[1.0]", relaxation__weights="[1, 1]").section(
+        "relaxation"
+    )
     assert relaxation is not None
     assert relaxation.times == (1.0,)
 

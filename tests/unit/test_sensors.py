@@ -205,13 +205,13 @@ def test_another_seed_gives_another_session() -> None:
 
 def test_a_session_taken_up_again_in_the_middle_ends_the_same() -> None:
     noisy = scene(*ALL)
-    system, path = assemble(noisy), noisy.trajectory.trajectory()
+    system, path = assemble(noisy), noisy.section("trajectory").trajectory()
     whole, halfway = begin(system), None
-    for whole in periods(system, path, whole, 400):  # noqa: B020
+    for whole in periods(system, [path], whole, 400):  # noqa: B020
         if whole.period == 207:
             halfway = whole.copy()
     assert halfway is not None
-    for again in periods(system, path, halfway, 400 - 207):
+    for again in periods(system, [path], halfway, 400 - 207):
         end = again
     np.testing.assert_array_equal(end.row(0), whole.row(0))
 

@@ -59,7 +59,7 @@ def test_modes_are_stored_as_small_integers(result: Result) -> None:
 
 def test_the_finger_stands_in_each_row_where_the_path_is_then(result: Result) -> None:
     assert result.history is not None
-    wanted = scene().trajectory.trajectory().poses(result.history["time"])
+    wanted = scene().section("trajectory").trajectory().poses(result.history["time"])
     assert np.array_equal(result.history["fingertip"], wanted)
 
 

@@ -87,7 +87,7 @@ def calls(count: int) -> list[int]:
     scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
     systems = [assemble(scene) for scene in scenes if scene]
     stack = put_together(systems)
-    state, ways = begin(stack), [scene.trajectory.trajectory() for scene in scenes if scene]
+    state, ways = begin(stack), [scene.section("trajectory").trajectory() for scene in scenes if scene]
     made, counted = [0], []
 
     def count_one(frame: Any, event: str, argument: Any) -> None:

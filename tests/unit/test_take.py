@@ -44,7 +44,7 @@ def gesture(count: int = COUNT) -> Floats:
     poses[:, 4] = 0.1 * part
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     at = np.arange(count + 1)
-    return np.column_stack([np.interp(at, read, column) for column in poses.T])
+    return np.column_stack([np.interp(at, read, column) for column in poses.T])[:, None]
 
 
 def taken(start: State | None = None) -> tuple[System, Take, State]:
@@ -76,7 +76,7 @@ def test_a_take_begun_on_a_formed_bed_replays_bit_for_bit_too() -> None:
 def test_a_replay_on_another_path_does_not_pass_for_the_take() -> None:
     _, take, _ = taken()
     poses = take.poses.copy()
-    poses[COUNT // 2, 2] += 1e-9
+    poses[COUNT // 2, 0, 2] += 1e-9
     assert not replayed(replace(take, poses=poses))
 
 
@@ -116,7 +116,7 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> No
     file = tmp_path / "my take.toml"  # type: ignore[operator]
     file.write_text(text(as_scene(take, "my take")), encoding="utf-8")
     read = load(file)
-    done = record(assemble(read), read.trajectory.trajectory(), read.periods)
+    done = record(assemble(read), read.section("trajectory").trajectory(), read.periods)
     assert read.periods == COUNT
     # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a thousandfold.
     assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
@@ -126,17 +126,17 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> No
 def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
     # Nobody begins to record in the very period a session starts in.
     system, take, last = taken()
-    away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1))
+    away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1))
     *_, waited = lived(system, begin(system), away)
     late = as_scene(replace(take, start=packed(system, waited)), "late")
-    done = record(assemble(late), late.trajectory.trajectory(), late.periods)
+    done = record(assemble(late), late.section("trajectory").trajectory(), late.periods)
     assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
 
 
 def test_only_turning_points_of_the_path_become_waypoints() -> None:
     _, take, _ = taken()
     # The finger was read every 6th period, and goes straight in between.
-    assert len(as_scene(take, "take").trajectory.waypoints) <= COUNT // 6 + 2
+    assert len(as_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
 
 
 def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
@@ -154,9 +154,10 @@ def test_states_come_one_a_period() -> None:
 @pytest.mark.parametrize(
     ("poses", "rule"),
     [
-        (np.zeros((1, 7)), "must hold one control period at least"),
-        (np.zeros((3, 6)), "must hold one control period at least"),
-        (np.full((3, 7), np.nan), "must be finite numbers"),
+        (np.zeros((1, 1, 7)), "must hold one control period at least"),
+        (np.zeros((3, 1, 6)), "must hold one control period at least"),
+        (np.zeros((3, 2, 7)), "of 1 x 7 numbers, a pose a finger"),
+        (np.full((3, 1, 7), np.nan), "must be finite numbers"),
     ],
 )
 def test_a_path_that_is_none_is_refused(poses: Floats, rule: str) -> None:

@@ -144,7 +144,7 @@ def test_the_pulp_over_a_pin_goes_on_relaxing_after_contact() -> None:
     kept = []
     for height in heights:
         pose = np.array([0, 0, height * 1e-3, *LEVEL])
-        state = step(system, state, np.tile(pose, (system.instants.size, 1)))
+        state = step(system, state, np.tile(pose, (system.instants.size, 1, 1)))
         kept.append([float(state.row(row)[0]) for row in filters])
     after, last = np.array(kept[19]), np.array(kept[-1])
     assert after.min() > 0.0

@@ -17,6 +17,7 @@ from ..core.control.methods import METHODS
 from ..core.metrics.finger_path import sum_cells
 from ..core.model.finger_range import beyond_words, largest_indentation
 from ..core.model.set_point import asked
+from ..core.scene.assembly import assemble
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.studies.speed_limits import Criterion, Drag, Lift, largest_speed
@@ -124,8 +125,8 @@ def _run(scene: Scene, method: str, *, quiet: bool) -> Trial:
 
 def _beyond(done: Trial) -> str:
     """Say what of a run is beyond a finger."""
-    tip, history = done.scene.fingertip, done.history
-    deepest = largest_indentation(tip, history) if tip else None
+    touch, history = assemble(done.scene).cell.touch, done.history
+    deepest = largest_indentation(touch.fingertip, history) if touch else None
     return beyond_words(float(history["total_force"].max()), deepest)
 
 

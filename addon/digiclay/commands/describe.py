@@ -55,7 +55,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
     yield f"\nThe line from finger to pins (preset {scene.preset})"
     for place, section in PLACES:
-        part = getattr(scene, section)
+        part = scene.section(section)
         method = f"{scene.method}: " if section == "control" else ""
         yield _filled(place, "left out" if part is None else method + _parameters(part))
     if scene.shape:
@@ -75,8 +75,9 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield "\nThe session"
     period, step = human(simulation.control_period, "s"), human(simulation.physics_step, "s")
     yield f"  {simulation.duration:g} s, {scene.periods} control periods of {period}, physics steps of {step}"
-    points = scene.trajectory.waypoints
-    yield f"  {len(points)} waypoints, {scene.trajectory.interpolation}, the last at {points[-1].time:g} s"
+    for finger in scene.fingers:
+        path, points = finger.trajectory, finger.trajectory.waypoints
+        yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
     sizes = scene.cells, scene.periods, busy_cells(scene)
     needed, free = bytes_needed(scene.recorder, system.rows, *sizes), available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ..core.base.errors import DigiclayError
 from ..core.base.run_folder import claimed_files
 from ..core.metrics.summary import compute_metrics
-from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import last_touch, read, row_at
 from ..core.session.render_settings import COLOURS, ENGINES, Film, Still, Turntable
@@ -133,8 +132,9 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
 
 def sizes(scene: Scene) -> dict[str, Any]:
     """Return what drawing needs to know of the device."""
-    finger = scene.fingertip or Fingertip()
-    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": finger}
+    from ..device.instant import find_ellipsoid
+
+    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}
 
 
 def picture(

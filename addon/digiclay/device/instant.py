@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
-from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.model.fingertip import LEVEL, Fingertip, require_one
 from ..core.model.layout import Layout, grid
+from ..core.scene.schema import Scene
 from ..core.session import finished_run
 
-__all__ = ["CLEARANCE", "Instant", "read"]
+__all__ = ["CLEARANCE", "Instant", "find_ellipsoid", "pick_pose", "read"]
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -125,6 +126,16 @@ class Instant:
         return [Mode(int(code)) for code in np.unique(self.mode)]
 
 
+def find_ellipsoid(scene: Scene) -> Fingertip:
+    """Return the ellipsoid a bed's fingertip is drawn as, also where a scene leaves the finger out."""
+    return require_one(scene.fingers).fingertip or Fingertip()
+
+
+def pick_pose(poses: Floats) -> Floats:
+    """Return the pose (7,) of the finger that a bed's fingertip shows, of those of all fingers (f, 7)."""
+    return require_one(tuple(poses))
+
+
 def read(path: Path, index: int = -1) -> Instant:
     """Read an instant of a finished_run run.
 
@@ -149,5 +160,5 @@ def read(path: Path, index: int = -1) -> Instant:
         index,
         pitch=scene.layout.pitch,
         actuator=scene.actuator,
-        finger=scene.fingertip or Fingertip(),
+        finger=find_ellipsoid(scene),
     )

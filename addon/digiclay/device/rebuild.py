@@ -7,12 +7,11 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import Scene
 from ..live import bed_state
 from ..settings import properties
 from . import view
-from .instant import Instant
+from .instant import Instant, find_ellipsoid
 from .roles import FINGER
 
 __all__ = ["rebuild"]
@@ -34,7 +33,7 @@ def rebuild(bed: Any) -> Scene:
         When the settings do not go together; the bed stays as it is.
     """
     scene = properties.described(bed)
-    instant = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
+    instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
     old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _nodes(bed)]
     made = view.build(instant, bed.users_collection[0], lowest=0.0)
     bed.data = made.data

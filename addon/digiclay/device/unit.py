@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 from .. import bridge
 from ..compat import bpy, own_curves
 from ..core.base.errors import DigiclayError
-from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import Scene
 from ..settings import properties
 from . import parts, view
-from .instant import Instant
+from .instant import Instant, find_ellipsoid
 from .roles import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
 
 __all__ = ["Faults", "adopt", "faults", "follow", "give_fingertip", "mend"]
@@ -107,7 +106,7 @@ def give_fingertip(bed: Any, scene: Scene) -> str:
             bed.users_collection[0].objects.link(part)
         return f"{bed.name} got its fingertip back"
     made = parts.fingertip(bed.users_collection[0], bed)
-    rest = Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip())
+    rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
     bridge.place_fingertip(made, rest.fingertip, rest.finger)
     view.guard(bed)
     return f"{bed.name} got a new fingertip"
@@ -172,7 +171,7 @@ def _made_whole(bed: Any) -> None:
         scene = Scene()
     give_fingertip(bed, scene)
     if view.is_drawn(bed) and view.housing_of(bed) is None:  # of an older file, where it is an object
-        view.dress(bed, Instant.at_rest(scene.layout, scene.actuator, scene.fingertip or Fingertip()))
+        view.dress(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
     view.guard(bed)
 
 

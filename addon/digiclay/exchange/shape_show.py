@@ -11,7 +11,7 @@ import numpy as np
 from .. import bridge
 from ..core.base.errors import DigiclayError, ParameterError
 from ..core.engine.simulation import begin, periods
-from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.model.fingertip import LEVEL
 from ..core.model.layout import grid
 from ..core.model.trajectory import level
 from ..core.scene.assembly import assemble
@@ -24,7 +24,7 @@ from ..core.shapes.relief import Relief
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import Fitted, fitted, fitted_to
 from ..device import view
-from ..device.instant import CLEARANCE
+from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import bed_state, sculpting
 from ..settings import properties
 
@@ -103,7 +103,7 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     assert display is not None
     finger = level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))
     count = min(display_time(display), LONGEST) / system.period
-    (state,) = deque(periods(system, finger, begin(system), max(1, round(count))), maxlen=1)
+    (state,) = deque(periods(system, [finger], begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
     pose = _lifted(bed, scene, state.row(0))
     # All that can fail is done: from here on the bed changes.
@@ -117,13 +117,13 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     view.show_state(bed, system, began.state)
     tip = view.fingertip_of(bed)
     if tip is not None:
-        bridge.place_fingertip(tip, pose, scene.fingertip or Fingertip())
+        bridge.place_fingertip(tip, pose, find_ellipsoid(scene))
     return laid, off
 
 
 def _lifted(bed: Any, scene: Scene, heights: Any) -> Any:
     """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
-    tip, finger = view.fingertip_of(bed), scene.fingertip or Fingertip()
+    tip, finger = view.fingertip_of(bed), find_ellipsoid(scene)
     pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
     touch = touch_height(grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
     pose[2] = max(pose[2], touch + CLEARANCE)

@@ -40,8 +40,8 @@ class Recording:
         The state recording began with, kept by `core.session.snapshot`.
     first : int
         Its period.
-    rows : ndarray (capacity, 8)
-        Pose at the end of each period and the moment it was simulated in; row 0: the start.
+    rows : ndarray (capacity, 7 f + 1)
+        Poses of the fingers at the end of each period and the moment it was simulated in; row 0: the start.
     count : int
         How many of the rows are in use. Those behind belong to nobody.
     saved : int
@@ -57,14 +57,14 @@ class Recording:
     @classmethod
     def begun(cls, kept: bytes, period: int, pose: Floats, moment: int) -> Recording:
         """Return a recording that has nothing but its start."""
-        rows = np.empty((256, 8))
-        rows[0] = *pose, moment
+        rows = np.empty((256, pose.size + 1))
+        rows[0] = *pose.ravel(), moment
         return cls(kept, period, rows, 1)
 
     @property
     def path(self) -> Floats:
-        """Poses, shape (t + 1, 7): `core.session.live_periods.lived` simulates them again bit for bit."""
-        return self.rows[: self.count, :7]
+        """Poses, shape (t + 1, f, 7): `core.session.live_periods.lived` simulates them again bit for bit."""
+        return self.rows[: self.count, :-1].reshape(self.count, -1, 7)
 
     @property
     def unsaved(self) -> bool:
@@ -72,19 +72,19 @@ class Recording:
         return self.count > max(self.saved, 1)
 
     def extended(self, path: Floats, moment: int) -> Recording:
-        """Return the recording with the poses of some more periods, shape (k, 7)."""
+        """Return the recording with the poses of some more periods, shape (k, f, 7)."""
         end = self.count + len(path)
         rows = self.rows
         if end > len(rows):
-            rows = np.empty((2 * end, 8))
+            rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
-        rows[self.count : end, :7] = path
-        rows[self.count : end, 7] = moment
+        rows[self.count : end, :-1] = path.reshape(len(path), -1)
+        rows[self.count : end, -1] = moment
         return replace(self, rows=rows, count=end)
 
     def at(self, moment: int, period: int) -> Recording | None:
         """Return the recording as it was at a moment undo came back to; None when it did not lead there."""
-        count = int(np.searchsorted(self.rows[: self.count, 7], moment, side="right"))
+        count = int(np.searchsorted(self.rows[: self.count, -1], moment, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 
     def until(self, period: int) -> Recording | None:
@@ -178,7 +178,7 @@ class Running:
 
     @property
     def path(self) -> Floats | None:
-        """Recorded poses (t + 1, 7), row 0 the start; None when nothing is recorded."""
+        """Recorded poses (t + 1, f, 7), row 0 the start; None when nothing is recorded."""
         return self.recording.path if self.recording else None
 
 

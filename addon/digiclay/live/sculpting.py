@@ -13,6 +13,7 @@ from ..core.base.errors import StateError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
+from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy
@@ -137,15 +138,15 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
     else:
         pose = reachable(pose, system.cell.actuator.stroke)
         running = _about_to_touch(running, pose, count)
-        path = way(running.pose, pose, count)
-    rows, errors = [], running.errors
+        path = way(running.pose[None], pose[None], count)[:, 0]
+    rows, errors, paths = [], running.errors, wrap_one(path)
     started = time.perf_counter()
     # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
     with np.errstate(over="ignore", invalid="ignore"):
         monitor = monitor and accuracy.begin_stretch(monitor, state)
-        for index, state in enumerate(lived(system, running.state, path)):
+        for index, state in enumerate(lived(system, running.state, paths)):
             if monitor:
-                monitor, found = accuracy.follow(monitor, state, path[index : index + 2])
+                monitor, found = accuracy.follow(monitor, state, paths[index : index + 2])
                 errors = found or errors
             if state.period % running.trace.every == 0:
                 rows.append(row(system, state, running.scene.set_point, running.trace.pins))
@@ -153,7 +154,7 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
     gone = replace(
         running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, monitor=monitor,
         errors=errors, trace=extended(running.trace, rows),
-        recording=running.recording and running.recording.extended(path[1:], running.moment),
+        recording=running.recording and running.recording.extended(paths[1:], running.moment),
     )  # fmt: skip
     return _touched(gone)
 

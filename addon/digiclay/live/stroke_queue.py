@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.model.fingertip import Fingertip
+from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
 from .stroke import Stroke, follow, start
 
@@ -60,7 +60,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
     if first.height is None:
         begun = Gesture(running.state.period, running.kept, running.pose)
         running = replace(running, coming=begun, stroke_start=begun)
-    finger = running.scene.fingertip or Fingertip()
+    finger = find_ellipsoid(running.scene)
     height = running.state.row(0)
     now = running.clock.seen or first.began
     stroke, path = follow(first, system.grid, height, finger, running.pose, count, system.period, now)

@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import bridge, preferences
 from ..core.base.errors import DigiclayError, DivergenceError
-from ..core.model.fingertip import Fingertip
 from ..device import display, unit, view
+from ..device.instant import find_ellipsoid
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..settings import properties
@@ -82,7 +82,7 @@ def place(context: Any, bed: Any, session: Running) -> None:
     """Put the fingertip where a session has it; one that is animated or constrained goes its own way."""
     tip = view.fingertip_of(bed)
     if tip is not None:
-        bridge.place_fingertip(tip, session.pose, session.scene.fingertip or Fingertip())
+        bridge.place_fingertip(tip, session.pose, find_ellipsoid(session.scene))
         context.view_layer.update()
 
 
@@ -169,7 +169,7 @@ def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str
                 session, said = sculpting.adapted(before, scene)
                 # A take is of one scene: what was recorded under the former one is not lost.
                 said = ". ".join(filter(None, (said, takes.keep_recorded(bed, before))))
-                bridge.resize_fingertip(view.fingertip_of(bed), scene.fingertip or Fingertip())
+                bridge.resize_fingertip(view.fingertip_of(bed), find_ellipsoid(scene))
         if session.stale:
             at, moment = bed_state.pose(bed), bed_state.moment(bed)
             at = session.pose if at is None else at

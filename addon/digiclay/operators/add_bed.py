@@ -6,12 +6,11 @@ from .. import preferences
 from ..compat import bpy
 from ..core.control.methods import METHODS
 from ..core.model.actuator import Actuator
-from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, rebuild, view
-from ..device.instant import Instant
+from ..device.instant import Instant, find_ellipsoid
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.declared import title
@@ -132,7 +131,7 @@ class Rebuild(Action, bpy.types.Operator):
 
 def add(context: Any, scene: Scene) -> Any:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    finger = scene.fingertip or Fingertip()
+    finger = find_ellipsoid(scene)
     return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
 
 

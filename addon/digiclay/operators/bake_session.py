@@ -7,10 +7,10 @@ import numpy as np
 
 from ..compat import bpy
 from ..core.engine.simulation import begin
-from ..core.model.fingertip import Fingertip
 from ..core.scene.assembly import assemble
 from ..core.session.snapshot import packed
 from ..core.session.take import Take
+from ..device.instant import find_ellipsoid
 from ..device.view import bed_of
 from ..recorded import bake, takes
 from ..settings import properties
@@ -67,7 +67,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
         else:
             made = properties.scene_of(bed)
             period = made.simulation.control_period
-            poses = np.empty((0, 7))
+            poses = np.empty((0, 1, 7))
             for step in bake.sampled(scene, bed, self.first, self.last, period):
                 if isinstance(step, float):
                     yield 0.3 * step
@@ -82,7 +82,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
                 yield 0.3 + 0.7 * step
             else:
                 moments = step
-        finger = take.scene.fingertip or Fingertip()
+        finger = find_ellipsoid(take.scene)
         bake.apply(bed, moments, self.first, finger, keyframe_finger=own)
         count = len(moments.height)
         self.report({"INFO"}, f"Baked {count} frames, {self.first} to {self.first + count - 1}")

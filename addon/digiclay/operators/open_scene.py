@@ -6,13 +6,14 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.model.fingertip import Fingertip
+from ..core.model.trajectory import sample_poses
 from ..core.scene.scene_source import find, load, sample_names
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
 from ..core.shapes.source_file import sample_shapes
 from ..device import view
+from ..device.instant import find_ellipsoid, pick_pose
 from ..exchange import shape_show
 from ..recorded import takes
 from ..settings.declared import title
@@ -45,8 +46,8 @@ class AddSceneAction(Action):
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
-        start = scene.trajectory.trajectory().poses(takes.START)[0]
-        bridge.place_fingertip(view.fingertip_of(bed), start, scene.fingertip or Fingertip())
+        start = pick_pose(sample_poses(scene.trajectories(), takes.START)[0])
+        bridge.place_fingertip(view.fingertip_of(bed), start, find_ellipsoid(scene))
         place_at_cursor(context, bed)
         context.view_layer.update()
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name

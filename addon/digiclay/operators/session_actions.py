@@ -6,10 +6,9 @@ from typing import Any
 from .. import bridge
 from ..compat import bpy
 from ..core.engine.simulation import begin
-from ..core.model.fingertip import Fingertip
 from ..core.scene.assembly import assemble
 from ..device import view
-from ..device.instant import CLEARANCE
+from ..device.instant import CLEARANCE, find_ellipsoid
 from ..device.view import bed_of
 from ..live import bed_state, handlers, loop, running, sculpting, tick
 from ..live.running import Running
@@ -161,4 +160,4 @@ def _bring_to_rest(bed: Any) -> None:
     if tip is not None:
         pose = bridge.pose(tip)
         pose[2] = max(pose[2], scene.actuator.rest_height + CLEARANCE)
-        bridge.place_fingertip(tip, pose, scene.fingertip or Fingertip())
+        bridge.place_fingertip(tip, pose, find_ellipsoid(scene))

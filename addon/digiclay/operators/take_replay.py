@@ -8,12 +8,13 @@ import numpy as np
 from .. import bridge, preferences
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
-from ..core.model.fingertip import LEVEL, Fingertip
+from ..core.model.fingertip import LEVEL
 from ..core.scene.assembly import assemble
 from ..core.session.live_periods import Clock, due, lived
 from ..core.session.snapshot import packed, unpacked
 from ..core.session.take import MOST_PARTS, Take, finer
 from ..device import view
+from ..device.instant import find_ellipsoid, pick_pose
 from ..device.view import bed_of
 from ..live import bed_state, sculpting, tick
 from ..live.running import Running
@@ -121,8 +122,8 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         """Put the fingertip to where the take has it; one that is animated goes its own way."""
         tip = view.fingertip_of(bed)
         if tip is not None:
-            finger = self._took.scene.fingertip or Fingertip()
-            bridge.place_fingertip(tip, self._took.poses[self._at], finger)
+            finger = find_ellipsoid(self._took.scene)
+            bridge.place_fingertip(tip, pick_pose(self._took.poses[self._at]), finger)
 
     def _finish(self, context: Any) -> set[str]:
         """Leave the bed as the take left it, and tell how the two compare."""
@@ -152,7 +153,12 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     def _came_to(self, bed: Any, state: bytes) -> Running:
         """Return the session that would go on from here."""
         session, _ = sculpting.begun(
-            bed.session_uid, bed.name, self._took.scene, self._took.poses[-1], state, bed_state.moment(bed)
+            bed.session_uid,
+            bed.name,
+            self._took.scene,
+            pick_pose(self._took.poses[-1]),
+            state,
+            bed_state.moment(bed),
         )
         return session
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import patch
 from ..device import view
+from ..device.instant import find_ellipsoid
 from ..live import running
 from ..overlay.picture import Line
 from . import aim
@@ -69,7 +69,7 @@ def _trail(found: aim.Target) -> list[Floats]:
     session = running.of(found.bed)
     if session is None or not session.strokes:
         return []
-    finger, pose = session.scene.fingertip or Fingertip(), session.pose
+    finger, pose = find_ellipsoid(session.scene), session.pose
     rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
     places = [stroke.ahead for stroke in session.strokes]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], places[0]]), *places[1:]]

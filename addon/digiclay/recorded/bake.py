@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from .. import bridge
 from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
 from ..core.base.errors import DigiclayError
-from ..core.model.fingertip import Fingertip
+from ..core.model.fingertip import Fingertip, wrap_one
 from ..core.scene.assembly import assemble
 from ..core.session.live_periods import lived
 from ..core.session.snapshot import unpacked
 from ..core.session.take import Take
 from ..device import view
+from ..device.instant import pick_pose
 from ..device.roles import BAKE
 from .bake_tree import MOMENT, pins_at_moment
 
@@ -44,7 +45,7 @@ class Moments:
     mode : ndarray (t, n) of int8
     force : ndarray (t, n)
         N.
-    pose : ndarray (t, 7)
+    pose : ndarray (t, f, 7)
         Of the fingertip.
     """
 
@@ -125,7 +126,7 @@ def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe
     if keyframe_finger and tip is not None:
         tip.animation_data_clear()
         for row, pose in enumerate(moments.pose):
-            bridge.place_fingertip(tip, pose, finger)
+            bridge.place_fingertip(tip, pick_pose(pose), finger)
             tip.keyframe_insert("location", frame=first + row)
             tip.keyframe_insert("rotation_quaternion", frame=first + row)
 
@@ -169,7 +170,7 @@ def sampled(scene: Any, bed: Any, first: int, last: int, period: float) -> Itera
     Yields
     ------
     float
-        The share that is done, after each pose; last of all the poses (t + 1, 7).
+        The share that is done, after each pose; last of all the poses (t + 1, 1, 7).
 
     Raises
     ------
@@ -194,7 +195,7 @@ def sampled(scene: Any, bed: Any, first: int, last: int, period: float) -> Itera
             yield row / count
     finally:
         scene.frame_set(kept[0], subframe=kept[1])
-    yield poses
+    yield wrap_one(poses)
 
 
 def _modifier(bed: Any) -> Any | None:

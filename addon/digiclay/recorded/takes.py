@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
+from ..core.model.trajectory import sample_poses
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session.live_periods import lived
@@ -133,7 +134,7 @@ def simulate(scene: Scene) -> Take | None:
         return None
     system = assemble(scene)
     times = np.arange(scene.periods + 1) * scene.simulation.control_period
-    poses = scene.trajectory.trajectory().poses(times)
+    poses = sample_poses(scene.trajectories(), times)
     state = begin(system)
     start = packed(system, state)
     # Only the last state is wanted: the others' arrays are used up.

@@ -91,7 +91,7 @@ def adopt(bed: Any, scene: Scene) -> None:
     settings.preset, settings.method = scene.preset, scene.method
     notes = _notes(settings)
     for section in SECTIONS:
-        part: Parameters | None = getattr(scene, section)
+        part: Parameters | None = scene.section(section)
         if section in OPTIONAL:
             setattr(settings, f"use_{section}", part is not None)
         if part is not None:

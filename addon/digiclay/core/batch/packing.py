@@ -55,11 +55,14 @@ def structure(scene: Scene) -> Any:
     ParameterError
         When the scene's parts do not go together.
     """
-    physics = tuple(getattr(scene, name) for name in PHYSICS)
+    physics = tuple(scene.section(name) for name in PHYSICS)
     common = (
         scene.layout,
         scene.method if scene.control else None,
-        *(kind(part) for part in (scene.fingertip, scene.control, scene.blister)),
+        *(
+            kind(part)
+            for part in (tuple(finger.fingertip for finger in scene.fingers), scene.control, scene.blister)
+        ),
         scene.recorder,
         scene.simulation.stepper,
     )

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ..base.errors import DigiclayError
 from ..engine.system import System
 from ..metrics.summary import METRICS
+from ..model.fingertip import require_one
+from ..model.trajectory import Trajectory
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, reference_settings
@@ -83,7 +85,7 @@ def _played(
     """Play all sessions to their ends; what is over leaves the stack before the next control period."""
     runs, share = tuple(systems), 0.0
     stack = put_together(list(systems.values()))
-    ways = {run: scenes[run].trajectory.trajectory() for run in runs}
+    ways = {run: _way(scenes[run]) for run in runs}
     ends = np.array([scenes[run].periods for run in runs])
     state = begin(stack)
     yield _Now(stack, state, runs, (), np.zeros(len(runs), np.bool_), share)
@@ -106,11 +108,16 @@ def _played(
                 stack, coming = put_together([systems[run] for run in runs]), None
 
 
+def _way(scene: Scene) -> Trajectory:
+    """Return the trajectory of the finger."""
+    return require_one(scene.trajectories())
+
+
 def _judged(now: _Now, place: int, scene: Scene, rows: Any, versions: Mapping[str, str]) -> Result:
     """Return the result of a run that has come to its end; without a history where there are no rows."""
     memory = now.stack.controller.of(now.state.memory, place) if now.stack.controller else None
-    end, way = _End(now.state.period, memory), scene.trajectory.trajectory()
-    return judged(scene, now.stack.systems[place], way, rows, end, now.share, versions)
+    end = _End(now.state.period, memory)
+    return judged(scene, now.stack.systems[place], rows, end, now.share, versions)
 
 
 def run_together(
@@ -173,7 +180,7 @@ class _Judges:
 
     def __init__(self, scenes: Mapping[int, Scene]) -> None:
         self._systems = {run: assemble(judge_of(scene)) for run, scene in scenes.items()}
-        self._ways = {run: scene.trajectory.trajectory() for run, scene in scenes.items()}
+        self._ways = {run: _way(scene) for run, scene in scenes.items()}
         self._runs = tuple(scenes)
         self._stack = put_together(list(self._systems.values()))
         self._state = begin(self._stack)
@@ -246,10 +253,15 @@ def judge_together(
                 yield run, blow_up(now.stack, now.state, place)
                 continue
             scene, trace = scenes[run], traces.of(run, now.state, place)
-            same = scene.trajectory, scene.simulation.control_period, len(trace.period), now.state.period
+            same = (
+                tuple(finger.trajectory for finger in scene.fingers),
+                scene.simulation.control_period,
+                len(trace.period),
+                now.state.period,
+            )
             if same not in ways:
                 times = trace.period * scene.simulation.control_period
-                ways[same] = way_over(systems[run].grid, scene.trajectory.trajectory(), times)
+                ways[same] = way_over(systems[run].grid, _way(scene), times)
             found = summary(trace, ways[same], systems[run].grid, scene.set_point)
             result = _judged(now, place, scene, None, {})
             units = {name: METRICS[name][0] for name in found}

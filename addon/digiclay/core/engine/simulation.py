@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import DivergenceError
+from ..model.fingertip import require_one
 from ..model.interfaces import Measurement, Movement, Truth
 from ..model.touch import Approach, approach
-from ..model.trajectory import Trajectory
+from ..model.trajectory import Trajectory, sample_poses
 from .active_set import taking_part
 from .state import Gathered, Part, State, at_rest
 from .system import System
@@ -33,10 +34,17 @@ def begin(system: System) -> State:
 
 
 def approaches(system: System, poses: Floats) -> list[Approach | None]:
-    """Work out the finger's way through some periods from its poses (t, p, 7); None without a finger."""
+    """Work out the fingers' ways through some control periods; None where nothing touches.
+
+    Parameters
+    ----------
+    system : System
+    poses : ndarray (t, p, f, 7)
+        Of the fingers at `System.instants` of t periods: lowest point, m, and unit quaternion.
+    """
     if system.cell.touch is None:
         return [None] * len(poses)
-    return list(approach(system.cell.touch.fingertip, poses))
+    return list(approach(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3)))))
 
 
 def step(system: System, state: State, poses: Floats) -> State:
@@ -46,9 +54,9 @@ def step(system: System, state: State, poses: Floats) -> State:
     ----------
     system : System
     state : State
-    poses : ndarray (p, 7)
-        Poses of the fingertip at `System.instants`: position of its lowest point, m, and
-        unit quaternion w, x, y, z.
+    poses : ndarray (p, f, 7)
+        Of the fingers at `System.instants`: position of the lowest point, m, and unit quaternion
+        w, x, y, z.
 
     Raises
     ------
@@ -180,8 +188,17 @@ def _check_finite(system: System, state: State) -> None:
     )
 
 
-def periods(system: System, trajectory: Trajectory, state: State, count: int) -> Iterator[State]:
-    """Simulate control periods along a trajectory; the arrays of `state` are used up.
+def periods(system: System, trajectories: Sequence[Trajectory], state: State, count: int) -> Iterator[State]:
+    """Simulate control periods along the fingers' trajectories; the arrays of `state` are used up.
+
+    Parameters
+    ----------
+    system : System
+    trajectories : sequence of Trajectory
+        One a finger.
+    state : State
+    count : int
+        Control periods.
 
     Yields
     ------
@@ -193,7 +210,8 @@ def periods(system: System, trajectory: Trajectory, state: State, count: int) ->
         chunk = min(CHUNK, count - done)
         starts = (state.period + np.arange(chunk)) * system.period
         times = (starts[:, None] + system.instants).ravel()
-        for finger in approaches(system, trajectory.poses(times).reshape(chunk, -1, 7)):
+        poses = sample_poses(trajectories, times).reshape(chunk, -1, len(trajectories), 7)
+        for finger in approaches(system, poses):
             state = advance(system, state, finger)
             yield state
         done += chunk

@@ -9,16 +9,30 @@ by a force that grows, not by one that jumps.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["LEVEL", "Fingertip", "forms", "matrices", "reach", "reaches", "underside"]
+__all__ = [
+    "LEVEL",
+    "Fingertip",
+    "forms",
+    "matrices",
+    "reach",
+    "reaches",
+    "require_one",
+    "underside",
+    "wrap_one",
+]
 
 Floats = NDArray[np.float64]
+Item = TypeVar("Item")
 
 #: Squared reduced radius at which the paraboloid takes over.
 JOIN = 0.96
@@ -27,6 +41,31 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 _ROOT = (1.0 - JOIN) ** 0.5
 _SLOPE = 0.5 / _ROOT
+
+
+def require_one(fingers: Sequence[Item]) -> Item:
+    """Return the only finger, or what there is of it; docs/architecture.md lists the callers.
+
+    Parameters
+    ----------
+    fingers : sequence
+        One item a finger.
+
+    Raises
+    ------
+    ParameterError
+        When there is none, or more than one.
+    """
+    if len(fingers) != 1:
+        rule = "must be one: the physics carries exactly one finger"
+        raise ParameterError("scene", "fingers", rule, str(len(fingers)))
+    (only,) = fingers
+    return only
+
+
+def wrap_one(poses: Floats) -> Floats:
+    """Return the poses of the only finger, (t, 7), as those of all fingers, (t, 1, 7)."""
+    return poses[:, None]
 
 
 @dataclass(frozen=True)

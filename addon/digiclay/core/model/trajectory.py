@@ -2,21 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
 from ..base.spline import inner_slopes
 from .fingertip import LEVEL
 
-__all__ = ["Trajectory", "along", "between", "level"]
+__all__ = ["Path", "Trajectory", "Waypoint", "along", "between", "level", "sample_poses"]
 
 Floats = NDArray[np.float64]
 
 #: Waypoints are no nearer to each other, s: speeds stay finite.
 SHORTEST = 1e-9
+#: The finger's path when a scene names none: one press in the middle of the bed, m above the rest height.
+PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
+
+
+@dataclass(frozen=True)
+class Waypoint(Parameters):
+    """Where the fingertip is at one time."""
+
+    time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
+    position: tuple[float, ...] = quantity(
+        (0.0, 0.0, 46e-3), "lowest point of the fingertip: x, y, z", unit="m", at_least=-100.0, at_most=100.0
+    )
+    orientation: tuple[float, ...] = quantity(
+        (1.0, 0.0, 0.0, 0.0), "quaternion w, x, y, z", at_least=-1e6, at_most=1e6
+    )
+
+    def check(self) -> None:
+        """Three coordinates, four parts of a quaternion."""
+        for name, count in (("position", 3), ("orientation", 4)):
+            value = getattr(self, name)
+            if len(value) != count:
+                rule = f"must be a list of {count} numbers"
+                raise ParameterError("Waypoint", name, rule, f"{len(value)} of them")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,18 +122,53 @@ class Trajectory:
         return poses
 
 
+@dataclass(frozen=True)
+class Path:
+    """The finger's path, as a scene gives it."""
+
+    interpolation: str = "smooth"
+    waypoints: tuple[Waypoint, ...] = ()
+
+    @classmethod
+    def press(cls, rest_height: float) -> Path:
+        """Return the path of a scene that names none."""
+        points = (Waypoint(time=t, position=(0.0, 0.0, rest_height + z)) for t, z in PRESS)
+        return cls(waypoints=tuple(points))
+
+    def trajectory(self) -> Trajectory:
+        """Return the path as something that has poses."""
+        times, positions, turns = (
+            np.array([getattr(point, name) for point in self.waypoints], dtype=np.float64)
+            for name in ("time", "position", "orientation")
+        )
+        return Trajectory(times, positions, turns, self.interpolation)
+
+
 def level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
     """Return a trajectory whose finger stays level."""
     return Trajectory(times, positions, np.tile(LEVEL, (times.size, 1)), interpolation)
 
 
-def between(start: Floats, end: Floats, parts: Floats) -> Floats:
-    """Return poses (k, 7) on the straight way from one pose to another.
+def sample_poses(trajectories: Sequence[Trajectory], times: Floats) -> Floats:
+    """Return the poses of all fingers, shape (k, f, 7).
 
     Parameters
     ----------
-    start, end : ndarray (7,)
-        Poses: position, m, and unit quaternion.
+    trajectories : sequence of Trajectory
+        Those of the f fingers.
+    times : ndarray (k,)
+        s.
+    """
+    return np.stack([trajectory.poses(times) for trajectory in trajectories], axis=1)
+
+
+def between(start: Floats, end: Floats, parts: Floats) -> Floats:
+    """Return poses (k, f, 7) on the straight ways from some poses to others.
+
+    Parameters
+    ----------
+    start, end : ndarray (f, 7)
+        Poses of the fingers: position, m, and unit quaternion.
     parts : ndarray (k,)
         Where on the way, 0 to 1.
     """
@@ -117,24 +177,24 @@ def between(start: Floats, end: Floats, parts: Floats) -> Floats:
 
 
 def along(path: Floats, parts: Floats) -> Floats:
-    """Return poses (t, p, 7) on the straight ways from each pose of a path to the next.
+    """Return poses (t, p, f, 7) on the straight ways from each row of a path to the next.
 
     Whether the ways are worked out one by one or together makes no difference to any bit.
 
     Parameters
     ----------
-    path : ndarray (t + 1, 7)
-        Poses: position, m, and unit quaternion.
+    path : ndarray (t + 1, f, 7)
+        Poses of the fingers: position, m, and unit quaternion.
     parts : ndarray (p,)
         Where on each way, 0 to 1.
     """
-    count = len(path) - 1
-    start, end = np.repeat(path[:-1], parts.size, axis=0), np.repeat(path[1:], parts.size, axis=0)
-    part = np.tile(parts, count)[:, None]
-    poses = np.empty((count * parts.size, 7))
+    count, fingers = len(path) - 1, path.shape[1]
+    start, end = (np.repeat(rows, parts.size, axis=0).reshape(-1, 7) for rows in (path[:-1], path[1:]))
+    part = np.tile(np.repeat(parts, fingers), count)[:, None]
+    poses = np.empty((len(start), 7))
     poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
     poses[:, 3:] = _turned(start[:, 3:], end[:, 3:], part)
-    return poses.reshape(count, parts.size, 7)
+    return poses.reshape(count, parts.size, fingers, 7)
 
 
 def _turned(start: Floats, end: Floats, part: Floats) -> Floats:

@@ -11,12 +11,13 @@ from ..control.methods import METHODS
 from ..engine.state import Rows
 from ..engine.system import System, segments
 from ..model.delay import Queue, queue
+from ..model.fingertip import require_one
 from ..model.interfaces import Controller, Flow, Lag, Pulp, Sensors, Stepper
 from ..model.layout import Grid, grid
 from ..model.physics import Cell, speeds
 from ..model.touch import Touch
 from ..model.valve import orifice
-from .schema import STEPPERS, Scene, part
+from .schema import STEPPERS, Finger, Scene, part
 
 __all__ = ["assemble"]
 
@@ -76,15 +77,16 @@ def _lag(scene: Scene) -> Lag:
 
 def _touch(scene: Scene) -> Touch | None:
     """Return the finger, or None."""
-    if scene.fingertip is None or scene.contact is None:
+    finger = require_one(scene.fingers)
+    if finger.fingertip is None or finger.contact is None:
         return None
-    return Touch(scene.fingertip, scene.contact, _pulp(scene))
+    return Touch(finger.fingertip, finger.contact, _pulp(finger))
 
 
-def _pulp(scene: Scene) -> Pulp:
+def _pulp(finger: Finger) -> Pulp:
     """Return how the finger's pulp relaxes."""
-    if scene.relaxation:
-        return scene.relaxation
+    if finger.relaxation:
+        return finger.relaxation
     from ..model.null_parts import Unrelaxed
 
     return Unrelaxed()

@@ -14,7 +14,8 @@ from ..control.shape_display import ShapeDisplayControl
 from ..engine.system import System
 from ..model.fingertip import LEVEL, Fingertip, forms, underside
 from ..model.layout import Grid
-from .schema import Path, Scene, Waypoint
+from ..model.trajectory import Path, Waypoint
+from .schema import Scene
 
 __all__ = ["GESTURES", "display_of", "display_time", "shaped", "summit", "touch_height"]
 
@@ -110,13 +111,13 @@ def shaped(scene: Scene, system: System, gesture: str) -> Scene:
     display = display_of(system)
     if display is None:
         raise ParameterError("shape", "", "must be given to form it", "none")
-    if scene.fingertip is None:
+    if system.cell.touch is None:
         raise ParameterError("fingertip", "", "must be given to form a shape", "absent")
     x, y = summit(system.grid, display.heights)
-    touch = touch_height(system.grid, display.heights, scene.fingertip, x, y)
+    touch = touch_height(system.grid, display.heights, system.cell.touch.fingertip, x, y)
     ready = display_time(display)
     points = [(ready + time, touch + above) for time, above in GESTURES[gesture]]
     way = tuple(Waypoint(time=time, position=(x, y, z)) for time, z in [(0.0, points[0][1]), *points])
     # Its own duration is that of the path.
     simulation = replace(scene.simulation, duration=points[-1][0])
-    return replace(scene, trajectory=Path("smooth", way), simulation=simulation)
+    return scene.with_sections(trajectory=Path("smooth", way), simulation=simulation)

@@ -12,7 +12,7 @@ from ..base.errors import ParameterError, SceneError
 from ..base.sample_file import found, named
 from ..base.toml_text import LARGEST, tables
 from .schema import Scene
-from .toml_table import resolve
+from .toml_table import merge_one_finger, resolve
 
 __all__ = ["SAMPLES", "Setting", "find", "load", "make_scene", "read_table", "sample_names"]
 
@@ -85,7 +85,8 @@ def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting]
         As `load`.
     """
     try:
-        return resolve(_override(_find_beside(table, path.parent), settings), path.stem)
+        merged = merge_one_finger(_find_beside(table, path.parent))
+        return resolve(_override(merged, settings), path.stem)
     except ParameterError as error:
         if settings:
             make_scene(path, table)  # a file that is wrong by itself is told of first

@@ -7,12 +7,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..control.methods import METHODS, ControlParameters
+from ..model.fingertip import require_one
 from ..model.set_point import SetPoint
+from ..model.trajectory import Path, Trajectory
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from ..control.blister import Blister
@@ -27,22 +27,21 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
     from ..model.supply import Supply
-    from ..model.trajectory import Trajectory
     from ..model.valve import Valve
     from ..shapes.request import Shape
     from .recorder import Recorder
 
 __all__ = [
+    "FINGER_SECTIONS",
     "NEEDS",
     "OPTIONAL",
     "PARTS",
     "SECTIONS",
     "STEPPERS",
     "UNASKED",
-    "Path",
+    "Finger",
     "Scene",
     "Simulation",
-    "Waypoint",
     "parameters",
     "part",
 ]
@@ -71,6 +70,8 @@ SECTIONS = (
     "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
     "relaxation", "sensors", "control", "blister", "shape", "simulation", "recorder",
 )  # fmt: skip
+#: Sections that a scene has once a finger.
+FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "trajectory")
 #: Parts a scene may leave out.
 OPTIONAL = (
     "conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "shape", "recorder",
@@ -142,52 +143,16 @@ class Simulation(Parameters):
 
 
 @dataclass(frozen=True)
-class Waypoint(Parameters):
-    """Where the fingertip is at one time."""
+class Finger:
+    """A finger: its tip, how its pulp yields and relaxes, and its path.
 
-    time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
-    position: tuple[float, ...] = quantity(
-        (0.0, 0.0, 46e-3), "lowest point of the fingertip: x, y, z", unit="m", at_least=-100.0, at_most=100.0
-    )
-    orientation: tuple[float, ...] = quantity(
-        (1.0, 0.0, 0.0, 0.0), "quaternion w, x, y, z", at_least=-1e6, at_most=1e6
-    )
+    Without a fingertip it touches nothing; its path is recorded, and the session lasts as long.
+    """
 
-    def check(self) -> None:
-        """Three coordinates, four parts of a quaternion."""
-        for name, count in (("position", 3), ("orientation", 4)):
-            value = getattr(self, name)
-            if len(value) != count:
-                rule = f"must be a list of {count} numbers"
-                raise ParameterError("Waypoint", name, rule, f"{len(value)} of them")
-
-
-#: The finger's path when a scene names none: one press in the middle of the bed, m above the rest height.
-PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
-
-
-@dataclass(frozen=True)
-class Path:
-    """The finger's path, as a scene gives it."""
-
-    interpolation: str = "smooth"
-    waypoints: tuple[Waypoint, ...] = ()
-
-    @classmethod
-    def press(cls, rest_height: float) -> Path:
-        """Return the path of a scene that names none."""
-        points = (Waypoint(time=t, position=(0.0, 0.0, rest_height + z)) for t, z in PRESS)
-        return cls(waypoints=tuple(points))
-
-    def trajectory(self) -> Trajectory:
-        """Return the path as something that has poses."""
-        from ..model.trajectory import Trajectory
-
-        times, positions, turns = (
-            np.array([getattr(point, name) for point in self.waypoints], dtype=np.float64)
-            for name in ("time", "position", "orientation")
-        )
-        return Trajectory(times, positions, turns, self.interpolation)
+    fingertip: Fingertip | None
+    contact: Contact | None
+    relaxation: Relaxation | None
+    trajectory: Path
 
 
 @dataclass(frozen=True)
@@ -210,14 +175,11 @@ class Scene:
     conduit: Conduit | None
     valve_lag: ValveLag | None
     delay: Delay | None
-    fingertip: Fingertip | None
-    contact: Contact | None
-    relaxation: Relaxation | None
     control: ControlParameters | None
     blister: Blister | None
     simulation: Simulation
     recorder: Recorder | None
-    trajectory: Path
+    fingers: tuple[Finger, ...]
     name: str = ""
     description: str = ""
     preset: str = "paper"
@@ -234,7 +196,7 @@ class Scene:
         if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
             rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
-        lasts = self.trajectory.trajectory().duration
+        lasts = max((path.duration for path in self.trajectories()), default=0.0)
         if self.simulation.duration == 0.0:
             if lasts == 0.0:
                 rule = "must be above 0 s where the trajectory has no duration of its own"
@@ -254,6 +216,19 @@ class Scene:
     def cells(self) -> int:
         """Number of cells."""
         return self.layout.rows * self.layout.columns
+
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """Return the paths of the fingers as something that has poses."""
+        return tuple(finger.trajectory.trajectory() for finger in self.fingers)
+
+    def section(self, name: str) -> Any:
+        """Return what a section of a scene file of one finger holds; None for a part that is left out."""
+        return getattr(require_one(self.fingers) if name in FINGER_SECTIONS else self, name, None)
+
+    def with_sections(self, **parts: Any) -> Scene:
+        """Return the scene with other parts, by the names of sections; those of fingers in all of them."""
+        own = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
+        return replace(self, fingers=tuple(replace(finger, **own) for finger in self.fingers), **parts)
 
     @property
     def set_point(self) -> SetPoint | None:

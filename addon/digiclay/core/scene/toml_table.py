@@ -9,11 +9,12 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.part_table import cut, read_part, refuse_unknown, shown
-from ..base.quantity import quantities
+from ..base.quantity import Parameters, quantities
 from ..control.methods import METHODS
-from .schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, Path, Scene, Waypoint, parameters
+from ..model.trajectory import Path, Waypoint
+from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, parameters
 
-__all__ = ["ABSENT", "PRESETS", "resolve", "text"]
+__all__ = ["ABSENT", "PRESETS", "merge_one_finger", "resolve", "text"]
 
 Table = Mapping[str, Any]
 
@@ -26,7 +27,11 @@ PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "viscous": {"fluid": {"viscosity": 3.2e-6, "density": 908.0}, "valve": {"orifice_diameter": 0.6e-3}},
 }
 TEXTS = ("name", "description", "preset")
-TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory")
+#: The list of tables that holds the fingers' sections where there are several.
+FINGERS = "finger"
+#: The sections of a finger that are parts; the other one is its path.
+FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
+TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 #: Share of the flat-plate law a cell of a hexagonal bed carries: its cells stand closer.
 HEXAGONAL_SHARE = 0.29
 
@@ -53,29 +58,79 @@ def resolve(table: Table, name: str = "") -> Scene:
     }
     if texts["preset"] not in PRESETS:
         raise ParameterError("preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"]))
-    given = {
+    tables = _finger_tables(table)
+    shared = {
         section: _section(section, table.get(section, ABSENT if section in UNASKED else {}))
         for section in SECTIONS
+        if section not in FINGER_PARTS
     }
-    method = _method(given["control"])
+    method = _method(shared["control"])
+    defaults = {section: dict(values) for section, values in PRESETS[texts["preset"]].items()}
     parts: dict[str, Any] = {}
-    for section in SECTIONS:
-        own, needed = given[section], NEEDS.get(section)
+    for section, own in shared.items():
+        needed = NEEDS.get(section)
         if (
             own is None
-            or (needed and given[needed] is None)
+            or (needed and shared[needed] is None)
             or (section == "blister" and not _forms_one(method, own))
         ):
             parts[section] = None
             continue
-        defaults = dict(PRESETS[texts["preset"]].get(section, {}))
+        usual = defaults.get(section, {})
         if section == "blister":
-            defaults |= METHODS[method].blister or {}
-        if section == "contact" and parts["layout"].arrangement == "hexagonal":
-            defaults["share"] = HEXAGONAL_SHARE
-        parts[section] = read_part(section, parameters(section, method), defaults, own)
-    path = _path(table.get("trajectory", {}), parts["actuator"].rest_height)
-    return Scene(**parts, **texts, trajectory=path, method=method)
+            usual |= METHODS[method].blister or {}
+        parts[section] = read_part(section, parameters(section, method), usual, own)
+    if parts["layout"].arrangement == "hexagonal":
+        defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
+    rest_height = parts["actuator"].rest_height
+    fingers = tuple(_finger(owner, own, defaults, rest_height) for owner, own in tables)
+    return Scene(**parts, **texts, fingers=fingers, method=method)
+
+
+def _finger_tables(table: Table) -> list[tuple[str, Table]]:
+    """Return what messages put before the sections of each finger, and the sections.
+
+    The sections of one finger stand beside the others; those of several in a list of tables.
+    """
+    own = {section: table[section] for section in FINGER_SECTIONS if section in table}
+    if FINGERS not in table:
+        return [("", own)]
+    given = table[FINGERS]
+    if not isinstance(given, list) or not all(isinstance(finger, dict) for finger in given):
+        raise ParameterError(FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", shown(given))
+    if own:
+        section = next(iter(own))
+        rule = f"must be left out where there is [[{FINGERS}]]: give it there"
+        raise ParameterError(section, "", rule, shown(own[section]))
+    owners = [f"{FINGERS} #{number}." for number in range(1, len(given) + 1)]
+    for owner, finger in zip(owners, given, strict=True):
+        refuse_unknown(owner.removesuffix("."), finger, FINGER_SECTIONS)
+    return list(zip(owners, given, strict=True))
+
+
+def merge_one_finger(table: Table) -> dict[str, Any]:
+    """Return the tables with the sections of the only finger beside the others, where settings name them.
+
+    What is no list of one table, or would be given twice, is left for `resolve` to refuse.
+    """
+    given = table.get(FINGERS)
+    if not (isinstance(given, list) and len(given) == 1 and isinstance(given[0], dict)):
+        return dict(table)
+    if any(section in table or section not in FINGER_SECTIONS for section in given[0]):
+        return dict(table)
+    return {**{key: value for key, value in table.items() if key != FINGERS}, **given[0]}
+
+
+def _finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float) -> Finger:
+    """Make a finger of its sections; `owner` stands before their names in messages."""
+    parts: dict[str, Any] = {}
+    for section in FINGER_PARTS:
+        own, needed = _section(section, table.get(section, {}), owner), NEEDS.get(section)
+        if own is None or (needed and parts[needed] is None):
+            parts[section] = None
+            continue
+        parts[section] = read_part(owner + section, parameters(section, ""), defaults.get(section, {}), own)
+    return Finger(**parts, trajectory=_path(owner + "trajectory", table.get("trajectory", {}), rest_height))
 
 
 def _text(key: str, value: Any) -> str:
@@ -87,14 +142,14 @@ def _text(key: str, value: Any) -> str:
     return value
 
 
-def _section(section: str, value: Any) -> dict[str, Any] | None:
+def _section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None:
     """Return the table of a section, or None for a part that is left out."""
     if value == ABSENT and section in OPTIONAL:
         return None
     if isinstance(value, dict):
         return dict(value)
     rule = f"must be a section, [{section}]" + (f', or "{ABSENT}"' if section in OPTIONAL else "")
-    raise ParameterError(section, "", rule, shown(value))
+    raise ParameterError(owner + section, "", rule, shown(value))
 
 
 def _method(control: dict[str, Any] | None) -> str:
@@ -114,11 +169,11 @@ def _forms_one(method: str, own: dict[str, Any]) -> bool:
     return METHODS[method].blister is not None
 
 
-def _path(table: Any, rest_height: float) -> Path:
+def _path(owner: str, table: Any, rest_height: float) -> Path:
     """Read the section of the finger's path."""
     if not isinstance(table, dict):
-        raise ParameterError("trajectory", "", "must be a section, [trajectory]", shown(table))
-    refuse_unknown("trajectory", table, ("interpolation", "waypoints"))
+        raise ParameterError(owner, "", "must be a section, [trajectory]", shown(table))
+    refuse_unknown(owner, table, ("interpolation", "waypoints"))
     kind = table.get("interpolation", "smooth")
     if "waypoints" not in table:
         path = dataclasses.replace(Path.press(rest_height), interpolation=kind)
@@ -126,14 +181,12 @@ def _path(table: Any, rest_height: float) -> Path:
         rows = table["waypoints"]
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
-            raise ParameterError("trajectory", "waypoints", rule, shown(rows))
-        path = Path(
-            kind, tuple(_waypoint(f"trajectory.waypoints #{i}", row) for i, row in enumerate(rows, 1))
-        )
+            raise ParameterError(owner, "waypoints", rule, shown(rows))
+        path = Path(kind, tuple(_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1)))
     try:
         path.trajectory()
     except ParameterError as error:
-        raise ParameterError("trajectory", error.field, error.rule, cut(error.value)) from None
+        raise ParameterError(owner, error.field, error.rule, cut(error.value)) from None
     return path
 
 
@@ -152,24 +205,49 @@ def text(scene: Scene) -> str:
 
 
 def _lines(scene: Scene) -> Iterator[str]:
-    """Give the lines of a scene file."""
+    """Give the lines of a scene file; one finger is written as versions that know no more of them read it."""
+    alone = len(scene.fingers) == 1
+    sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
     yield "# Every parameter of the scene, in SI units."
     yield from (f"{key} = {_toml(getattr(scene, key))}" for key in TEXTS)
-    yield from (f'{section} = "{ABSENT}"' for section in OPTIONAL if getattr(scene, section) is None)
-    for section in SECTIONS:
-        part = getattr(scene, section)
-        if part is None:
-            continue
-        yield f"\n[{section}]"
-        if section == "control":
-            yield f"method = {_toml(scene.method)}"
-        for key, known in quantities(part).items():
-            note = f"{known.unit}: {known.doc}" if known.unit else known.doc
-            yield f"{key} = {_toml(getattr(part, key))}  # {note}"
-    yield "\n[trajectory]"
-    yield f"interpolation = {_toml(scene.trajectory.interpolation)}"
+    yield from (
+        f'{name} = "{ABSENT}"' for name in OPTIONAL if name in sections and scene.section(name) is None
+    )
+    if not scene.fingers:
+        yield f"{FINGERS} = []"
+    for name in sections:
+        method = scene.method if name == "control" else ""
+        yield from _part_lines(name, scene.section(name), method)
+    for finger in scene.fingers:
+        if alone:
+            yield from _path_lines("trajectory", finger.trajectory)
+            break
+        yield f"\n[[{FINGERS}]]"
+        parts = {name: getattr(finger, name) for name in FINGER_PARTS}
+        yield from (f'{name} = "{ABSENT}"' for name in parts if name in OPTIONAL and parts[name] is None)
+        for name, part in parts.items():
+            yield from _part_lines(f"{FINGERS}.{name}", part)
+        yield from _path_lines(f"{FINGERS}.trajectory", finger.trajectory)
+
+
+def _part_lines(section: str, part: Parameters | None, method: str = "") -> Iterator[str]:
+    """Give the lines of a section; none for a part that is left out."""
+    if part is None:
+        return
+    yield f"\n[{section}]"
+    if method:
+        yield f"method = {_toml(method)}"
+    for key, known in quantities(part).items():
+        note = f"{known.unit}: {known.doc}" if known.unit else known.doc
+        yield f"{key} = {_toml(getattr(part, key))}  # {note}"
+
+
+def _path_lines(section: str, path: Path) -> Iterator[str]:
+    """Give the lines of a finger's path."""
+    yield f"\n[{section}]"
+    yield f"interpolation = {_toml(path.interpolation)}"
     yield "waypoints = ["
-    for point in scene.trajectory.waypoints:
+    for point in path.waypoints:
         pairs = (f"{field.name} = {_toml(getattr(point, field.name))}" for field in dataclasses.fields(point))
         yield f"  {{ {', '.join(pairs)} }},"
     yield "]"

@@ -146,7 +146,7 @@ def estimate_errors(
     """
     system = _replay(_reference(scene), history["command"])
     done, largest = len(history["time"]) - 1, np.zeros(3)
-    for row, state in enumerate(periods(system, scene.trajectory.trajectory(), begin(system), done), 1):
+    for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
         height, force = state.row(0), state.row(system.rows.force)
         found = compare(height, force, history["height"][row], history["force"][row])
         np.maximum(largest, found, out=largest)
@@ -198,7 +198,7 @@ def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMoni
         Given the state before by `begin_stretch`, or by the period before.
     after : State
         The session's, at the end of the period.
-    path : ndarray (2, 7)
+    path : ndarray (2, f, 7)
         The finger at both ends of the period; see `live_periods.lived`.
     """
     if monitor.state is None:

@@ -109,11 +109,11 @@ def spent(clock: Clock, count: int, took: float) -> Clock:
 
 
 def way(start: Floats, end: Floats, count: int) -> Floats:
-    """Return where the finger is between periods, shape (count + 1, 7), on its way from pose to pose.
+    """Return where the fingers are between periods, shape (count + 1, f, 7), on their ways from pose to pose.
 
     Parameters
     ----------
-    start, end : ndarray (7,)
+    start, end : ndarray (f, 7)
         Poses when last read, and now.
     count : int
         Control periods in between, at least 1.
@@ -143,7 +143,7 @@ def reachable(pose: Floats, stroke: float) -> Floats:
 
 
 def lived(system: System, state: State, path: Floats) -> Iterator[State]:
-    """Simulate the periods of a finger's path; the arrays of `state` are used up.
+    """Simulate the periods of the fingers' paths; the arrays of `state` are used up.
 
     A recorded path gives the same states bit for bit, however many periods are done at a time.
 
@@ -151,8 +151,8 @@ def lived(system: System, state: State, path: Floats) -> Iterator[State]:
     ----------
     system : System
     state : State
-    path : ndarray (t + 1, 7)
-        Where the finger is between the periods, from `way`.
+    path : ndarray (t + 1, f, 7)
+        Where the fingers are between the periods, from `way`.
 
     Yields
     ------

@@ -19,7 +19,7 @@ from ..engine.state import State
 from ..engine.system import System
 from ..metrics.summary import METRICS, compute_metrics
 from ..model.finger_range import beyond_words, largest_indentation
-from ..model.trajectory import Trajectory
+from ..model.fingertip import require_one
 from ..scene.assembly import assemble
 from ..scene.recorder import Recording, available_memory, refuse_what_cannot_fit, write
 from ..scene.schema import Scene
@@ -121,13 +121,13 @@ def run(
     DivergenceError
         When the integration leaves the finite numbers.
     """
-    system, trajectory = assemble(scene), scene.trajectory.trajectory()
+    system, trajectories = assemble(scene), scene.trajectories()
     fits(scene, system)
     state = begin(system)
     recording = Recording(scene.recorder, system.rows, state, scene.periods) if scene.recorder else None
     started = time.perf_counter()
     start = state
-    for state in periods(system, trajectory, start, scene.periods):
+    for state in periods(system, trajectories, start, scene.periods):
         if recording:
             recording.observe(state)
         if watched:
@@ -140,7 +140,7 @@ def run(
     if recording:
         recording.finish(state)
     rows = recording.arrays() if recording else None
-    return judged(scene, system, trajectory, rows, state, took, versions or {})
+    return judged(scene, system, rows, state, took, versions or {})
 
 
 class Ended(Protocol):
@@ -156,7 +156,6 @@ class Ended(Protocol):
 def judged(
     scene: Scene,
     system: System,
-    trajectory: Trajectory,
     rows: History | None,
     state: Ended,
     took: float,
@@ -168,7 +167,6 @@ def judged(
     ----------
     scene : Scene
     system : System
-    trajectory : Trajectory
     rows : dict of ndarray, or None
         From `Recording.arrays`; None without a recorder.
     state : Ended
@@ -178,27 +176,32 @@ def judged(
     versions : mapping
         What else to note as versions the run was made with.
     """
-    history = None if rows is None else _history(scene, system, trajectory, rows)
-    metrics = _metrics(scene, history, state.period, took, versions)
+    history = None if rows is None else _history(scene, system, rows)
+    metrics = _metrics(scene, system, history, state.period, took, versions)
     # Methods that track a finger count how often it was lost; the others have nothing to lose.
     metrics["losses"] = getattr(state.memory, "losses", None)
     return Result(scene, history, state.period, took, metrics)
 
 
-def _history(scene: Scene, system: System, trajectory: Trajectory, rows: History) -> History:
+def _history(scene: Scene, system: System, rows: History) -> History:
     """Return the arrays of ``history.npz``."""
     moments = rows.pop("period") * scene.simulation.control_period
     return {
         "time": moments,
         **rows,
-        "fingertip": trajectory.poses(moments),
+        "fingertip": require_one(scene.trajectories()).poses(moments),
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
 
 
 def _metrics(
-    scene: Scene, history: History | None, done: int, took: float, versions: Mapping[str, str]
+    scene: Scene,
+    system: System,
+    history: History | None,
+    done: int,
+    took: float,
+    versions: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return what a run is judged by, and under what it was made."""
     simulated = done * scene.simulation.control_period
@@ -224,8 +227,8 @@ def _metrics(
         judged = compute_metrics(history, scene.set_point)
         known |= judged
         units |= {name: METRICS[name][0] for name in judged}
-        if scene.fingertip is not None:
-            known["max_indentation"] = largest_indentation(scene.fingertip, history)
+        if system.cell.touch is not None:
+            known["max_indentation"] = largest_indentation(system.cell.touch.fingertip, history)
             units["max_indentation"] = "m"
             known["beyond_a_finger"] = beyond_words(judged["max_total_force"], known["max_indentation"])
     return {**known, "units": units}

@@ -20,13 +20,15 @@ from ..base.modes import Mode
 from ..engine.simulation import begin
 from ..engine.state import Gathered, Rows, State
 from ..engine.system import System
+from ..model.fingertip import require_one
 from ..model.layout import Disc
 from .snapshot_memory import rebuilt, written
 
 __all__ = ["carried", "packed", "unpacked"]
 
-#: What kept bytes start with; the number changes when their arrangement does.
-START = b"digiclay state 1\n"
+#: What kept bytes start with; the number changes when their arrangement does. Of the first one, the finger's
+#: entry stood by itself.
+START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
 #: How far rounding may take a height, m, or an opening beyond its ends.
 SLACK = 1e-6
 #: No number of a state is as large: a session ends when the square of one is no longer finite.
@@ -60,7 +62,7 @@ def packed(system: System, state: State) -> bytes:
         "gathered": {
             "cells": held.cells.size,
             "near": held.near,
-            "reach": held.reach,
+            "fingers": [{"reach": held.reach}],
             "control": held.control,
             "peak": held.peak,
             "until": held.until,
@@ -100,6 +102,7 @@ def unpacked(system: System, data: bytes) -> State:
     _fits("number of cells", header["cells"], system.grid.count)
     _fits("rows of a cell", header["rows"], here)
     _fits("control period", header["control_period"], system.period)
+    _fits("number of fingers", len(header["gathered"]["fingers"]), 1)
     _within_the_device(system, kept)
     template = system.controller.begin() if system.controller else None
     gathered = header["gathered"]
@@ -111,7 +114,7 @@ def unpacked(system: System, data: bytes) -> State:
         kept.arrays["block"],
         kept.arrays["mode"],
         system.grid.place(cells),
-        _disc(gathered["reach"]),
+        _disc(require_one(gathered["fingers"])["reach"]),
         _disc(gathered["control"]),
         gathered["peak"],
         gathered["until"],
@@ -164,13 +167,15 @@ def _within_the_device(system: System, kept: Kept) -> None:
 
 def _read(data: bytes) -> Kept:
     """Read bytes without regard to any system; their arrays are new ones."""
-    if not isinstance(data, bytes) or not data.startswith(START):
+    if not isinstance(data, bytes) or not data.startswith((START, FIRST)):
         raise _unusable("does not begin as one")
     try:
         first = len(START) + 4
         length = int.from_bytes(data[len(START) : first], "little")
         header = json.loads(data[first : first + length])
         cells, held = _whole(header["cells"]), header["gathered"]
+        if data.startswith(FIRST):
+            held["fingers"] = [{"reach": held.pop("reach")}]
         count, taken = Rows(*map(_whole, header["rows"])).count, _whole(held["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
@@ -182,7 +187,8 @@ def _read(data: bytes) -> Kept:
             raise _unusable(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], held["peak"], header["control_period"]]
         numbers += [_whole(value) for value in (header["period"], held["until"], held["near"])]
-        numbers += [*(_disc(held["reach"]) or ()), *(_disc(held["control"]) or ())]
+        discs = [held["control"], *(finger["reach"] for finger in held["fingers"])]
+        numbers += [number for disc in discs for number in _disc(disc) or ()]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
         kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.

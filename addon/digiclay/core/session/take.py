@@ -1,4 +1,4 @@
-"""Take: initial state and fingertip path of a session, replayed bit for bit.
+"""Take: initial state and fingers' paths of a session, replayed bit for bit.
 
 The path is a pose at the start and one at the end of every control period, between which the
 finger goes straight; that and the state at the start decide all that follows. The state at
@@ -21,8 +21,9 @@ from ..base.toml_text import tables
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
+from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
-from ..scene.schema import Path, Scene, Waypoint
+from ..scene.schema import Scene
 from ..scene.toml_table import resolve, text
 from .live_periods import lived
 from .snapshot import packed, unpacked
@@ -35,6 +36,9 @@ Floats = NDArray[np.float64]
 STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")
+#: What the number of a format's version stands for: 1, which is not written down, has poses (t + 1, 7) of one
+#: finger; 2 has (t + 1, f, 7).
+VERSION = 2
 #: Most parts a physics step is cut into when a take is simulated once more.
 MOST_PARTS = 64
 
@@ -49,14 +53,14 @@ class Take:
         Its trajectory is not used: the finger follows `poses`.
     start, end : bytes
         The states before and after, from `snapshot.packed`.
-    poses : ndarray (t + 1, 7)
-        Finger at the start, and at the end of each of t control periods: lowest point, m,
+    poses : ndarray (t + 1, f, 7)
+        Fingers at the start, and at the end of each of t control periods: lowest point, m,
         and unit quaternion.
 
     Raises
     ------
     ParameterError
-        When there is no period, or a pose is not finite.
+        When there is no period, a pose is not finite, or the scene has another number of fingers.
     """
 
     scene: Scene
@@ -65,11 +69,10 @@ class Take:
     end: bytes
 
     def __post_init__(self) -> None:
-        if self.poses.ndim != 2 or self.poses.shape[1] != 7 or len(self.poses) < 2:
-            shown = f"an array of the shape {self.poses.shape}"
-            raise ParameterError(
-                "Take", "poses", "must hold one control period at least, 7 numbers a pose", shown
-            )
+        fingers = len(self.scene.fingers)
+        if self.poses.shape[1:] != (fingers, 7) or len(self.poses) < 2:
+            rule = f"must hold one control period at least, of {fingers} x 7 numbers, a pose a finger"
+            raise ParameterError("Take", "poses", rule, f"an array of the shape {self.poses.shape}")
         if not np.isfinite(self.poses).all():
             row = int(np.argwhere(~np.isfinite(self.poses))[0][0])
             raise ParameterError("Take", "poses", "must be finite numbers", f"row {row} is not")
@@ -131,12 +134,21 @@ def as_scene(take: Take, name: str) -> Scene:
             "reset the session before recording a take for export."
         )
     times = np.arange(len(take.poses)) * take.scene.simulation.control_period
-    waypoints = tuple(
-        Waypoint(float(times[row]), tuple(take.poses[row, :3].tolist()), tuple(take.poses[row, 3:].tolist()))
-        for row in np.flatnonzero(_turning_points(take.poses))
-    )
     lasting = replace(take.scene.simulation, duration=float(times[-1]))
-    return replace(take.scene, name=name, simulation=lasting, trajectory=Path("linear", waypoints))
+    fingers = tuple(
+        replace(finger, trajectory=_path(times, take.poses[:, number]))
+        for number, finger in enumerate(take.scene.fingers)
+    )
+    return replace(take.scene, name=name, simulation=lasting, fingers=fingers)
+
+
+def _path(times: Floats, poses: Floats) -> Path:
+    """Return a finger's poses (t, 7) at times (t,), s, as the path of a scene."""
+    waypoints = (
+        Waypoint(float(times[row]), tuple(poses[row, :3].tolist()), tuple(poses[row, 3:].tolist()))
+        for row in np.flatnonzero(_turning_points(poses))
+    )
+    return Path("linear", tuple(waypoints))
 
 
 def _rests(system: System, start: bytes) -> bool:
@@ -158,7 +170,7 @@ def _turning_points(poses: Floats) -> NDArray[np.bool_]:
 
 
 def to_bytes(take: Take) -> bytes:
-    """Write a take as numpy's ``.npz``."""
+    """Write a take as numpy's ``.npz``"""
     written = io.BytesIO()
     np.savez(
         written,
@@ -166,6 +178,7 @@ def to_bytes(take: Take) -> bytes:
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
+        version=np.array(VERSION),
     )
     return written.getvalue()
 
@@ -180,12 +193,17 @@ def from_bytes(data: bytes) -> Take:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            held = heads(archive, PARTS)
+            names = (*PARTS, "version")[: 5 if "version.npy" in archive.namelist() else 4]
+            held = heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to no more than it is.
             size = sum(head.size for head in held.values())
             if size > len(data):
                 raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
-            scene, start, poses, end = (array(archive, name) for name in PARTS)
+            scene, start, poses, end, *version = (array(archive, name) for name in names)
+        if not version:
+            poses = poses[:, None]  # the first version held one finger
+        elif int(version[0]) != VERSION:
+            raise ValueError(f"its version must be at most {VERSION} (got {version[0]})")
         return Take(resolve(tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
     except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

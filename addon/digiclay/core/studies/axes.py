@@ -210,7 +210,7 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
         values = tuple(_find_value(scenes[word], one.key, word) for word in one.words)
         section, _, name = one.key.partition(".")
-        part = next((getattr(scene, section, None) for scene in scenes.values()), None)
+        part = next((scene.section(section) for scene in scenes.values()), None)
         known = quantities(part).get(name) if name and part else None
         columns.append(Column(one.key, known.unit if known else "", values, one.logarithmic))
     return columns
@@ -219,6 +219,6 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
 def _find_value(scene: Scene, key: str, word: str) -> Any:
     """Return what a scene made of a word, if it is a number."""
     section, _, name = key.partition(".")
-    value = getattr(getattr(scene, section, None), name, None) if name else None
+    value = getattr(scene.section(section), name, None) if name else None
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return value if number else word

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -125,7 +125,7 @@ def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
             said = f"physics steps of {step * 1e3:g} ms, not {simulation.physics_step * 1e3:g} ms"
             yield Omission("steps", said, partial(_with_step, step=step))
     for section, said in PARTS.items():
-        if getattr(scene, section) is not None:
+        if scene.section(section) is not None:
             yield Omission(section, said, partial(_without, section=section))
     for band in (share * budget for share in BANDS):
         if getattr(scene.control, "dead_band", math.inf) < band:
@@ -186,8 +186,7 @@ def fitted(scene: Scene, budget: float, *, told: Callable[[str], None] | None = 
 
 def _without(scene: Scene, section: str) -> Scene:
     """Leave out a part."""
-    left: dict[str, Any] = {section: None}
-    return replace(scene, **left)
+    return scene.with_sections(**{section: None})
 
 
 def _with_step(scene: Scene, step: float) -> Scene:
@@ -213,7 +212,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
     """
     apart, done = 0.0, np.zeros(2)
     pair = [assemble(full), assemble(less)]
-    runs = (periods(one, full.trajectory.trajectory(), begin(one), full.periods) for one in pair)
+    runs = (periods(one, full.trajectories(), begin(one), full.periods) for one in pair)
     weights = [_weight(scene, system) for scene, system in zip((full, less), pair, strict=True)]
     for both in zip(*runs, strict=True):
         done += [each * state.gathered.cells.size for each, state in zip(weights, both, strict=True)]
@@ -225,7 +224,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
 
 def _weight(scene: Scene, system: System) -> int:
     """Return the work of a cell in a control period: steps times state rows, and parts that own no row."""
-    rows: int = system.rows.driven.stop + sum(getattr(scene, part) is not None for part in WITHOUT_ROWS)
+    rows: int = system.rows.driven.stop + sum(scene.section(part) is not None for part in WITHOUT_ROWS)
     return rows * scene.simulation.steps
 
 

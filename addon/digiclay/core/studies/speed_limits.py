@@ -12,7 +12,8 @@ from ..base.quantity import Parameters, quantity
 from ..metrics.finger_path import lag, sum_cells
 from ..metrics.force import rfd
 from ..model.set_point import asked
-from ..scene.schema import Path, Scene, Waypoint
+from ..model.trajectory import Path, Waypoint
+from ..scene.schema import Scene
 from .trials import Trial, trial
 
 __all__ = ["Criterion", "Drag", "Follows", "Lift", "followed", "largest", "largest_speed"]
@@ -130,7 +131,7 @@ def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Tri
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
-    done = trial(replace(scene, trajectory=path, simulation=shorter))
+    done = trial(scene.with_sections(trajectory=path, simulation=shorter))
     part = done.between(start, end)
     sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
     behind, wanted = lag(sums, part["fingertip"]), asked(scene.set_point, sums.following)

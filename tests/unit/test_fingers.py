@@ -1,0 +1,196 @@
+"""Fingers are a tuple in scenes, kept states and takes; few places take the only one out of it."""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import OutputError, ParameterError, SceneError, StateError
+from digiclay.core.base.toml_text import tables
+from digiclay.core.engine.simulation import begin
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.session.snapshot import START, packed, unpacked
+from digiclay.core.session.take import Take, as_scene, from_bytes, to_bytes
+
+ROOT = Path(__file__).parents[2]
+BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
+#: A thumb and a finger without relaxation.
+TWO = """
+[[finger]]
+[finger.fingertip]
+length = "14 mm"
+[finger.trajectory]
+waypoints = [{ time = 0.0, position = [-0.004, 0.0, 0.042] }, { time = 0.5, position = [-0.004, 0.0, 0.038] }]
+[[finger]]
+relaxation = "absent"
+[finger.trajectory]
+interpolation = "linear"
+waypoints = [{ time = 0.0, position = [0.004, 0.0, 0.042] }, { time = 0.7, position = [0.004, 0.0, 0.038] }]
+"""
+FILES = sorted((ROOT / "addon").rglob("*.py"))
+ONE = TWO[: TWO.rindex("[[finger]]")]
+
+
+def scene(words: str) -> Scene:
+    """Return the scene of a text."""
+    return resolve(tables(BED + words), "bed")
+
+
+def refused(words: str) -> str:
+    """Return why a scene is refused."""
+    with pytest.raises(ParameterError) as caught:
+        scene(words)
+    return str(caught.value)
+
+
+def test_a_scene_may_have_two_fingers() -> None:
+    thumb, other = scene(TWO).fingers
+    assert thumb.fingertip is not None
+    assert (thumb.fingertip.length, thumb.relaxation is None, other.relaxation) == (14e-3, False, None)
+    assert (thumb.trajectory.interpolation, other.trajectory.interpolation) == ("smooth", "linear")
+
+
+def test_a_session_lasts_as_long_as_the_longest_path() -> None:
+    assert scene(TWO).simulation.duration == 0.7
+
+
+@pytest.mark.parametrize("words", [TWO, "finger = []\nsimulation.duration = 1.0\n"])
+def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(words: str) -> None:
+    made = resolve(tables(words + BED) if words.startswith("finger") else tables(BED + words), "bed")
+    assert resolve(tables(text(made))) == made
+
+
+def test_one_finger_in_a_list_is_the_same_as_one_beside_the_other_sections() -> None:
+    beside = ONE.replace("[[finger]]", "").replace("[finger.", "[")
+    assert scene(ONE) == scene(beside)
+    assert "[[finger]]" not in text(scene(ONE))
+
+
+def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path: Path) -> None:
+    file = tmp_path / "one.toml"
+    file.write_text(BED + ONE, encoding="utf-8")
+    (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
+    assert finger.fingertip is not None
+    assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
+
+
+def test_a_setting_for_one_of_two_fingers_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "two.toml"
+    file.write_text(BED + TWO, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"^--set: fingertip must be left out where there is \[\[finger\]\]"):
+        load(file, [Setting("fingertip.length", "9 mm")])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("[[finger]]\nlength = 1\n", r"finger #1.length must be a known key"),
+        ("[[finger]]\n[[finger]]\nfingertip = 3\n", r"finger #2.fingertip must be a section"),
+        ("[[finger]]\n[finger.contact]\nshare = -1.0\n", r"finger #1.contact.share must be"),
+        (
+            "[[finger]]\ntrajectory.waypoints = [{ time = 0.0 }]\n",
+            r"finger #1.trajectory.waypoints #1.position",
+        ),
+        ("[[finger]]\n[contact]\n", r"contact must be left out where there is \[\[finger\]\]"),
+        ("[finger]\n", r"finger must be a list of tables, \[\[finger\]\] \(got an empty section\)"),
+    ],
+)
+def test_what_is_wrong_with_a_finger_is_told_with_its_number(words: str, said: str) -> None:
+    assert re.match(said, refused(words))
+
+
+@pytest.mark.parametrize(("number", "fingers"), [(0, ()), (2, scene(TWO).fingers)])
+def test_a_number_of_fingers_that_the_physics_does_not_carry_is_refused_in_one_line(
+    number: int, fingers: tuple[object, ...]
+) -> None:
+    said = rf"^scene\.fingers must be one: the physics carries exactly one finger \(got {number}\)\.$"
+    with pytest.raises(ParameterError, match=said):
+        assemble(replace(scene(ONE), fingers=fingers))
+
+
+def test_a_kept_state_of_two_fingers_is_refused() -> None:
+    system = assemble(scene(ONE))
+    data = packed(system, begin(system))
+    length = int.from_bytes(data[len(START) : len(START) + 4], "little")
+    header = json.loads(data[len(START) + 4 : len(START) + 4 + length])
+    assert header["gathered"]["fingers"] == [{"reach": None}]
+    header["gathered"]["fingers"] *= 2
+    head = json.dumps(header).encode()
+    two = START + len(head).to_bytes(4, "little") + head + data[len(START) + 4 + length :]
+    with pytest.raises(StateError, match=r"must have the same number of fingers as the bed now, 1 \(got 2\)"):
+        unpacked(system, two)
+
+
+def take_of(made: Scene) -> Take:
+    """Return a take of three control periods, of as many fingers as a scene has."""
+    poses = np.tile([0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0], (4, len(made.fingers), 1))
+    poses[:, :, 0] += 1e-3 * np.arange(len(made.fingers))
+    return Take(made, b"start", poses, b"end")
+
+
+@pytest.mark.parametrize("words", [ONE, TWO])
+def test_a_take_keeps_the_path_of_every_finger(words: str) -> None:
+    take = take_of(scene(words))
+    back = from_bytes(to_bytes(take))
+    assert np.array_equal(back.poses, take.poses)
+    assert (back.scene, back.start, back.end) == (take.scene, take.start, take.end)
+
+
+def test_a_take_of_a_later_version_is_refused() -> None:
+    take, written = take_of(scene(ONE)), io.BytesIO()
+    with np.load(io.BytesIO(to_bytes(take))) as kept:
+        np.savez(written, **{**kept, "version": np.array(3)})
+    with pytest.raises(OutputError, match=r"its version must be at most 2 \(got 3\)"):
+        from_bytes(written.getvalue())
+
+
+def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
+    made = scene(ONE)
+    system = assemble(made)
+    (finger,) = as_scene(replace(take_of(made), start=packed(system, begin(system))), "take").fingers
+    assert [point.time for point in finger.trajectory.waypoints] == [0.0, pytest.approx(0.015)]
+
+
+def callers(path: Path, names: set[str]) -> set[str]:
+    """Return ``file: function`` for the functions of a file that call one of some others."""
+    found = set()
+    for outer in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(outer, ast.FunctionDef):
+            called = {
+                node.func.id
+                for node in ast.walk(outer)
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+            }
+            if called & names:
+                found.add(f"{path.relative_to(ROOT / 'addon' / 'digiclay').as_posix()}: {outer.name}")
+    return found
+
+
+def test_the_places_where_there_is_one_finger_are_ten_at_most_and_named_in_the_docs() -> None:
+    places = set().union(*(callers(path, {"require_one", "wrap_one"}) for path in FILES))
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = page[page.index("### Fingers") :].split("\n#", 1)[0]
+    named = {f"{file}: {name}" for file, name in re.findall(r"\| `([\w/.]+)`: `(\w+)` \|", part)}
+    assert places == named
+    assert 0 < len(places) <= 10
+
+
+def test_no_module_takes_a_finger_by_its_number() -> None:
+    hits = [
+        f"{path.name}: {line.strip()}"
+        for path in FILES
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.search(
+            r"fingers\[\d|trajectories\(\)\[|section\(\"(fingertip|contact|relaxation|trajectory)\"\)", line
+        )
+    ]
+    assert hits == []
