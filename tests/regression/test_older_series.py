@@ -48,6 +48,13 @@ def test_an_older_sweep_that_is_done_is_shown_as_it_was() -> None:
     assert sorted(path.stem for path in Path("sweep").glob("*.png")) == ["height_error", "lag_mean", "rfd"]
 
 
+def test_an_older_sweep_of_another_scene_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    before = times("sweep/points/*")
+    assert main([*SWEEP, "--set", "contact.stiffness=300"]) == 2
+    assert "sweep holds another sweep (10 points over" in capsys.readouterr().err
+    assert times("sweep/points/*") == before
+
+
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table(workers: str) -> None:
     known = numbers(Path("sweep/sweep.csv"))

@@ -75,9 +75,9 @@ def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> 
     finish(
         executor,
         task,
-        [(point, (point,)) for point in todo],
-        lambda point, records: done.update({point.index: records[0]}),
-        lambda point, why: done.update({point.index: {"error": why}}),
+        [(point,) for point in todo],
+        lambda bundle, records: done.update({bundle[0].index: records[0]}),
+        lambda bundle, why: done.update({bundle[0].index: {"error": why}}),
         **known,
     )
     return done
@@ -218,9 +218,14 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
     assert (started.returncode, err, list((here / "out").glob("points/*"))) == (130, "", [])
 
 
+def idle() -> Processes:
+    """Return the processes of a series that nobody stops."""
+    return Processes(never, lambda: None)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no sessions of processes")
 def test_ctrl_c_on_a_terminal_reaches_no_worker() -> None:
-    with Processes() as processes:
+    with idle() as processes:
         worker = processes.start(Evaluator)
         assert worker is not None
         assert os.getpgid(worker.process.pid) != os.getpgid(0)
@@ -245,7 +250,7 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here: Path, whol
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_a_bundle_that_no_worker_survives_is_told() -> None:
-    with Processes() as processes:
+    with idle() as processes:
         dead = []
         for _ in range(2):
             worker = processes.start(Evaluator)
@@ -257,6 +262,6 @@ def test_a_bundle_that_no_worker_survives_is_told() -> None:
 
 
 def test_after_a_stop_a_bundle_has_no_records() -> None:
-    processes = Processes()
-    processes.stop()
+    processes = Processes(lambda: True, lambda: None)
+    assert processes.stopped()
     assert evaluate_elsewhere(processes, [], some(2), errors=False) == [None, None]

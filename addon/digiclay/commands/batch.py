@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import DigiclayError, one_line
 from ..core.studies.job_table import Job, batch, find_jobs
+from ..core.studies.series import finish
 from .arguments import add_command
 from .batch_folder import Folder, opened
 from .exit_codes import FAILED, STOPPED
@@ -20,7 +22,7 @@ from .job import ERROR, PROGRESS, check_outputs
 from .progress import Counted, duration
 from .stop import Stop
 from .sweep import workers
-from .worker import Process, Processes, count_cores, finish_here
+from .worker import Process, Processes, count_cores
 
 __all__ = ["JobProcess", "add"]
 
@@ -139,12 +141,9 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
                 done = before + len(ended) + sum(process.fraction() for process in list(running.values()))
                 bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
-        processes = Processes()
-        task = partial(_do_job, processes, running, folder)
-        pieces = [(job, job) for job in todo]
-        finish_here(
-            processes, count, task, pieces, lambda job, _: ended.append(job), fail, stop=stop, draw=draw
-        )
+        with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
+            task = partial(_do_job, processes, running, folder)
+            finish(threads, task, todo, lambda job, _: ended.append(job), fail, stopped=processes.stopped)
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
     done = before - sum(bool(job.error) for job in made.jobs) + now
@@ -179,8 +178,7 @@ def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder
     if process is None:
         return
     running[job.name] = process
-    process.wait()
+    processes.wait(process)
     del running[job.name]
-    processes.remove(process)
     if not folder.is_done(job):
         raise DigiclayError(process.error())

@@ -10,13 +10,14 @@ from statistics import median
 from typing import Any
 
 from .. import __version__
-from ..core.base.errors import OutputError
+from ..core.base.errors import DigiclayError, OutputError
 from ..core.base.run_folder import inside
 from ..core.base.unfinished import remove_abandoned
 from ..core.base.whole_files import read_json, write_whole
+from ..core.scene.scene_source import load
 from ..core.scene.toml_table import text
 from ..core.session.finished_run import is_whole
-from ..core.studies.job_table import JOB, SCENE, Batch, Job
+from ..core.studies.job_table import JOB, SCENE, Batch, Job, job_outputs
 from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
 from .job import FILES, RUNS, TIMING
@@ -60,19 +61,14 @@ class Folder:
         """Return the file of what a job's process said."""
         return inside(self.path, LOGS, f"{job.name}.log")
 
-    def files(self, job: Job) -> dict[str, bytes]:
-        """Return the files that describe a job."""
-        assert job.scene is not None
-        return {SCENE: text(job.scene).encode(), JOB: self.batch.outputs.text().encode()}
-
     def is_done(self, job: Job) -> bool:
         """Tell whether there is a whole run of just this job, and not of one it once was."""
         if job.scene is None:
             return False
         run = self.run(job)
         try:
-            same = all((run / name).read_bytes() == content for name, content in self.files(job).items())
-        except OSError:
+            same = load(run / SCENE) == job.scene and job_outputs(run / JOB) == self.batch.outputs
+        except DigiclayError:
             return False
         timing = read_json(run / TIMING)
         return same and timing is not None and is_whole(run, job.scene, timing.get(FILES))
@@ -86,8 +82,8 @@ class Folder:
         except OSError as error:
             raise OutputError(f"{self.job(job)} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(self.job(job))
-        for name, content in self.files(job).items():
-            write_whole(self.job(job) / name, content)
+        write_whole(self.job(job) / SCENE, text(job.scene).encode())
+        write_whole(self.job(job) / JOB, self.batch.outputs.text().encode())
 
     def start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""

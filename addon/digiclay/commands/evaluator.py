@@ -80,14 +80,13 @@ def evaluate_elsewhere(
         try:
             records = evaluator.evaluate(bundle, errors=errors)
         except EOFError:
-            how = evaluator.wait()
-            processes.remove(evaluator)
-            if processes.stopped:
+            how = processes.wait(evaluator)
+            if processes.stopping():
                 break
         else:
             idle.append(evaluator)
             return records
-    if processes.stopped:
+    if processes.stopping():
         return [None] * len(bundle)
     rule = f"A worker died twice of this ({how}), perhaps for lack of memory"
     raise DigiclayError(f"{rule}. Run the same again with fewer --workers.")

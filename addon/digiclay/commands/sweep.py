@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,13 +24,14 @@ from ..core.studies.evaluation import (
     find_figure,
     make_bundles,
 )
+from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder, format_table, make_grid, open_sweep
 from .arguments import add_scene, settings_of
 from .evaluator import Evaluator, evaluate_elsewhere
 from .exit_codes import STOPPED
 from .progress import Counted
 from .stop import Stop
-from .worker import Processes, count_cores, finish_here, in_blender
+from .worker import Processes, count_cores, in_blender
 
 __all__ = ["add", "workers"]
 
@@ -157,16 +159,15 @@ def _finish(
 
     if todo:
         count = min(arguments.workers or count_cores(), MOST, len(todo)) if not in_blender() else 1
-        processes, done = Processes(), len(records)
-        task: Callable[[Any], list[Record | None]]
-        if count == 1:
-            task = partial(evaluate_bundle, stopped=lambda: processes.stopped, errors=errors)
-        else:
-            task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
-        with Counted(sys.stderr, "sweep", "points", done) as bar:
-            draw = (lambda: None) if arguments.quiet else (lambda: bar(len(records), total))
-            pieces = [(bundle, bundle) for bundle in todo]
-            finish_here(processes, count, task, pieces, keep, fail, stop=stop, draw=draw)
+        bar = Counted(sys.stderr, "sweep", "points", len(records))
+        draw = (lambda: None) if arguments.quiet else (lambda: bar(len(records), total))
+        with ThreadPoolExecutor(count) as threads, bar, Processes(stop, draw) as processes:
+            task: Callable[[Sequence[Point]], list[Record | None]]
+            if count == 1:
+                task = partial(evaluate_bundle, stopped=processes.stopping, errors=errors)
+            else:
+                task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
+            finish(threads, task, todo, keep, fail, stopped=processes.stopped)
     return records
 
 

@@ -7,29 +7,26 @@ and when whoever started it has died.
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..core.base.errors import DigiclayError
-from ..core.studies.series import finish
 
-__all__ = ["Process", "Processes", "count_cores", "finish_here", "in_blender"]
+__all__ = ["Process", "Processes", "count_cores", "in_blender"]
 
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
 #: The package, as an extension in Blender or installed with pip.
 PACKAGE = __name__.removesuffix(".commands.worker")
 
-Piece = TypeVar("Piece")
-Outcome = TypeVar("Outcome")
 Started = TypeVar("Started", bound="Process")
 
 
@@ -113,81 +110,60 @@ class Process:
 
 
 class Processes:
-    """All processes of a series: they are asked to stop together, and none is left when the block ends."""
+    """The processes of a series: they are asked to stop together, and none is left when the block ends.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    stop : callable
+        Whether somebody asks to stop.
+    draw : callable
+        Called again and again while the series is worked at.
+    """
+
+    def __init__(self, stop: Callable[[], bool], draw: Callable[[], None]) -> None:
+        self._stop, self._draw = stop, draw
         self._alive: list[Process] = []
-        self._deadline = 0.0
+        self._deadline = math.inf
         self._lock = threading.Lock()
 
     def __enter__(self) -> Processes:
         return self
 
-    @property
+    def stopping(self) -> bool:
+        """Tell whether they have been asked to stop."""
+        return self._deadline < math.inf
+
     def stopped(self) -> bool:
-        """Whether they were asked to stop."""
-        return self._deadline > 0.0
+        """Draw, and ask all to stop when somebody asks to; kill those that have not after some time."""
+        self._draw()
+        if self._stop():
+            self._stop_all()
+        return self._stop()
+
+    def _stop_all(self) -> None:
+        """Ask all to stop, or kill them."""
+        with self._lock:
+            self._deadline = min(self._deadline, time.monotonic() + GRACE)
+            for process in self._alive:
+                process.kill() if time.monotonic() >= self._deadline else process.stop()
 
     def start(self, make: Callable[[], Started]) -> Started | None:
         """Start a process; None after a stop."""
         with self._lock:
-            if self.stopped:
+            if self.stopping():
                 return None
             process = make()
             self._alive.append(process)
             return process
 
-    def stop(self) -> None:
-        """Ask all to stop; asked again after some time, kill those that have not."""
-        with self._lock:
-            self._deadline = self._deadline or time.monotonic() + GRACE
-            for process in self._alive:
-                process.kill() if time.monotonic() >= self._deadline else process.stop()
-
-    def remove(self, process: Process) -> None:
-        """Forget a process that has ended."""
+    def wait(self, process: Process) -> str:
+        """Wait for a process to end, forget it, and say how it did."""
+        how = process.wait()
         with self._lock:
             self._alive.remove(process)
+        return how
 
     def __exit__(self, *raised: object) -> None:
-        self.stop()
-        with self._lock:
-            for process in self._alive:
-                process.kill()
-
-
-def finish_here(
-    processes: Processes,
-    count: int,
-    task: Callable[[Any], Outcome],
-    pieces: Iterable[tuple[Piece, Any]],
-    keep: Callable[[Piece, Outcome], None],
-    fail: Callable[[Piece, str], None],
-    *,
-    stop: Callable[[], bool],
-    draw: Callable[[], None],
-) -> None:
-    """Do what is left of a series on this machine, several pieces at a time, see `series.finish`.
-
-    Parameters
-    ----------
-    processes : Processes
-        Those that the task starts.
-    count : int
-        How many pieces are done at a time.
-    task, pieces, keep, fail
-        As `series.finish` has them.
-    stop : callable
-        Whether somebody asks to stop.
-    draw : callable
-        Called again and again meanwhile.
-    """
-
-    def stopped() -> bool:
-        if stop():
-            processes.stop()
-        draw()
-        return stop()
-
-    with ThreadPoolExecutor(count) as threads, processes:
-        finish(threads, task, pieces, keep, fail, stopped=stopped)
+        self._stop_all()
+        for process in list(self._alive):
+            process.kill()

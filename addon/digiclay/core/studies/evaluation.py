@@ -21,7 +21,7 @@ from .axes import Point
 from .series import describe_error
 
 __all__ = [
-    "ERRORS", "FIGURES", "RUNS", "Bundles", "Record", "StackWarning", "evaluate", "evaluate_bundle",
+    "ERRORS", "FIGURES", "RUNS", "TIMES", "Bundles", "Record", "StackWarning", "evaluate", "evaluate_bundle",
     "explain_failed_stacks", "find_figure", "make_bundles",
 ]  # fmt: skip
 
@@ -42,6 +42,8 @@ FIGURES: dict[str, tuple[str, str]] = {
     "real_time_factor": ("1", "simulated time over the time it took"),
     **ERRORS,
 }
+#: Figures that are others each time.
+TIMES = ("run_time", "real_time_factor")
 #: Short names of figures.
 SHORT = {"lag": "lag_mean"}
 #: Fewer points than this are as quick one at a time.

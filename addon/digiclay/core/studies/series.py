@@ -123,8 +123,8 @@ def _is_bare(path: Path, kind: Kind) -> bool:
 
 def finish(
     executor: Executor,
-    task: Callable[[Any], Outcome],
-    pieces: Iterable[tuple[Piece, Any]],
+    task: Callable[[Piece], Outcome],
+    pieces: Iterable[Piece],
     keep: Callable[[Piece, Outcome], None],
     fail: Callable[[Piece, str], None],
     *,
@@ -140,8 +140,8 @@ def finish(
         Any.
     task : callable
         What it runs, in a form it can hand on.
-    pieces : iterable of tuple
-        Each piece, and the argument that the task gets for it.
+    pieces : iterable
+        What the task gets, one at a time.
     keep : callable
         Told of each piece that is done, and of what the task returned.
     fail : callable
@@ -157,8 +157,8 @@ def finish(
     arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
     waiting: dict[Future[Outcome], Piece] = {}
     try:
-        for piece, argument in pieces:
-            future = executor.submit(task, argument)
+        for piece in pieces:
+            future = executor.submit(task, piece)
             waiting[future] = piece
             future.add_done_callback(arrived.put)
         while waiting:

@@ -6,6 +6,8 @@ import csv
 import hashlib
 import io
 import itertools
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,13 +21,15 @@ from ..base.errors import OutputError
 from ..base.whole_files import as_json, read_json, write_whole
 from ..scene.toml_table import text
 from .axes import Axis, Column, Point
-from .evaluation import FIGURES, Record
+from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
 
 __all__ = ["MARK", "Folder", "format_table", "make_grid", "open_sweep"]
 
 #: The file by which a folder is known as a sweep's, and the folder of its points.
 MARK, POINTS = "sweep.json", "points"
+#: The comment at the end of a line of a scene file.
+NOTE = re.compile(r'  # [^"\n]*$', re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -67,18 +71,22 @@ def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], versio
     OutputError
         When it holds anything else, cannot be written, or another process works in it.
     """
-    identity = hashlib.sha256(version.encode())
+    scenes = hashlib.sha256()
     for point in points:
-        identity.update((text(point.scene) if point.scene else point.error).encode())
-    description = {
+        scenes.update((NOTE.sub("", text(point.scene)) if point.scene else point.error).encode())
+    plan = {
         "digiclay": version,
         "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
         "points": len(points),
-        "identity": identity.hexdigest(),
     }
+    description = {**plan, "scenes": scenes.hexdigest()}
+    folder = Folder(path)
 
     def refuse_another(there: Any) -> None:
         if there == description:
+            return
+        older = isinstance(there, dict) and there == {**plan, "identity": there.get("identity")}
+        if older and _agrees(folder.read_records(), points):
             return
         try:
             varied = " and ".join(one["key"] for one in there["axes"])
@@ -88,7 +96,28 @@ def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], versio
         raise OutputError(f"{path} holds another sweep ({said}): choose another folder with --out.")
 
     with open_series(path, Kind("sweep", MARK, (POINTS,)), description, refuse_another):
-        yield Folder(path)
+        yield folder
+
+
+def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
+    """Tell whether the first point that is kept comes to the same figures once more.
+
+    Older descriptions identify scenes by a number that depends on the wording of their comments.
+    """
+    for index, record in sorted(records.items()):
+        scene = points[index].scene if index < len(points) else None
+        if scene is not None and "figures" in record:
+            known, again = record["figures"], (evaluate(scene) or {}).get("figures", {})
+            names = known.keys() - {*TIMES, *ERRORS}
+            return all(_is_close(known[name], again.get(name)) for name in names)
+    return not records
+
+
+def _is_close(one: float | None, other: float | None) -> bool:
+    """Tell whether a figure is the same but for rounding."""
+    if one is None or other is None:
+        return one is other
+    return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-12)
 
 
 def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
