@@ -181,7 +181,7 @@ def uniform(bed: Any) -> float:
 
 
 def linear(colour: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
-    """Return an sRGB colour in the linear light Blender's materials want."""
+    """Return an sRGB colour in the linear light of Blender's materials."""
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
     return r, g, b, alpha
 

@@ -61,7 +61,7 @@ def _parsed(argv: Sequence[str] | None) -> Any:
 
 
 def _wrong(said: object) -> int:
-    """Tell in a line what is wrong, and return the exit code."""
+    """Print an error in one line, and return the exit code."""
     print(one_line(said), file=sys.stderr)
     return WRONG
 

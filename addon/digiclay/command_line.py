@@ -20,7 +20,7 @@ def run(arguments: list[str]) -> int:
 
 
 def register() -> None:
-    """Make the command known to Blender."""
+    """Register the command in Blender."""
     HANDLES.append(bpy.utils.register_cli_command(NAME, run))
 
 

@@ -102,7 +102,7 @@ def own_curves(owner: Any) -> None:
 
 
 def has_denoiser() -> bool:
-    """Tell whether this Blender was built with Cycles' denoiser; some distributions' are not."""
+    """Return whether this Blender was built with Cycles' denoiser; some distributions' are not."""
     try:
         import _cycles
     except ImportError:

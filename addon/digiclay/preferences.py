@@ -12,7 +12,7 @@ __all__ = ["Choices", "Preferences", "of", "register", "unregister"]
 
 @dataclass(frozen=True)
 class Choices:
-    """The preferences of somebody who has set none.
+    """Default preferences.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Preferences(bpy.types.AddonPreferences):
 
     redraw_rate: bpy.props.IntProperty(
         name="Redraw Rate (Hz)",
-        description="How often a running session is drawn at most, in Hz; drawing is what costs most",
+        description="Largest redraw rate of a live session, in Hz; drawing takes most of the time",
         default=Choices.redraw_rate,
         min=1,
         max=240,
@@ -61,7 +61,7 @@ class Preferences(bpy.types.AddonPreferences):
     )
     palette: bpy.props.EnumProperty(
         name="Mode Colours",
-        description="Colours of the control modes; choosing one recolours the beds of the open file",
+        description="Colours of the modes; a choice recolours the beds of the open file",
         items=[(name, *words) for name, words in palettes.WORDS.items()],
         default=Choices.palette,
         update=take_palette,

@@ -120,7 +120,7 @@ def test_the_panel_says_when_a_bed_is_no_longer_as_its_layout(field: str, value:
 
 def test_rows_and_columns_exchanged_are_another_bed_of_as_many_pins(bed: Any) -> None:
     bed.digiclay.layout.rows, bed.digiclay.layout.columns = 8, 6
-    assert properties.stale(bed) == "The pins stand elsewhere than Layout says"
+    assert properties.stale(bed) == "The pins differ from the parameters of Layout"
     with pytest.raises(ParameterError, match="press Rebuild"):
         properties.scene_of(bed)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,7 +15,11 @@ from benchmarks.kinds import parser as benchmarks_parser
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(
-    [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "benchmarks" / "README.md", *ROOT.glob("docs/*.md")]
+    [
+        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "benchmarks/README.md")),
+        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
+    ]
 )
 #: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(
@@ -139,3 +144,20 @@ def test_every_command_is_one_that_its_program_takes(page: Path, capsys: pytest.
 
 def test_the_pages_have_commands_to_check() -> None:
     assert sum(len(_commands(page)) for page in PAGES) > 25
+
+
+def _first_lines() -> Iterator[tuple[str, str]]:
+    """Yield name and first line of the docstrings of all modules and classes of the package."""
+    for path in sorted((ROOT / "addon").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef) and (text := ast.get_docstring(node)):
+                yield f"{path.relative_to(ROOT)}: {getattr(node, 'name', '')}", text.splitlines()[0]
+
+
+def test_the_first_line_of_a_docstring_names_a_content() -> None:
+    wrong = re.compile(
+        r"^(what|how|which|whether|why|where|who)\b"
+        r"|\b(wants|knows|lives|judge[sd]?|tells?|told|says?|said|remembers|feels)\b",
+        re.IGNORECASE,
+    )
+    assert [(name, line) for name, line in _first_lines() if wrong.search(re.sub(r"`[^`]*`", "", line))] == []

@@ -21,7 +21,7 @@ __all__ = [
 
 
 class Help(argparse.RawDescriptionHelpFormatter):
-    """Help that keeps its paragraphs, with room for the longest command's name beside what it does."""
+    """Help formatter that keeps paragraphs and fits the longest command name."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog)
@@ -40,7 +40,7 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
     parser.add_argument(
         "--tolerance",
         metavar="T",
-        help='error of the heights to keep to, such as "1 um": chooses the adaptive stepper',
+        help='largest error of the heights, such as "1 um": chooses the adaptive stepper',
     )
     parser.add_argument(
         "--set",
@@ -84,14 +84,14 @@ def add_command(commands: Any, name: str, help: str, epilog: str, said: str = ""
 def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
     """Add a command that works on a finished run."""
     parser = add_command(commands, name, help, epilog)
-    parser.add_argument("run", metavar="RUN", type=Path, help="the folder 'digiclay run' wrote")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("run", metavar="RUN", type=Path, help="run folder of 'digiclay run'")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
     return parser
 
 
 @contextmanager
 def told_as_options(*owners: str, **names: str) -> Iterator[None]:
-    """Tell of the parameters of some owners as of options, which are called like them or as `names` say."""
+    """Rename parameters of some owners to their options in an error, by equal name or `names`."""
     try:
         yield
     except ParameterError as error:

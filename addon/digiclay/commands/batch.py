@@ -29,11 +29,11 @@ __all__ = ["JobProcess", "add"]
 EXAMPLES = """\
 examples:
   digiclay batch first                    the sample batch, into ./first
-  digiclay batch my.toml --jobs 4         four processes; index.html shows what came of it
-  digiclay batch my.toml --prepare        only the files of the jobs, for a render farm: see 'digiclay job'
+  digiclay batch my.toml --jobs 4         four processes; results in index.html
+  digiclay batch my.toml --prepare        files of the jobs only, for a render farm: see 'digiclay job'
 
-Stopped by Ctrl-C, or killed, it goes on when the same command is given again: finished jobs are kept, and
-done again only if the JOBS file has changed them. Exit code 1: some jobs failed, the others are there.
+After Ctrl-C or a kill, the same command continues: finished jobs are kept, and repeated only after a change
+in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
 #: Bytes at a log's end that are looked at for its last line.
 TAIL = 4096
@@ -85,13 +85,15 @@ class JobProcess(Process):
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "run many scenes in the background, with exports, pictures and films"
+    said = "run a job series in the background: scenes, exports, pictures and films"
     parser = add_command(commands, "batch", said, EXAMPLES)
     parser.add_argument("file", metavar="JOBS", help="a .toml file, or a sample's name")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the file's name, here")
-    parser.add_argument("--jobs", metavar="N", type=workers, help="processes; default one a core")
-    parser.add_argument("--prepare", action="store_true", help="write the jobs' files, and run none")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder; default: the file's name in the working folder"
+    )
+    parser.add_argument("--jobs", metavar="N", type=workers, help="number of processes; default: one a core")
+    parser.add_argument("--prepare", action="store_true", help="write the files of the jobs, run none")
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 
@@ -113,7 +115,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
-    """Do the jobs, tell of them, and return the exit code."""
+    """Run the jobs, report them, and return the exit code."""
     made, started = folder.batch, time.monotonic()
     failed = {job.name: job.error for job in made.jobs if job.error}
     todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]
@@ -169,7 +171,7 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
 
 
 def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder, job: Job) -> None:
-    """Do a job in a process of its own; DigiclayError says why it is not done."""
+    """Run a job in a process of its own; DigiclayError states the reason of a failure."""
     arguments = [
         "job", str(folder.job(job).resolve()), "--out", str(folder.run(job).resolve()),
         "--overwrite", "--follow", "--since", repr(time.time()),

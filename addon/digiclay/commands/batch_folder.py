@@ -44,7 +44,7 @@ FACTS: tuple[tuple[str, str, float, str], ...] = (
 
 @dataclass(frozen=True)
 class Folder:
-    """Where a batch is kept."""
+    """Folder of a job series."""
 
     path: Path
     batch: Batch
@@ -62,7 +62,7 @@ class Folder:
         return inside(self.path, LOGS, f"{job.name}.log")
 
     def is_done(self, job: Job) -> bool:
-        """Tell whether there is a whole run of just this job, and not of one it once was."""
+        """Return whether there is a whole run of just this job, and not of one it once was."""
         if job.scene is None:
             return False
         run = self.run(job)
@@ -92,7 +92,7 @@ class Folder:
         return median(known) if known else None
 
     def write_index(self, failed: Mapping[str, str], said: str) -> Path:
-        """Write the page about all jobs; `failed` says why, by name."""
+        """Write the page about all jobs; `failed` has the reasons by name."""
         cards = []
         for job in self.batch.jobs:
             error = failed.get(job.name, "") or job.error
@@ -109,7 +109,7 @@ class Folder:
         return path
 
     def _card(self, job: Job) -> Card:
-        """Return what the page says of a finished job."""
+        """Return the content of the page for a finished job."""
         run = self.run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
         metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))

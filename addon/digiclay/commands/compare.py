@@ -35,7 +35,7 @@ examples:
   digiclay compare ridge_mound_valley
   digiclay compare slow_press --methods virtual_master,cell_states --speed --out both
 
-The folder holds compare.png and metrics.json; what a metric means stands in docs/metrics.md.
+The folder holds compare.png and metrics.json; docs/metrics.md defines the metrics.
 """
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
@@ -49,17 +49,19 @@ Metrics = dict[str, float | None]
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Run control methods on the same input, and set their metrics side by side."
-    parser = add_command(commands, "compare", "run control methods on the same input", EXAMPLES, said)
+    said = "Run control methods on the same input, and compare their metrics."
+    parser = add_command(commands, "compare", "compare control methods on the same input", EXAMPLES, said)
     add_scene(parser)
     parser.add_argument(
         "--methods", metavar="M,...", type=_methods, default=("virtual_master", "cell_states"),
         help="default virtual_master,cell_states",
     )  # fmt: skip
-    parser.add_argument("--speed", action="store_true", help="also the largest speeds that are followed")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default SCENE_compare, here")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older one when all is done")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.add_argument("--speed", action="store_true", help="also the largest tracking speeds")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder; default: SCENE_compare in the working folder"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an older folder at the end")
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 

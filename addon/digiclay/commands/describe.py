@@ -38,7 +38,7 @@ READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(commands, "describe", "tell what a scene consists of", EXAMPLES)
+    parser = add_command(commands, "describe", "list the parts of a scene and their parameters", EXAMPLES)
     add_scene(parser)
     parser.set_defaults(carry_out=carry_out)
 

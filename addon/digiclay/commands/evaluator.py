@@ -25,7 +25,7 @@ TRIES = 2
 
 
 class Evaluator(Process):
-    """A process that evaluates one bundle of points after the other."""
+    """Process that evaluates bundles of points in turn."""
 
     def __init__(self) -> None:
         super().__init__([], ".commands.evaluator", stdout=subprocess.PIPE)

@@ -37,7 +37,7 @@ STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "fea
 
 def add(commands: Any) -> None:
     """Add the command."""
-    parser = add_run(commands, "export", "write what was formed in a run as mesh files", EXAMPLES)
+    parser = add_run(commands, "export", "write the formed surface of a run as mesh files", EXAMPLES)
     shown = ", ".join(f"{name} ({said})" for name, said in FORMATS.items())
     parser.add_argument(
         "--format", metavar="F,...", type=formats, default=["stl"], help=f"{shown}; default stl"
@@ -47,12 +47,14 @@ def add(commands: Any) -> None:
     add_surface(parser)
     parser.add_argument(
         "--base-thickness", metavar="L", type=millimetres,
-        help="material under the lowest point, mm, or with a unit; default 3 mm",
+        help="base under the lowest point, mm, or with a unit; default: 3 mm",
     )  # fmt: skip
-    parser.add_argument("--separate", action="store_true", help="a file for each feature")
-    parser.add_argument("--unit", choices=tuple(UNITS), default="mm", help="of all but glb; default mm")
-    parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the end")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="where to; default the run's folder")
+    parser.add_argument("--separate", action="store_true", help="one file a feature")
+    parser.add_argument(
+        "--unit", choices=tuple(UNITS), default="mm", help="unit of all formats but glb; default: mm"
+    )
+    parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
     parser.set_defaults(carry_out=carry_out)
 
 

@@ -85,7 +85,7 @@ def pictured(scene: Scene, history: History) -> Extra:
 def make_extras(
     extras: Iterable[Extra], folder: Path, stopped: Callable[[], bool]
 ) -> tuple[list[Extra], list[DigiclayError]]:
-    """Make one after the other; return those left out because of a stop, and what went wrong."""
+    """Make one after the other; return those prevented by a stop, and the errors."""
     left_out: list[Extra] = []
     wrong: list[DigiclayError] = []
     for extra in extras:
@@ -100,13 +100,13 @@ def make_extras(
 
 
 def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
-    """Say which files a stop has left out, and the command that makes them."""
+    """Print the files that a stop prevented, and the command that makes them."""
     for extra in left_out:
         tell_stopped_before(", ".join(extra.files), extra.later(run))
 
 
 def tell_stopped_before(what: str, later: Sequence[str]) -> None:
-    """Say what a stop has left out, and the arguments of the command that makes it."""
+    """Print the output that a stop prevented, and the command that makes it."""
     print(f"Stopped before {what}; to have it: {as_typed(later)}", file=sys.stderr)
 
 

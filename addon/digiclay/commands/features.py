@@ -23,8 +23,8 @@ examples:
   digiclay features ridge_mound_valley --time 13.3 --former 10.3 --threshold "1 mm"
   digiclay features ridge_mound_valley --json > features.json
 
-Areas are in plan; a crest is measured in space. With --json everything is in SI units, with the pins of
-each feature and the points of its crest lines.
+Areas are in plan, lengths of crests in space. --json writes SI units, with the pins of each feature and the
+points of its crests.
 """
 
 
@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     """Add the command."""
     parser = add_run(commands, "features", "list the bosses and creases of a run", EXAMPLES)
     add_surface(parser)
-    parser.add_argument("--time", metavar="T", type=seconds, help="the instant, s; default the end")
+    parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
     parser.add_argument("--json", action="store_true", help="write JSON")
     parser.set_defaults(carry_out=carry_out)
 

@@ -36,15 +36,15 @@ __all__ = ["add"]
 
 EXAMPLES = f"""\
 examples:
-  digiclay form crater                                   displayed, a peak pulled out of it, surface.stl
+  digiclay form crater                                   displayed, a peak drawn out of it: surface.stl
   digiclay form "my relief.png" --set shape.rise="20 mm" --finger press --export obj,glb
   digiclay form part.stl --set shape.fit=actual --set shape.unit=inch --out part
-  digiclay form letters --finger scene --scene my.toml   the finger goes the scene's own way
+  digiclay form letters --finger scene --scene my.toml   the fingertip path of the scene
 
 {textwrap.fill("sample shapes: " + ", ".join(sample_shapes()), 100)}
 
-The folder is a run's: scene.toml (the shape's heights are in it), history.npz, metrics.json. Beside the
-formed surface stands the displayed one, in the folder 'displayed'.
+The result is a run folder: scene.toml (with the heights of the shape), history.npz, metrics.json. It has the
+formed surface, and the displayed one in the folder 'displayed'.
 """
 #: Bed, method and finger unless --scene names others.
 SCENE = "dome_peaked"
@@ -52,9 +52,9 @@ SCENE = "dome_peaked"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "Display a mesh, a picture or an array of heights, form it with the finger, export it."
+    said = "Display a mesh, a picture or an array of heights, form it with the fingertip, export it."
     parser = add_command(
-        commands, "form", "display a shape, form it with the finger, export it", EXAMPLES, said
+        commands, "form", "display a shape, form it with the fingertip, export it", EXAMPLES, said
     )
     parser.add_argument("shape", metavar="SHAPE", help="a sample shape's name, or a file")
     add_scene(parser, SCENE)
@@ -63,17 +63,19 @@ def add(commands: Any) -> None:
         help="press: into the highest part; pull: press, and draw a peak out of it (default); away: "
         "no touch; scene: as the scene says",
     )  # fmt: skip
-    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the shape's name, here")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder; default: the shape's name in the working folder"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
     parser.add_argument(
         "--export", metavar="F,...", type=formats, default=["stl"], help="mesh formats; default stl"
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
-    """Fit, display, form, export, and tell in a few lines what came of it."""
+    """Fit, display, form, export, and print a summary."""
     file = find_shape(arguments.shape)
     out: Path = arguments.out or Path(name_of(file))
     may_be_written(out, overwrite=arguments.overwrite)

@@ -35,7 +35,7 @@ a { color: inherit; margin-right: .7rem; font-size: .87rem; } a.picture { margin
 
 @dataclass(frozen=True)
 class Card:
-    """What the page says of one job.
+    """Content of the page for one job.
 
     Attributes
     ----------

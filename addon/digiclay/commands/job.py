@@ -36,11 +36,11 @@ __all__ = ["ERROR", "FILES", "PROGRESS", "RUNS", "TIMING", "add", "check_outputs
 
 EXAMPLES = """\
 examples:
-  digiclay batch first --prepare            write the jobs' files, and run none
-  digiclay job first/jobs/tap-cell_states   do one of them, on any machine: into first/runs
-  digiclay batch first                      take up what is done, do the rest, and write first/index.html
+  digiclay batch first --prepare            write the files of the jobs, run none
+  digiclay job first/jobs/tap-cell_states   run one of them, on any machine: into first/runs
+  digiclay batch first                      collect finished jobs, run the rest, write first/index.html
 
-A job is a folder with scene.toml, every parameter of its session, and job.toml, what is made of it.
+A job is a folder with scene.toml (every parameter of its session) and job.toml (its outputs).
 """
 #: Where a batch keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"
@@ -55,12 +55,12 @@ Tell = Callable[[str, float], None]
 
 def add(commands: Any) -> None:
     """Add the command."""
-    said = "do one job of a batch, from its files alone; for render farms"
+    said = "run one job of a series from its files alone; for render farms"
     parser = add_command(commands, "job", said, EXAMPLES)
     parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="default ../../runs/JOB, as a batch has it")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
     # How a batch starts it: at what time, and that it is to stop when its standard input ends.
     parser.add_argument("--since", type=float, help=argparse.SUPPRESS)
     parser.add_argument("--follow", action="store_true", help=argparse.SUPPRESS)

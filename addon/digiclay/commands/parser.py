@@ -33,21 +33,21 @@ __all__ = ["Parser", "parser"]
 EXAMPLES = """\
 examples:
   digiclay run ridge_mound_valley                   the paper's session, into ./ridge_mound_valley
-  digiclay run my.toml --out first --export stl     a scene of one's own, and its surface for a printer
+  digiclay run my.toml --out first --export stl     a custom scene, and its surface for a printer
   digiclay run tap --set valve.stroke="20 um"       the same scene with another valve
-  digiclay describe ridge_mound_valley              what a scene consists of
+  digiclay describe ridge_mound_valley              the parts of a scene
   digiclay render first --time 5                    a picture of an instant (needs bpy)
 """
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, with what was probably meant."""
+    """Parser with errors of one line, which suggest the probable word."""
 
     _given: Sequence[str] = ()
     _hint = ""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong with the arguments, and stop."""
+        """Print the error in the arguments, and exit."""
         told = one_line(f"{self.prog}: {message}")
         self.exit(WRONG, f"{told}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
 
@@ -62,7 +62,7 @@ class Parser(argparse.ArgumentParser):
         return ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Refuse a value that is not among the choices, and say which one is near."""
+        """Refuse a value that is not among the choices, and suggest the nearest."""
         if action.choices is not None and value not in action.choices:
             choices = [str(choice) for choice in action.choices]
             self._hint = _asked(str(value), choices)
@@ -71,7 +71,7 @@ class Parser(argparse.ArgumentParser):
             )
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """Refuse what is not known here and now: later, nobody knows which command it was for."""
+        """Refuse unknown arguments here, where their command is known."""
         self._given = sys.argv[1:] if args is None else args
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
@@ -80,7 +80,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def _asked(word: str, known: Sequence[str]) -> str:
-    """Ask whether a known word was meant: the only one that begins so, or the nearest."""
+    """Return a suggestion: the only known word with this beginning, or the nearest."""
     bare = {one.lstrip("-").lower(): one for one in known}  # dashes say nothing about who is near
     meant = word.lstrip("-").lower()
     longer = [one for one in bare if len(meant) > 1 and one.startswith(meant)]

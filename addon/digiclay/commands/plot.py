@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
     """Add the command."""
     said = "draw heights and force of a run over time, and its final surface"
     parser = add_run(commands, "plot", said, EXAMPLES)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="where to; default the run's folder")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
     parser.set_defaults(carry_out=carry_out)
 
 

@@ -13,7 +13,7 @@ WIDTH, PAUSE = 28, 0.1
 
 
 class Line:
-    """A line of a terminal that is taken away when its block is left.
+    """Line of a terminal, removed at the end of its block.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Line:
         return self
 
     def due(self) -> bool:
-        """Tell whether it is time to draw once more: what is drawn costs, and nobody reads that fast."""
+        """Return whether to redraw; the rate is limited, since drawing takes time."""
         return time.monotonic() - self._drawn >= PAUSE
 
     def draw(self, said: str) -> None:
@@ -55,7 +55,7 @@ class Line:
 
 
 class Bar(Line):
-    """Shows how much of a session is done; to be told after each control period.
+    """Progress of a session; updated after each control period.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Bar(Line):
 
 
 class Counted(Line):
-    """Shows how many of something are done, such as frames, and how long the others will take.
+    """Progress of a count, such as frames, with the remaining time.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Counted(Line):
 
 
 class Steps(Line):
-    """Shows how many pieces of a work are done; to be told after each what it was.
+    """Progress of a sequence of pieces; updated after each with its name.
 
     Parameters
     ----------

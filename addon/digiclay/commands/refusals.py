@@ -32,7 +32,7 @@ def refuse_without(module: str, option: str, remedy: str) -> None:
 
 
 def refuse_without_blender() -> None:
-    """Say what to install where Blender's module is missing."""
+    """Refuse without Blender's module, with the command that installs it."""
     with undisturbed():
         importlib.import_module("..compat", __package__)
 

@@ -45,30 +45,32 @@ def add(commands: Any) -> None:
     said = "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy"
     parser = add_run(commands, "render", said, EXAMPLES)
     kind = parser.add_mutually_exclusive_group()
-    kind.add_argument(
-        "--film", action="store_true", help="the session as film.mp4, with a strip of the force"
-    )
-    kind.add_argument("--turntable", action="store_true", help="an instant turning once, as turntable.mp4")
+    kind.add_argument("--film", action="store_true", help="session as film.mp4, with a plot of the force")
+    kind.add_argument("--turntable", action="store_true", help="one rotation at an instant, as turntable.mp4")
     parser.add_argument(
         "--time", metavar="T", type=seconds,
-        help="the instant, s; default the last touch, and the end for a turntable",
+        help="instant, s; default: the last touch, or the end for a turntable",
     )  # fmt: skip
-    parser.add_argument("--out", metavar="FILE", type=Path, help="default in the run's folder")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="output file; default: in the run folder")
     parser.add_argument("--size", metavar="WxH", type=size, help="default 1600x1000; 960x600 for films")
     parser.add_argument("--engine", choices=ENGINES, help="default cycles; workbench for films")
-    parser.add_argument("--colour", choices=COLOURS, help="what the pins' colours tell; default mode")
     parser.add_argument(
-        "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default in films only"
+        "--colour", choices=COLOURS, help="quantity shown by the colours of the pins; default: mode"
+    )
+    parser.add_argument(
+        "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default: in films only"
     )
     parser.add_argument("--rate", metavar="N", type=int, help="frames a second of film; default 25")
-    parser.add_argument("--frames", metavar="N", type=int, help="frames of a turn; default 75")
+    parser.add_argument("--frames", metavar="N", type=int, help="frames of a rotation; default: 75")
     parser.add_argument(
         "--speed", metavar="X", type=float, help="simulated seconds a second of film; default 1"
     )
     parser.add_argument("--start", metavar="T", type=seconds, help="first instant of the film, s")
     parser.add_argument("--stop", metavar="T", type=seconds, help="last instant of the film, s")
     parser.add_argument(
-        "--strip", action=argparse.BooleanOptionalAction, help="total force over time; default in films"
+        "--strip",
+        action=argparse.BooleanOptionalAction,
+        help="plot of the total force over time; default: in films",
     )
     parser.set_defaults(carry_out=carry_out)
 
@@ -81,7 +83,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _drawn(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int:
-    """Draw, and say where it is."""
+    """Draw, and print the path."""
     name, ending = ("film" if isinstance(looks, Film) else "turntable"), ".mp4"
     if isinstance(looks, Still):
         name, ending = Path(PICTURE).stem, ".png"

@@ -33,8 +33,8 @@ examples:
   digiclay run ridge_mound_valley --budget 20um
   digiclay run tap --set layout.rows=9 --set control.force_setpoint="300 mN" --set conduit=absent
 
-The folder holds scene.toml (every parameter), history.npz, metrics.json, and what the options
-add. Ctrl-C keeps what was computed, marked as incomplete.
+The run folder holds scene.toml (every parameter), history.npz, metrics.json, and the files of the
+options. Ctrl-C keeps the computed rows, marked as incomplete.
 """
 
 
@@ -43,8 +43,10 @@ def add(commands: Any) -> None:
     said = "Simulate a scene and write its folder."
     parser = add_command(commands, "run", "simulate a scene", EXAMPLES, said)
     add_scene(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="the folder; default the scene's name, here")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run when all is done")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder; default: the scene's name in the working folder"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
     parser.add_argument(
         "--export", metavar="F,...", type=formats, default=[], help="also meshes: stl,obj,ply,glb,3mf"
     )
@@ -52,21 +54,21 @@ def add(commands: Any) -> None:
         "--budget",
         metavar="E",
         type=length,
-        help="leave out of the model what changes no height by more than this, such as 20um, and say what",
+        help="omit parts of the model that change no height by more than this, such as 20um, and report them",
     )
     parser.add_argument("--plots", action="store_true", help="also plots, session.png and surface.png")
     parser.add_argument("--render", action="store_true", help="also a picture, pins.png (needs bpy)")
     parser.add_argument(
         "--no-errors",
         action="store_true",
-        help="do not estimate the errors, which takes some one and a half times the run's time",
+        help="without error estimates, which take about one and a half times the run's time",
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
-    """Run, write, and tell in a line what came of it."""
+    """Run, write, and print a summary line."""
     scene, path = scene_of(arguments)
     out: Path = arguments.out or Path(name_of(path))
     _refuse_early(arguments, scene)

@@ -13,14 +13,14 @@ __all__ = ["Stop", "interruptible", "undisturbed"]
 
 
 class Stop:
-    """Within its block a first signal is only noted; a second one interrupts for good."""
+    """Block in which a first signal is noted and a second one interrupts."""
 
     def __init__(self) -> None:
         self.requested = False
         self._former: dict[int, Any] = {}
 
     def __call__(self) -> bool:
-        """Tell whether somebody asked to stop."""
+        """Return whether a stop was requested."""
         return self.requested
 
     def __enter__(self) -> Stop:

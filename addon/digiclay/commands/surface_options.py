@@ -21,21 +21,25 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     shown = "; ".join(f"{name}: {said}" for name, said in SKINS.items())
     parser.add_argument("--skin", choices=tuple(SKINS), default="bilinear", help=f"{shown}; default bilinear")
     parser.add_argument(
-        "--resolution", metavar="N", type=_points, default=0, help="points a pitch; default 1, or 4 if curved"
+        "--resolution",
+        metavar="N",
+        type=_points,
+        default=0,
+        help="points a pitch; default: 1, or 4 for curved skins",
     )
     known = Finding()
     parser.add_argument(
         "--threshold", metavar="L", type=millimetres, default=known.threshold,
-        help="how far off its former place a feature is, mm, or with a unit; "
+        help="least distance of a feature from the former surface, mm, or with a unit; "
         f"default {known.threshold * 1e3:g} mm",
     )  # fmt: skip
     parser.add_argument(
         "--smallest", metavar="N", type=int, default=known.smallest,
-        help=f"pins a feature has at least; default {known.smallest}",
+        help=f"least number of pins of a feature; default {known.smallest}",
     )  # fmt: skip
     parser.add_argument(
         "--former", metavar="T", default="0",
-        help="the instant, s, whose surface features are measured from, or 'rest'; default the start",
+        help="instant of the former surface, s, or 'rest'; default: the start",
     )  # fmt: skip
 
 

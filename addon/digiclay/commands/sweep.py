@@ -45,10 +45,10 @@ examples:
   digiclay sweep my.toml --vary valve.stroke="20 um:40 um:5" --set layout.rows=15 --out strokes
 
 The folder holds points/, a small file for each finished point; sweep.csv; and for one or two
-axes a picture of each metric. Stopped by Ctrl-C, it goes on when the same command is given again;
-a point that failed is done again if its file is removed. Points of one bed, parts and steps run
-together in stacks, which takes a fraction of the time; it is said which cannot. For the metrics
-height_error, force_error and total_force_error every point is integrated once more.
+axes a picture of each metric. After Ctrl-C the same command continues. It repeats a failed point
+if its file is removed. Points of one bed, parts and steps run together in one call, a batch or
+stack, in a fraction of the time; the others are listed. For the metrics height_error,
+force_error and total_force_error every point is integrated once more.
 """
 
 
@@ -56,7 +56,7 @@ def add(commands: Any) -> None:
     """Add the command."""
     said = "Run a scene at many points of its parameters."
     parser = commands.add_parser(
-        "sweep", help="run a scene at many points of its parameters", description=said, epilog=EXAMPLES,
+        "sweep", help="run a scene over a grid of parameter values", description=said, epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
     add_scene(parser)
@@ -65,11 +65,13 @@ def add(commands: Any) -> None:
         help="START:STOP:COUNT, START:STOP:COUNT:log or A,B,C; may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--metric", metavar="M,...", default="rfd,lag", help="what to tabulate and plot; default rfd,lag"
+        "--metric", metavar="M,...", default="rfd,lag", help="metrics of table and plot; default: rfd,lag"
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
-    parser.add_argument("--workers", metavar="N", type=workers, help="processes; default one a core")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors, and no progress")
+    parser.add_argument(
+        "--workers", metavar="N", type=workers, help="number of processes; default: one a core"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 

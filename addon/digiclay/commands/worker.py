@@ -31,7 +31,7 @@ Started = TypeVar("Started", bound="Process")
 
 
 def in_blender() -> bool:
-    """Tell whether this is an extension inside Blender, which cannot start others like itself."""
+    """Return whether this is an extension inside Blender, which cannot start others like itself."""
     return PACKAGE != "digiclay"
 
 
@@ -64,7 +64,7 @@ def count_cores() -> int:
 
 
 class Process:
-    """This program once more, in a process of its own.
+    """This program in a process of its own.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Process:
         self.wait()
 
     def wait(self) -> str:
-        """Wait for the process to end, and say how it did."""
+        """Wait for the process to end, and return its outcome."""
         code = self.process.wait()
         self.stop()
         if self.process.stdout:

@@ -118,18 +118,18 @@ def _take_overlay(display: Any, context: Any) -> None:
 
 
 class Display(bpy.types.PropertyGroup):
-    """What is shown of a bed."""
+    """Display properties of a bed."""
 
     colour: bpy.props.EnumProperty(
         name="Colour",
-        description="What the colour of a pin tells",
+        description="Quantity shown by the colour of a pin",
         items=COLOURINGS,
         get=_colour,
         set=_set_colour,
     )
     top_force: bpy.props.FloatProperty(
         name="Top Colour at (N)",
-        description="From this force on a pin has the last colour, in N",
+        description="Force of the last colour, in N",
         min=1e-3,
         max=1e3,
         soft_max=2.0,
@@ -140,7 +140,7 @@ class Display(bpy.types.PropertyGroup):
     )
     arrows: bpy.props.BoolProperty(
         name="Force Arrows",
-        description="Draw the force on each pin as an arrow, and the fingertip clear; renders show it too",
+        description="Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
         get=_arrows,
         set=_set_arrows,
     )
@@ -164,7 +164,7 @@ class Display(bpy.types.PropertyGroup):
     )
     seconds: bpy.props.FloatProperty(
         name="Past (s)",
-        description="How much of the past the overlay's curves show, in s",
+        description="Time span of the overlay's curves, in s",
         default=5.0,
         min=0.5,
         max=SPAN,

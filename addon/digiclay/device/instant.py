@@ -31,7 +31,7 @@ CLEARANCE = 6e-3
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The bed and the fingertip at one time, with the sizes needed to draw them.
+    """Bed and fingertip at one time, with the sizes for drawing.
 
     Attributes
     ----------

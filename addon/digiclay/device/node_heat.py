@@ -16,7 +16,7 @@ COLOUR_BY_FORCE, TOP_FORCE = "Colour by Force", "Top Colour at (N)"
 def add_settings(tree: Any) -> None:
     """Add what each bed may choose for itself."""
     socket(tree, COLOUR_BY_FORCE, "NodeSocketBool", False, "Colour the pins by force, not by mode")
-    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "From this force on a pin has the last colour, in N")
+    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last colour, in N")
 
 
 def level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:

@@ -38,7 +38,7 @@ WORDS = {
 
 
 def worn() -> bool:
-    """Tell whether the open file has materials of the modes already, which may be the user's own by now."""
+    """Return whether the open file has materials of the modes already, which may be the user's own by now."""
     return any(_material(mode) is not None for mode in Mode)
 
 

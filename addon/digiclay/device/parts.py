@@ -56,7 +56,7 @@ def material(name: str, colour: tuple[float, float, float], roughness: float, al
 
 
 class Sources(NamedTuple):
-    """What a bed's geometry nodes draw: objects that stand in no scene, all in one collection.
+    """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ def ellipsoid(tip: Any) -> Any | None:
 
 
 def stands(thing: Any) -> bool:
-    """Tell whether an object stands in any collection: what is deleted but held by a property does not."""
+    """Return whether an object stands in any collection: what is deleted but held by a property does not."""
     return bool(thing.users_collection)
 
 

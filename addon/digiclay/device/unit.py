@@ -27,7 +27,7 @@ EYE, SWITCHES = 1, ((2, "hide_viewport"), (4, "hide_render"))
 
 
 class Faults(NamedTuple):
-    """What is not as it should be; not to be kept, since undo invalidates it.
+    """Missing and surplus objects of a bed; not to be stored, since undo invalidates them.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def _beds() -> list[Any]:
 
 
 def _asks(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
-    """Tell whether an object without a part of its own is to get one.
+    """Return whether an object without a part of its own is to get one.
 
     A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
     part the user has deleted, or taken off it, is not.
@@ -149,7 +149,7 @@ def _asks(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) 
 
 
 def _lost(part: Any) -> bool:
-    """Tell whether nothing that stands has this part any more."""
+    """Return whether nothing that stands has this part any more."""
     kind, held = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
     owner = part.parent
     if owner is not None and owner.get(ROLE) == kind and parts.stands(owner):
@@ -243,5 +243,5 @@ def _hide_along(owner: Any, part: Any) -> None:
 
 
 def _in(layer: Any, thing: Any) -> bool:
-    """Tell whether an object stands in a view layer."""
+    """Return whether an object stands in a view layer."""
     return bool(layer.objects.get(thing.name) == thing)

@@ -64,7 +64,7 @@ def _mend(found: unit.Faults) -> None:
 
 
 def _gone_on(came: str) -> bool:
-    """Undo or redo one more step; tell whether there was one."""
+    """Undo or redo one more step; return whether there was one."""
     operator = getattr(bpy.ops.ed, came)
     if operator.poll():
         operator()
@@ -120,7 +120,7 @@ def _look() -> float | None:
 
 
 def _at_work(windows: Any) -> bool:
-    """Tell whether an operator is under way that changes data, or something is edited, or rendered."""
+    """Return whether an operator is under way that changes data, or something is edited, or rendered."""
     every = (operator for window in windows for operator in window.modal_operators)
     active = (window.view_layer.objects.active for window in windows)
     return (

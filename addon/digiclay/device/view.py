@@ -128,7 +128,7 @@ def colour_by(bed: Any, what: str) -> None:
 
 
 def coloured_by(bed: Any) -> str:
-    """Return what the colour of the pins tells: "mode" or "force"."""
+    """Return the quantity shown by the colour of the pins: "mode" or "force"."""
     return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
 
 
@@ -138,7 +138,7 @@ def top_colour(bed: Any) -> float:
 
 
 def shows_force(bed: Any) -> bool:
-    """Tell whether the colours of the pins tell the force on them."""
+    """Return whether the colours of the pins show the force on them."""
     return is_drawn(bed) and coloured_by(bed) == "force"
 
 
@@ -157,7 +157,7 @@ def show_arrows(bed: Any, on: bool) -> None:
 
 
 def arrows_shown(bed: Any) -> bool:
-    """Tell whether the bed's forces are drawn as arrows."""
+    """Return whether the bed's forces are drawn as arrows."""
     return bool(node_setting(_modifier(bed), ARROWS))
 
 
@@ -172,17 +172,17 @@ def scale_arrows(bed: Any, length: float) -> None:
 
 
 def wants_force(bed: Any) -> bool:
-    """Tell whether anything drawn needs the force on each pin."""
+    """Return whether anything drawn needs the force on each pin."""
     return shows_force(bed) or (is_drawn(bed) and arrows_shown(bed))
 
 
 def is_drawn(bed: Any) -> bool:
-    """Tell whether the bed still has the modifier that draws its pins."""
+    """Return whether the bed still has the modifier that draws its pins."""
     return _modifier_of(bed) is not None
 
 
 def is_bed(thing: Any) -> bool:
-    """Tell whether an object is a bed of this extension."""
+    """Return whether an object is a bed of this extension."""
     return thing is not None and thing.get(ROLE) == BED
 
 

@@ -48,7 +48,7 @@ def formed(bed: Any) -> Formed:
 
 
 def is_kept(bed: Any) -> bool:
-    """Tell whether a bed's owner has kept a surface to measure from."""
+    """Return whether a bed's owner has kept a surface to measure from."""
     found = bed.data.attributes.get(FORMER)
     return found is not None and found.domain == "POINT" and found.data_type == "FLOAT"
 

@@ -39,7 +39,7 @@ AWAY = 50.0
 
 
 def surfaced(thing: Any) -> bool:
-    """Tell whether an object has a surface that can be displayed."""
+    """Return whether an object has a surface that can be displayed."""
     return thing is not None and thing.type in SURFACED and view.ROLE not in thing
 
 

@@ -29,7 +29,7 @@ def token() -> int:
 
 
 def runs() -> bool:
-    """Tell whether there is a loop, and it ticks."""
+    """Return whether there is a loop, and it ticks."""
     return bool(_LOOP) and time.perf_counter() - float(_LOOP["ticked"]) < GONE
 
 
@@ -57,7 +57,7 @@ def take_over() -> None:
 
 
 def aside() -> bool:
-    """Tell whether there is a loop that no operator drives for the moment."""
+    """Return whether there is a loop that no operator drives for the moment."""
     return "aside" in _LOOP
 
 
@@ -72,7 +72,7 @@ def end() -> None:
 
 
 def due(context: Any, now: float) -> bool:
-    """Tell whether to tick now: no more often than preferred, though other timers may run as well."""
+    """Return whether to tick now: no more often than preferred, though other timers may run as well."""
     wanted = (1.0 - EARLY) / preferences.of(context).redraw_rate
     if now - float(_LOOP["ticked"]) < wanted:
         return False

@@ -53,7 +53,7 @@ def take_back(path: str = "") -> None:
 
 
 def unsaved() -> bool:
-    """Tell whether something was recorded that the file does not have."""
+    """Return whether something was recorded that the file does not have."""
     return any(session.recording is not None and session.recording.unsaved for session in running.all())
 
 

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """Where a gesture began: period, kept state (`core.session.snapshot`), and pose of the finger (7,)."""
+    """Start of a gesture: period, snapshot (`core.session.snapshot`), and pose of the fingertip (7,)."""
 
     period: int
     kept: bytes
@@ -32,7 +32,7 @@ class Gesture:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """The finger's path since recording began.
+    """Fingertip path since the start of the recording.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Running:
-    """A bed's session at one moment; replaced by another value each tick.
+    """Live session at one instant; replaced by another value at each tick.
 
     Attributes
     ----------
@@ -211,10 +211,10 @@ _SAID = [""]
 
 
 def say(words: str) -> None:
-    """Keep what was told last, for the Session panel."""
+    """Keep the last message, for the Session panel."""
     _SAID[0] = words
 
 
 def said() -> str:
-    """Return what was told last."""
+    """Return the last message."""
     return _SAID[0]

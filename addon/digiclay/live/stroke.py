@@ -51,7 +51,7 @@ LATE = 0.5
 
 @dataclass(frozen=True)
 class Sample:
-    """A place the hand has been at.
+    """Point of a press stroke.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """A path, and how far the finger has come along it.
+    """Press stroke, and the progress of the fingertip along it.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def follow(
     period: float,
     now: float,
 ) -> tuple[Stroke, Floats]:
-    """Let the finger go on along a stroke.
+    """Advance the fingertip along a press stroke.
 
     Parameters
     ----------

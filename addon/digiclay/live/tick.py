@@ -29,7 +29,7 @@ LOOK = 8
 
 
 class Note(NamedTuple):
-    """Something to tell the user: level as Blender's operators report it, and words."""
+    """Message to the user: level of Blender's operator reports, and text."""
 
     level: str
     words: str
@@ -87,7 +87,7 @@ def place(context: Any, bed: Any, session: Running) -> None:
 
 
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
-    """Take back the last unfinished stroke of one session, or of each; tell whether there was one."""
+    """Take back the last unfinished stroke of one session, or of each; return whether there was one."""
     busy = [session for session in running.all() if session.strokes and uid in (None, session.uid)]
     for session in busy:
         bed = find_bed(session.uid, session.name)
@@ -99,7 +99,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
 
 
 def tick(context: Any, now: float) -> list[Note]:
-    """Let every session go on up to now, by a clock that never goes back, s; return what there is to tell."""
+    """Advance every session to the current time of a monotonic clock, s; return the messages."""
     notes: list[Note] = []
     most = preferences.of(context).most_periods
     for session in running.all():
@@ -113,7 +113,7 @@ def tick(context: Any, now: float) -> list[Note]:
 
 
 def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> list[Note]:
-    """Let one session go on."""
+    """Advance one session."""
     if session.stale > 1:
         # What undo has put back has no place in the world until Blender has evaluated it, which it
         # does before the next tick.
@@ -157,7 +157,7 @@ def _seen(session: Running) -> Floats:
 
 
 def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
-    """Look at what the user may have changed; return why to wait, the session, and what to tell."""
+    """Detect changes by the user; return the reason to wait, the session, and the messages."""
     why, said = blocking_reason(context, bed, session.system.grid.count), ""
     if why:
         return why, session, said

@@ -35,13 +35,13 @@ def find_bed(uid: int, name: str) -> Any | None:
 
 
 def _shown(context: Any, thing: Any) -> bool:
-    """Tell whether some window shows a scene the object stands in."""
+    """Return whether some window shows a scene the object stands in."""
     layers = (window.view_layer for window in context.window_manager.windows)
     return any(layer.objects.get(thing.name) == thing for layer in layers)
 
 
 def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
-    """Return why the session of a bed cannot go on now, or an empty text.
+    """Return the reason why the session of a bed cannot continue now, or an empty text.
 
     Parameters
     ----------

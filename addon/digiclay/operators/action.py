@@ -9,7 +9,7 @@ __all__ = ["Action", "FileAction", "Polled"]
 
 
 class Polled:
-    """Mixin of an operator that Blender greys out while `poll_message` says why it cannot run."""
+    """Mixin of an operator that Blender disables while `poll_message` returns a reason."""
 
     report: Any
     poll_message_set: Any
@@ -21,7 +21,7 @@ class Polled:
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Tell whether the operator can run; Blender shows the message where it cannot."""
+        """Return whether the operator can run; Blender shows the message where it cannot."""
         message = cls.poll_message(context)
         if message:
             cls.poll_message_set(message)
@@ -29,7 +29,7 @@ class Polled:
 
 
 class Action(Polled):
-    """Mixin of an operator that is done at once: a DigiclayError is reported, and nothing else follows."""
+    """Mixin of an operator without a modal part: a DigiclayError is reported and ends it."""
 
     def perform(self, context: Any) -> set[str] | None:
         """Do it; return the operator's result where that is not FINISHED."""
@@ -45,7 +45,7 @@ class Action(Polled):
 
 
 class FileAction(Action):
-    """Mixin of an action that asks for its `filepath` first."""
+    """Mixin of an action with a file browser for its `filepath`."""
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the file."""

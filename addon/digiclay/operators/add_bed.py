@@ -61,7 +61,7 @@ class AddBed(Action, bpy.types.Operator):
     )
     arrangement: bpy.props.EnumProperty(
         name="Arrangement",
-        description="How neighbouring rows stand to each other",
+        description="Offset of neighbouring rows",
         items=[
             ("aligned", "Aligned", "A square grid"),
             ("staggered", "Staggered", "Every other row shifted by half a pitch, rows one pitch apart"),
@@ -71,16 +71,16 @@ class AddBed(Action, bpy.types.Operator):
     )
     method: bpy.props.EnumProperty(
         name="Method",
-        description="How the cells are controlled",
+        description="Control method of the cells",
         items=method_items(),
         default=next(iter(METHODS)),
     )
     preset: bpy.props.EnumProperty(
-        name="Preset", description="Fluid, valves and whatever else a preset of your own sets", items=offered
+        name="Preset", description="Fluid, valves and all other parameters of a custom preset", items=offered
     )
     scale: bpy.props.FloatProperty(
         name="Scale (cm/mm)",
-        description="How large the device is drawn: centimetres in Blender for a millimetre of the device",
+        description="Scale of the device: centimetres in Blender for a millimetre of the device",
         default=1.0,
         min=0.001,
         soft_min=0.1,
@@ -107,7 +107,7 @@ class AddBed(Action, bpy.types.Operator):
 
 
 class Rebuild(Action, bpy.types.Operator):
-    """Make the pins and the housing anew after the settings; what was formed is lost, the fingertip stays"""
+    """Make pins and housing from the settings; the formed surface is lost, the fingertip stays"""
 
     bl_idname = "digiclay.rebuild"
     bl_label = "Rebuild"

@@ -23,7 +23,7 @@ __all__ = ["Bake", "FreeBake"]
 
 
 class Bake(ChosenTake, LongWork, bpy.types.Operator):
-    """Turn a session into ordinary animation of the bed, which plays and renders without simulating"""
+    """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
 
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
@@ -31,17 +31,17 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
 
     source: bpy.props.EnumProperty(
         name="Source",
-        description="What moves the fingertip",
+        description="Source of the fingertip path",
         items=[
             ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
             ("TAKE", "Take", "The fingertip as it was recorded in a session"),
         ],
         default="FINGERTIP",
     )
-    first: bpy.props.IntProperty(name="First Frame", description="Frame the session begins at", default=1)
+    first: bpy.props.IntProperty(name="First Frame", description="First frame of the session", default=1)
     last: bpy.props.IntProperty(
         name="Last Frame",
-        description="Frame the session ends at; a take has its own length",
+        description="Last frame of the session; a take has its own length",
         default=250,
     )
 
@@ -89,7 +89,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
 
 
 class FreeBake(Action, bpy.types.Operator):
-    """Take the bake away: the bed shows its own state again. Keyframes of the fingertip stay"""
+    """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
 
     bl_idname = "digiclay.bake_free"
     bl_label = "Free Bake"

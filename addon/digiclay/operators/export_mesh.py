@@ -26,7 +26,7 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
 
 
 class ExportMesh(SurfaceOptions, bpy.types.Operator):
-    """Write what was formed in the active bed as a mesh file"""
+    """Write the formed surface of the active bed as a mesh file"""
 
     bl_idname = "export_mesh.digital_clay"
     bl_label = "Export Digital Clay"
@@ -121,12 +121,12 @@ def _told_by(name: str) -> str:
 
 
 def _is_text(path: Path) -> bool:
-    """Tell whether a name is that of an STL as text, which ends like that of a binary one."""
+    """Return whether a name is that of an STL as text, which ends like that of a binary one."""
     return path.name.lower().endswith(suffix("stl_ascii"))
 
 
 class ExportMenu(bpy.types.Menu):
-    """What is often wanted, and a dialog for all else"""
+    """Frequent exports, and a dialog for all others"""
 
     bl_idname = "DIGICLAY_MT_export"
     bl_label = "Digital Clay"

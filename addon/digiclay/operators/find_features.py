@@ -35,7 +35,7 @@ class FindFeatures(FindingOptions, bpy.types.Operator):
 
 
 class KeepSurface(SurfaceAction, bpy.types.Operator):
-    """Measure features from the surface as it is now"""
+    """Measure features from the current surface"""
 
     bl_idname = "digiclay.keep_surface"
     bl_label = "Measure from Here"

@@ -13,7 +13,7 @@ __all__ = ["ImportRun", "entry"]
 
 
 class ImportRun(FileAction, bpy.types.Operator):
-    """Show one instant of a finished Digital Clay run as a bed of pins"""
+    """Show one instant of a Digital Clay run as a bed of pins"""
 
     bl_idname = "import_scene.digital_clay_run"
     bl_label = "Import Digital Clay Run"
@@ -23,7 +23,7 @@ class ImportRun(FileAction, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.npz", options={"HIDDEN"})
     row: bpy.props.IntProperty(
         name="Row",
-        description="Which recorded row to show: 0 is the start, -1 the last one",
+        description="Recorded row to show: 0 is the first, -1 the last",
         default=-1,
     )
 

@@ -17,7 +17,7 @@ TICK, SHARE = 0.05, 0.9
 
 
 class LongWork(Action):
-    """Mixin of an operator whose work is a generator of shares done, from 0 to 1.
+    """Mixin of an operator whose work is a generator of completed shares, from 0 to 1.
 
     The operator defines `work`, and changes Blender's data only in the last of its steps, so
     that Esc leaves everything as it was.
@@ -35,7 +35,7 @@ class LongWork(Action):
             pass
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begin the work; it goes on while Blender draws and listens."""
+        """Begin the work; it continues while Blender draws and handles events."""
         self._steps = self.work(context)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TICK, window=context.window)

@@ -22,7 +22,7 @@ MADE = "digiclay_made"
 
 
 class MakeMesh(SurfaceOptions, bpy.types.Operator):
-    """Make a mesh object of what was formed in the active bed, with its features as vertex groups"""
+    """Make a mesh object of the formed surface of the active bed, with its features as vertex groups"""
 
     bl_idname = "mesh.digital_clay_make"
     bl_label = "Make Mesh"
@@ -30,7 +30,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
 
     beside: bpy.props.BoolProperty(
         name="Beside the Bed",
-        description="Put the mesh beside the bed, and not where its surface is",
+        description="Place the mesh beside the bed instead of on its surface",
         default=True,
     )
 

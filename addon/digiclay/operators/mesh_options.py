@@ -33,7 +33,7 @@ class SurfaceAction(Action):
 
 
 class FindingOptions(SurfaceAction):
-    """What counts as a feature."""
+    """Criteria of a feature."""
 
     threshold: bpy.props.FloatProperty(
         name="Threshold (mm)",
@@ -59,17 +59,17 @@ class FindingOptions(SurfaceAction):
 
 
 class SurfaceOptions(FindingOptions):
-    """What is made of a surface."""
+    """Kind of mesh and skin."""
 
     kind: bpy.props.EnumProperty(
         name="Mesh",
-        description="What is made of the formed surface",
+        description="Kind of mesh made of the formed surface",
         items=[(name, sentence(name), sentence(said)) for name, said in KINDS.items()],
         default=Model().kind,
     )
     skin: bpy.props.EnumProperty(
         name="Skin",
-        description="What the surface is between the pins",
+        description="Interpolation of the surface between the pins",
         items=[(name, sentence(name), sentence(said)) for name, said in SKINS.items()],
         default=Model().skin,
     )

@@ -25,13 +25,13 @@ __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionS
 
 
 class AddSceneAction(Action):
-    """Mixin of the operators here: a bed is added as Add > Mesh > Digital Clay does."""
+    """Mixin of operators that add a bed, as Add > Mesh > Digital Clay does."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     take: bpy.props.BoolProperty(
         name="Simulate as a Take",
-        description="Simulate the scene's session and keep it as a take, to be replayed or baked",
+        description="Simulate the session of the scene and keep it as a take, for replay or bake",
         default=True,
     )
 
@@ -60,7 +60,7 @@ class AddSceneAction(Action):
 
 
 class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
-    """Add the bed a Digital Clay scene file describes"""
+    """Add the bed of a Digital Clay scene file"""
 
     bl_idname = "digiclay.open_scene"
     bl_label = "Open Digital Clay Scene"
@@ -80,7 +80,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
 
 
 class AddSample(AddSceneAction, bpy.types.Operator):
-    """Add a bed with one of the sessions or shapes that come with Digital Clay"""
+    """Add a bed with a sample session or shape of Digital Clay"""
 
     bl_idname = "digiclay.add_sample"
     bl_label = "Digital Clay Sample"
@@ -112,7 +112,7 @@ class AddSample(AddSceneAction, bpy.types.Operator):
 
 
 class Entries:
-    """A menu of samples."""
+    """Menu of samples."""
 
     kind = ""
 
@@ -124,7 +124,7 @@ class Entries:
 
 
 class SessionSamples(Entries, bpy.types.Menu):
-    """Sessions that come with Digital Clay"""
+    """Sample sessions of Digital Clay"""
 
     bl_idname = "DIGICLAY_MT_session_samples"
     bl_label = "Sessions"
@@ -132,7 +132,7 @@ class SessionSamples(Entries, bpy.types.Menu):
 
 
 class ShapeSamples(Entries, bpy.types.Menu):
-    """Shapes that come with Digital Clay, displayed on a bed"""
+    """Sample shapes of Digital Clay, displayed on a bed"""
 
     bl_idname = "DIGICLAY_MT_shape_samples"
     bl_label = "Shapes"
@@ -140,7 +140,7 @@ class ShapeSamples(Entries, bpy.types.Menu):
 
 
 class Samples(bpy.types.Menu):
-    """Sessions and shapes that come with Digital Clay"""
+    """Sample sessions and shapes of Digital Clay"""
 
     bl_idname = "DIGICLAY_MT_samples"
     bl_label = "Digital Clay Samples"
@@ -155,7 +155,7 @@ class Samples(bpy.types.Menu):
 
 
 class SceneFiles(bpy.types.FileHandler):
-    """Lets a scene file be dropped into the 3D view."""
+    """Drop of a scene file into the 3D view."""
 
     bl_idname = "DIGICLAY_FH_scene"
     bl_label = "Digital Clay Scene"

@@ -83,7 +83,7 @@ def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
 
 
 class ClearPins(Action, bpy.types.Operator):
-    """Drop all picked pins of the active bed"""
+    """Remove all picked pins of the active bed"""
 
     bl_idname = "digiclay.clear_pins"
     bl_label = "Clear"

@@ -27,7 +27,7 @@ class ApplyPreset(Action, bpy.types.Operator):
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
-        """Say what the preset is."""
+        """Return the description of the preset."""
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 
     @classmethod
@@ -48,14 +48,14 @@ class ApplyPreset(Action, bpy.types.Operator):
 
 
 class SavePreset(Action, bpy.types.Operator):
-    """Save the bed's parameters as a preset of your own, for other beds and files"""
+    """Save the bed's parameters as a custom preset, for other beds and files"""
 
     bl_idname = "digiclay.preset_save"
     bl_label = "Save Digital Clay Preset"
 
     name: bpy.props.StringProperty(
         name="Name",
-        description="What the preset is called; one of that name is replaced",
+        description="Name of the preset; a preset of that name is replaced",
         maxlen=own_presets.LONGEST,
     )
 
@@ -78,7 +78,7 @@ class SavePreset(Action, bpy.types.Operator):
 
 
 class RemovePreset(Action, bpy.types.Operator):
-    """Remove the preset of your own that was applied last"""
+    """Remove the custom preset that was applied last"""
 
     bl_idname = "digiclay.preset_remove"
     bl_label = "Remove Digital Clay Preset"

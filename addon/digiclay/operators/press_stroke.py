@@ -26,7 +26,7 @@ KEYS = (
 
 
 class Press(Polled, bpy.types.Operator):
-    """Press the fingertip into the pins under the mouse, and drag it on"""
+    """Press the fingertip into the pins under the mouse, and drag it"""
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
@@ -35,7 +35,7 @@ class Press(Polled, bpy.types.Operator):
 
     depth: bpy.props.FloatProperty(
         name="Depth (mm)",
-        description="How deep to press below the surface as it was, in mm",
+        description="Depth of the press below the surface, in mm",
         default=4.0,
         min=0.1,
         max=1e3 * DEEPEST,
@@ -45,7 +45,7 @@ class Press(Polled, bpy.types.Operator):
     )
     use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
-        description="A pen presses as deep as its pressure says, up to the depth",
+        description="Pen pressure scales the depth, up to its value",
         default=True,
     )
 
@@ -68,7 +68,7 @@ class Press(Polled, bpy.types.Operator):
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
         if session.paused:
-            self.report({"WARNING"}, "The session is paused: the finger follows when it goes on")
+            self.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
         self.uid, self.grid, self.height = session.uid, found.grid, found.height.copy()
         self.region, self.began, self.before = context.region, time.perf_counter(), event.mouse_y
@@ -88,7 +88,7 @@ class Press(Polled, bpy.types.Operator):
         stroke = session and find_stroke(session, self.number)
         if stroke is None:
             if bed is None or session is None:
-                self.report({"WARNING"}, "The press ended: its session or bed is gone")
+                self.report({"WARNING"}, "The press stroke ended: its session or bed was removed")
             return self._end({"CANCELLED", "PASS_THROUGH"})
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             tick.withdraw_strokes(context, self.uid)

@@ -41,7 +41,7 @@ class OfSession(Action):
 
 
 class PauseSession(OfSession, bpy.types.Operator):
-    """Let the bed stand still, or go on: it then takes the straight way to where the fingertip is"""
+    """Pause or resume the bed; on resume the fingertip path is straight to its current position"""
 
     bl_idname = "digiclay.session_pause"
     bl_label = "Pause or Resume"
@@ -53,7 +53,7 @@ class PauseSession(OfSession, bpy.types.Operator):
 
 
 class StepSession(OfSession, bpy.types.Operator):
-    """Let the bed do one control period and stand still; a session that runs is paused"""
+    """Simulate one control period; a running session is paused"""
 
     bl_idname = "digiclay.session_step"
     bl_label = "Single Step"
@@ -65,7 +65,7 @@ class StepSession(OfSession, bpy.types.Operator):
 
 
 class StopSession(OfSession, bpy.types.Operator):
-    """Stop the session of the bed; it keeps its state, and another session goes on from it"""
+    """Stop the session of the bed; the bed keeps its state, from which another session continues"""
 
     bl_idname = "digiclay.session_stop"
     bl_label = "Stop Session"
@@ -77,7 +77,7 @@ class StopSession(OfSession, bpy.types.Operator):
 
 
 class RewindSession(OfSession, bpy.types.Operator):
-    """Take back the last gesture: bed and fingertip are as they were when it began"""
+    """Undo the last gesture: bed and fingertip return to its start"""
 
     bl_idname = "digiclay.session_rewind"
     bl_label = "Take Back a Gesture"
@@ -99,7 +99,7 @@ class RewindSession(OfSession, bpy.types.Operator):
 
 
 class ResetSession(OfSession, bpy.types.Operator):
-    """Bring all pins back to rest and lift the fingertip off them"""
+    """Return all pins to rest and lift the fingertip off them"""
 
     bl_idname = "digiclay.session_reset"
     bl_label = "Reset"
@@ -107,7 +107,7 @@ class ResetSession(OfSession, bpy.types.Operator):
 
     running_only: bpy.props.BoolProperty(
         name="Only While It Runs",
-        description="Leave beds without a session alone: the key must not reach them by accident",
+        description="Exclude beds without a session, so that the key cannot reset them by accident",
         options={"HIDDEN", "SKIP_SAVE"},
     )
 

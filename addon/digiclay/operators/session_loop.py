@@ -22,7 +22,7 @@ CLOSED = "ended: its window was closed"
 
 
 class Looping(Polled):
-    """Mixin of the operators that drive the sessions of a window."""
+    """Mixin of the modal operators for the sessions of a window."""
 
     def begun(self, context: Any) -> set[str]:
         """Begin to drive the loop that there is."""
@@ -67,14 +67,14 @@ class Looping(Polled):
             handlers.end_all(CLOSED)
 
     def tell(self, notes: list[tick.Note]) -> None:
-        """Report what there is to tell, and keep it for the panel."""
+        """Report the messages, and keep them for the panel."""
         for note in notes:
             self.report({note.level}, note.words)
             running.say(note.words)
 
 
 class GoOn(Looping, bpy.types.Operator):
-    """Go on with the sessions after Blender had a moment to save by itself"""
+    """Continue the sessions after Blender's auto save"""
 
     bl_idname = "digiclay.session_go_on"
     bl_label = "Go On"
@@ -91,7 +91,7 @@ class GoOn(Looping, bpy.types.Operator):
 
 
 class Escape(Action, bpy.types.Operator):
-    """Stop the sessions in the moment in which no operator of theirs takes the key"""
+    """Stop the sessions while none of their operators receives the key"""
 
     bl_idname = "digiclay.session_escape"
     bl_label = "Stop Sessions"
@@ -121,7 +121,7 @@ def _stop(context: Any) -> bool:
 
 
 def _undoes(context: Any, event: Any) -> bool:
-    """Tell whether an event is the user's key for Undo while a stroke is unfinished: it has no step yet."""
+    """Return whether an event is the user's key for Undo while a stroke is unfinished: it has no step yet."""
     if event.value != "PRESS" or not any(session.strokes for session in running.all()):
         return False
     keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
@@ -130,14 +130,14 @@ def _undoes(context: Any, event: Any) -> bool:
 
 
 def _struck(item: Any, event: Any) -> bool:
-    """Tell whether an event is the key of a keymap's item, with the keys held that it wants."""
+    """Return whether an event is the key of a keymap's item, with the keys held that it wants."""
     return item.type == event.type and all(
         bool(getattr(item, held)) == getattr(event, held) for held in ("ctrl", "shift", "alt", "oskey")
     )
 
 
 def _saves(context: Any) -> bool:
-    """Tell whether Blender saves by itself."""
+    """Return whether Blender saves by itself."""
     return bool(context.preferences.filepaths.use_auto_save_temporary_files)
 
 

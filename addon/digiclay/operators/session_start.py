@@ -14,7 +14,7 @@ __all__ = ["Session"]
 
 
 class Session(Looping, Action, bpy.types.Operator):
-    """Start to sculpt: the pins follow the fingertip while you move it by any means. Esc stops"""
+    """Start sculpting: the pins follow the fingertip, which any tool can move. Esc stops"""
 
     bl_idname = "digiclay.session"
     bl_label = "Start Session"

@@ -40,20 +40,20 @@ def millimetres(name: str, default: float, words: str) -> Any:
 
 
 class Shaped(Action):
-    """Mixin of the operators here: how the shape is laid onto the bed, and how that is told."""
+    """Mixin of the operators here: placement of the shape, and report."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     fit: bpy.props.EnumProperty(
-        name="Size", description="How it is laid onto the bed", items=FITS, default=DEFAULT.fit
+        name="Size", description="Placement on the bed", items=FITS, default=DEFAULT.fit
     )
     scale: bpy.props.FloatProperty(
-        name="Times", description="How much larger than that in plan", default=1.0, min=1e-3, max=1e3
+        name="Times", description="Scale of the plan", default=1.0, min=1e-3, max=1e3
     )
     x: millimetres("Right", DEFAULT.x, "Shift of its middle from the bed's along x")
     y: millimetres("Back", DEFAULT.y, "Shift of its middle from the bed's along y")
     relief: bpy.props.EnumProperty(
-        name="Height", description="How high it is", items=RELIEFS, default=DEFAULT.relief
+        name="Height", description="Height of the shape", items=RELIEFS, default=DEFAULT.relief
     )
     rise: millimetres("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")
     foot: millimetres("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")
@@ -76,7 +76,7 @@ class Shaped(Action):
         return ""
 
     def perform(self, context: Any) -> None:
-        """Display the shape, and say what of it the bed cannot show."""
+        """Display the shape, and report its parts beyond the bed."""
         bed = bed_of(context)
         context.view_layer.update()
         laid, off = self.displayed(context, bed)
@@ -123,7 +123,7 @@ class ShapeFromObject(Shaped, bpy.types.Operator):
 
 
 class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
-    """Display a mesh, a picture (light is high) or a .npy file of heights on the active bed"""
+    """Display a mesh, a picture (bright is high) or a .npy file of heights on the active bed"""
 
     bl_idname = "digiclay.shape_from_file"
     bl_label = "Shape from File"
@@ -132,12 +132,12 @@ class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default=";".join(f"*{kind}" for kind in KINDS), options={"HIDDEN"})
     up: bpy.props.EnumProperty(
         name="Up",
-        description="Which direction of a mesh is up; automatic: y in a glTF file, else z",
+        description="Upward direction of a mesh; automatic: y in a glTF file, else z",
         items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
     )
     unit: bpy.props.EnumProperty(
         name="Unit",
-        description="Length a mesh is in; automatic: metres in a glTF file, else millimetres",
+        description="Unit of length of a mesh; automatic: metres in a glTF file, else millimetres",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
     )
 
@@ -148,7 +148,7 @@ class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
 
 
 class ShapeSample(Shaped, bpy.types.Operator):
-    """Display one of the shapes that come with Digital Clay on the active bed"""
+    """Display a sample shape of Digital Clay on the active bed"""
 
     bl_idname = "digiclay.shape_sample"
     bl_label = "Sample Shape"

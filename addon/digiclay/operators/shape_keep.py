@@ -16,7 +16,7 @@ __all__ = ["KeepShape", "RemoveShape"]
 
 
 class KeepShape(Action, bpy.types.Operator):
-    """Make what is formed the bed's shape: sessions begin with it, elastic and viscous beds go back to it"""
+    """Make the formed surface the bed's shape: sessions begin with it, elastic and viscous beds keep to it"""
 
     bl_idname = "digiclay.shape_keep"
     bl_label = "Keep Formed as Shape"
@@ -39,7 +39,7 @@ class KeepShape(Action, bpy.types.Operator):
 
 
 class RemoveShape(Action, bpy.types.Operator):
-    """Take the bed's shape away: sessions begin at rest; what is formed stays until then"""
+    """Remove the bed's shape: sessions begin at rest; the formed surface stays until then"""
 
     bl_idname = "digiclay.shape_remove"
     bl_label = "Remove Shape"

@@ -18,7 +18,7 @@ __all__ = ["ChosenTake", "ExportTake", "KeepTake", "RecordTake", "RemoveTake"]
 
 
 class ChosenTake:
-    """Mixin of an operator that is about one take of the active bed."""
+    """Mixin of an operator on one take of the active bed."""
 
     take: bpy.props.StringProperty(name="Take", description="Number of the take; empty: the last one")
 
@@ -71,7 +71,7 @@ class KeepTake(Action, bpy.types.Operator):
         take = takes.recorded(session)
         running.put(sculpting.recording(session, False))
         if take is None:
-            self.report({"WARNING"}, "Nothing was recorded: the session stood still")
+            self.report({"WARNING"}, "Nothing was recorded: the session was paused")
             return {"CANCELLED"}
         entry = takes.keep(bed, take, self.name)
         self.report({"INFO"}, f"{entry.name}: {entry.seconds:.1f} s kept")
@@ -113,7 +113,7 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
 
 
 class RemoveTake(ChosenTake, Action, bpy.types.Operator):
-    """Throw a take away"""
+    """Remove a take"""
 
     bl_idname = "digiclay.take_remove"
     bl_label = "Remove Take"

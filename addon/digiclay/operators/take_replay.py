@@ -29,7 +29,7 @@ __all__ = ["ReplayTake"]
 
 
 class ReplayTake(ChosenTake, Action, bpy.types.Operator):
-    """Play a take again at the speed it was recorded at. Esc stops, and the bed is as it was"""
+    """Replay a take at its recorded speed. Esc stops and restores the bed"""
 
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
@@ -37,7 +37,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
 
     parts: bpy.props.IntProperty(
         name="Finer Steps",
-        description="Parts each physics step is cut into: 1 replays the take bit for bit",
+        description="Number of parts of each physics step: 1 replays the take bit for bit",
         default=1,
         min=1,
         max=MOST_PARTS,
@@ -69,7 +69,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Go on by what the wall's clock says."""
+        """Continue by the wall clock."""
         if event.type == "ESC" and event.value == "PRESS":
             return self._left(context)
         if event.type != "TIMER":
@@ -126,7 +126,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
             bridge.place_fingertip(tip, pick_pose(self._took.poses[self._at]), finger)
 
     def _finish(self, context: Any) -> set[str]:
-        """Leave the bed as the take left it, and tell how the two compare."""
+        """Leave the bed in the final state of the take, and report the comparison."""
         bed, system = bed_of(context), self._system
         state = packed(system, self._state)
         self._place(bed)
@@ -176,7 +176,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
                 tick.place(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
-        self.report({"INFO"}, "Replay stopped: the bed is as it was")
+        self.report({"INFO"}, "Replay stopped: the bed is restored")
         return {"CANCELLED"}
 
     def _ended(self, context: Any) -> None:

@@ -30,7 +30,7 @@ BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class Look:
-    """Colours of the overlay: behind everything, letters, faint letters, frames, force, set point, pins."""
+    """Colours of the overlay: background, text, faint text, frames, force, set point, pins."""
 
     back: Colour
     ink: Colour

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Box:
-    """A filled rectangle: left, bottom, width, height; pixels."""
+    """Filled rectangle: left, bottom, width, height; pixels."""
 
     x: float
     y: float
@@ -28,7 +28,7 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line through points (k, 2), pixels; joined, or every other stretch left out."""
+    """Line through points (k, 2), pixels; solid or dashed."""
 
     points: Floats
     colour: Colour
@@ -38,7 +38,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Dot:
-    """A filled circle about a point."""
+    """Filled circle about a point."""
 
     x: float
     y: float
@@ -48,7 +48,7 @@ class Dot:
 
 @dataclass(frozen=True)
 class Words:
-    """A line of text on a base line, from its left end or to its right end."""
+    """Line of text on a base line, from its left end or to its right end."""
 
     x: float
     y: float
@@ -60,7 +60,7 @@ class Words:
 
 @dataclass
 class Picture:
-    """All marks, in the order they are drawn: boxes, lines, dots, words."""
+    """All marks in drawing order: boxes, lines, dots, text."""
 
     boxes: list[Box] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)

@@ -31,7 +31,7 @@ LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What the overlay tells of a session.
+    """Session data in the overlay.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Pen:
-    """Where a section draws: into which picture, in which colours, from where and how wide, at what scale."""
+    """Target of a section's drawing: picture, colours, position, width, scale."""
 
     picture: Picture
     look: Look
@@ -121,14 +121,14 @@ class Pen:
 
 
 def error_words(errors: tuple[float, float] | None) -> str:
-    """Say how large the solver's errors of a height, m, and of a cell's force, N, are estimated to be."""
+    """Return the text of the estimated errors of a height, m, and of a cell's force, N."""
     if errors is None:
         return "Solver error: not estimated yet"
     return f"Solver error: about {_size(errors[0] * 1e6, 'µm')}, {_size(errors[1] * 1e3, 'mN')}"
 
 
 def force_words(force: float) -> str:
-    """Say how large the total force is, N, and when beyond a finger's; see `core.model.finger_range`."""
+    """Return the text of the total force, N, and its excess over `core.model.finger_range`."""
     if force <= MOST_FORCE:
         return f"{force:.2f} N"
     return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
@@ -231,7 +231,7 @@ def modes(told: Told, pen: Pen, top: float) -> None:
 
 
 def _size(error: float, unit: str) -> str:
-    """Say how large an error is."""
+    """Return the text of an error."""
     return f"{error:.2g} {unit}" if error >= 0.01 else f"0.01 {unit} or less"
 
 

@@ -32,7 +32,7 @@ _HANDLES: list[Any] = []
 
 
 def follow() -> None:
-    """Have the overlay drawn if a running session wants it, and else not."""
+    """Draw the overlay if a live session has it enabled, and remove it otherwise."""
     if any(_wanted(bed) for bed in _beds()):
         if not _HANDLES:
             _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
@@ -51,7 +51,7 @@ def stop() -> None:
 
 
 def shown() -> bool:
-    """Tell whether the draw handler is there."""
+    """Return whether the draw handler is there."""
     return bool(_HANDLES)
 
 
@@ -70,7 +70,7 @@ def _again() -> float:
 
 
 def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:
-    """Return what the overlay tells of a bed and its session."""
+    """Return the content of the overlay for a bed and its session."""
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else asked(scene.set_point, 0))
     errors = session.errors
@@ -99,13 +99,13 @@ def _beds() -> list[Any]:
 
 
 def _wanted(bed: Any) -> bool:
-    """Tell whether the overlay is wanted for a bed."""
+    """Return whether the overlay is enabled for a bed."""
     display = getattr(bed, "digiclay_display", None)
     return display is not None and bool(display.overlay)
 
 
 def _chosen(context: Any) -> Any | None:
-    """Return the bed to tell of in a view: the active one, or the first one in the view's scene."""
+    """Return the bed of a view's overlay: the active one, or the first one in the view's scene."""
     beds = [bed for bed in _beds() if _wanted(bed) and bed.name in context.scene.objects]
     active = context.object
     while active is not None and active not in beds:

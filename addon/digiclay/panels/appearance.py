@@ -12,7 +12,7 @@ __all__ = ["CLASSES", "Display"]
 
 
 class Display(Panel, bpy.types.Panel):
-    """What is shown of the bed; each part can be off, and then costs nothing."""
+    """Display of the bed; a disabled item takes no time."""
 
     bl_label = "Display"
     bl_idname = "DIGICLAY_PT_display"

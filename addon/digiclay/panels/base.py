@@ -15,7 +15,7 @@ LINE = 36
 
 
 class Panel:
-    """Mixin of a sub-panel: in the 3D view's sidebar, shown while a part of a bed is active.
+    """Mixin of a sub-panel in the 3D view's sidebar, shown while a part of a bed is active.
 
     A panel derives from this and from `bpy.types.Panel`, has a `bl_label`, a `bl_idname` that
     starts with ``DIGICLAY_PT_`` and a `bl_order`, and draws only: it never changes anything.

@@ -15,7 +15,7 @@ __all__ = ["CLASSES", "Session", "Takes", "error_line"]
 
 
 class Session(Panel, bpy.types.Panel):
-    """Sculpting live."""
+    """Live sculpting."""
 
     bl_idname = "DIGICLAY_PT_session"
     bl_label = "Session"
@@ -78,7 +78,7 @@ def error_line(session: Running) -> str:
 
 
 class Takes(Panel, bpy.types.Panel):
-    """The takes of the bed and its bake."""
+    """Takes of the bed, and its bake."""
 
     bl_label = "Takes"
     bl_idname = "DIGICLAY_PT_takes"

@@ -22,7 +22,7 @@ BESIDE = {"ENUM", "STRING"}
 
 
 class Start(Panel, bpy.types.Panel):
-    """What the tab shows while no bed is active: how to come by one."""
+    """Content of the tab without an active bed: how to add one."""
 
     bl_idname = "DIGICLAY_PT_start"
     bl_label = "Digital Clay"
@@ -43,7 +43,7 @@ class Start(Panel, bpy.types.Panel):
 
 
 class Presets(bpy.types.Menu):
-    """The presets of the core, and the user's own."""
+    """Presets of the core and of the user."""
 
     bl_idname = "DIGICLAY_MT_presets"
     bl_label = "Presets"
@@ -60,7 +60,7 @@ class Presets(bpy.types.Menu):
 
 
 class Device(Panel, bpy.types.Panel):
-    """Which device it is."""
+    """Type of device."""
 
     bl_idname = "DIGICLAY_PT_device"
     bl_label = "Device"
@@ -84,7 +84,7 @@ class Device(Panel, bpy.types.Panel):
 
 
 class Finger(Panel, bpy.types.Panel):
-    """The finger that forms the bed."""
+    """Fingertip parameters."""
 
     bl_idname = "DIGICLAY_PT_finger"
     bl_label = "Finger"
@@ -94,11 +94,11 @@ class Finger(Panel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         """Say when there is none."""
         if not bed_of(context).digiclay.use_fingertip:
-            self.layout.label(text="Left out: nothing touches the bed", icon="INFO")
+            self.layout.label(text="Omitted: nothing touches the bed", icon="INFO")
 
 
 class Control(Panel, bpy.types.Panel):
-    """How the cells are controlled."""
+    """Control of the cells."""
 
     bl_idname = "DIGICLAY_PT_control"
     bl_label = "Control"
@@ -164,7 +164,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
 
 
 def in_use(settings: Any, section: str) -> bool:
-    """Tell whether a part is simulated: neither it nor the one it belongs to is switched off."""
+    """Return whether a part is simulated: neither it nor the one it belongs to is switched off."""
     needed = NEEDS.get(section)
     switches = [name for name in (section, needed) if name in OPTIONAL]
     return all(getattr(settings, f"use_{name}") for name in switches)

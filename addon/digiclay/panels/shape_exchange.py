@@ -17,7 +17,7 @@ MOST = 24
 
 
 class Shapes(Panel, bpy.types.Panel):
-    """A shape in, clay, the finger, a shape out."""
+    """Initial shape of the bed."""
 
     bl_idname = "DIGICLAY_PT_shapes"
     bl_label = "Shapes"
@@ -55,7 +55,7 @@ class Shapes(Panel, bpy.types.Panel):
 
 
 class Export(Panel, bpy.types.Panel):
-    """What was formed, as meshes."""
+    """Formed surface as meshes."""
 
     bl_idname = "DIGICLAY_PT_export"
     bl_label = "Export"

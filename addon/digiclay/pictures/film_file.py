@@ -57,7 +57,7 @@ def encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
 
 
 def whole_film(data: bytes) -> bool:
-    """Tell whether an MP4 file has all its parts, the last of which says where the frames are."""
+    """Return whether an MP4 file has all its parts, the last of which says where the frames are."""
     at, kinds = 0, []
     while at + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, at)

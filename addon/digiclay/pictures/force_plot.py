@@ -28,7 +28,7 @@ LEAST = 0.05
 
 @dataclass(frozen=True)
 class Strip:
-    """The strip of one film.
+    """Force plot of one film.
 
     Attributes
     ----------

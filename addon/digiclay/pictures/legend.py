@@ -36,7 +36,7 @@ LAYER = 1e-3
 
 @dataclass(frozen=True)
 class Front:
-    """The plane before the camera; nothing on it casts or takes any light.
+    """Plane in front of the camera, without shadow or shading.
 
     Attributes
     ----------

@@ -122,7 +122,7 @@ def draw(scene: Any, path: Path, out: Path) -> None:
 
 
 def whole_picture(data: bytes) -> bool:
-    """Tell whether a PNG file has its end; Blender does not always tell when a disk is full."""
+    """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
     return data[-8:-4] == b"IEND"
 
 

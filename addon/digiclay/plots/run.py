@@ -59,7 +59,7 @@ def surface(history: History, out: str | Path) -> Path:
 
 
 def session_cells(history: History) -> list[int]:
-    """Choose up to six cells that tell the session: along the finger's path in contact, evenly spaced.
+    """Choose up to six cells along the fingertip path in contact, evenly spaced.
 
     They are different, in the order in which the finger passes them, the first and the last
     contact among them. Without any contact they are those that moved most.
@@ -153,7 +153,7 @@ def surface_figure(history: History) -> Figure:
 
 
 def _write_figures(axes: Axes, found: dict[str, float | None]) -> None:
-    """Write the figures a session is judged by."""
+    """Write the metrics of a session as text."""
     axes.set_axis_off()
     axes.set_title("In figures")
     told = [row for row in FIGURES if found["set_point"] is not None or not row[1].startswith("rfd")]

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A place on the pins of a bed.
+    """Point on the pins of a bed.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ MOST_FRAMES = 216_000
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What a bake shows, a row a frame.
+    """Content of a bake, a row a frame.
 
     Attributes
     ----------
@@ -132,12 +132,12 @@ def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe
 
 
 def is_baked(bed: Any) -> bool:
-    """Tell whether a bed plays a bake."""
+    """Return whether a bed plays a bake."""
     return _modifier(bed) is not None
 
 
 def free(bed: Any) -> bool:
-    """Take a bed's bake away; tell whether it had one. Keyframes of the fingertip stay."""
+    """Take a bed's bake away; return whether it had one. Keyframes of the fingertip stay."""
     modifier = _modifier(bed)
     if modifier is None:
         return False

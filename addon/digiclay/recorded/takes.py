@@ -30,7 +30,7 @@ START = np.zeros(1)
 
 
 class Entry(NamedTuple):
-    """What a list of takes shows of one.
+    """Row in the list of takes.
 
     Attributes
     ----------

@@ -114,7 +114,7 @@ def _bound(closed: float | None, opened: float | None, power: int, inside: float
 
 
 def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
-    """Say what a parameter means, its symbol, its bounds and its default; Blender adds the full stop."""
+    """Return meaning, symbol, bounds and default of a parameter; Blender adds the full stop."""
 
     def value(number: float) -> str:
         plain = isinstance(default, int)

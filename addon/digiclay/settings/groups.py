@@ -81,7 +81,7 @@ UPDATES: dict[str, dict[str, Update]] = {
 
 
 def method_items() -> list[tuple[str, str, str]]:
-    """Return the methods with what their modules say of themselves."""
+    """Return the methods with the first lines of their modules."""
     words = {
         name: importlib.import_module(f"..core.{method.module}", __package__).__doc__ or ""
         for name, method in METHODS.items()
@@ -97,7 +97,7 @@ def use_properties() -> dict[str, Any]:
         words = " and ".join([title(section).lower(), *(title(other).lower() for other in along)])
         switches[f"use_{section}"] = bpy.props.BoolProperty(
             name=title(section),
-            description=f"Simulate the {words}; left out, it costs nothing",
+            description=f"Simulate the {words}; without it, no time is spent on it",
             default=section not in UNASKED,
         )
     return switches
@@ -126,19 +126,19 @@ SETTINGS = made(
     {
         "preset": bpy.props.EnumProperty(
             name="Preset",
-            description="Fluid and valves; choosing one sets their parameters",
+            description="Fluid and valves; a choice sets their parameters",
             items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
             update=take_preset,
         ),
         "method": bpy.props.EnumProperty(
             name="Method",
-            description="How the cells are controlled; choosing one sets the blister it is made for",
+            description="Control method of the cells; a choice also sets its blister",
             items=method_items(),
             default="virtual_master",
             update=take_method,
         ),
         "own_preset": bpy.props.StringProperty(
-            name="Own Preset", description="The preset of your own that was applied last", options={"HIDDEN"}
+            name="Own Preset", description="The custom preset that was applied last", options={"HIDDEN"}
         ),
         "notes": bpy.props.StringProperty(options={"HIDDEN"}),
         **use_properties(),

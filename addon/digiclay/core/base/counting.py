@@ -12,7 +12,7 @@ __all__ = ["how_many", "some"]
 
 
 def some(test: NDArray[np.bool_]) -> bool:
-    """Tell whether a test holds anywhere."""
+    """Return whether a test holds anywhere."""
     return 1 in test.tobytes()
 
 

@@ -21,11 +21,11 @@ def one_line(said: object) -> str:
 
 
 class DigiclayError(Exception):
-    """Base of every error a user can cause; its text is one complete line."""
+    """Base of all errors that a user can cause; its text is one complete line."""
 
 
 class ParameterError(DigiclayError, ValueError):
-    """A parameter breaks its rule.
+    """Parameter outside its rule.
 
     Parameters
     ----------
@@ -48,19 +48,19 @@ class ParameterError(DigiclayError, ValueError):
 
 
 class SceneError(DigiclayError):
-    """A scene file, or a ``--set`` value, cannot be used."""
+    """Invalid scene file or ``--set`` value."""
 
 
 class OutputError(DigiclayError):
-    """A result cannot be written, or a run's folder cannot be read."""
+    """Result that cannot be written, or run folder that cannot be read."""
 
 
 class StateError(DigiclayError):
-    """A kept state cannot be taken up."""
+    """Snapshot that cannot be restored."""
 
 
 class DivergenceError(DigiclayError, ArithmeticError):
-    """The integration left the finite numbers.
+    """Integration with values beyond all bounds.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ NO_LOCKS = {
 
 
 class NoLocksHere(Exception):
-    """The drive has no locks."""
+    """Drive without locks."""
 
 
 @contextmanager
@@ -98,7 +98,7 @@ def _taken(path: Path) -> int | None:
 
 
 def _locked(file: int) -> bool:
-    """Take the system's lock on an open file; tell whether it was to be had."""
+    """Take the system's lock on an open file; return whether it was to be had."""
     if os.name == "nt":
         windows: Any = importlib.import_module("msvcrt")
         try:
@@ -119,7 +119,7 @@ def _locked(file: int) -> bool:
 
 
 def _is_at(file: int, path: Path) -> bool:
-    """Tell whether an open file is the one that has this name now."""
+    """Return whether an open file is the one that has this name now."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path))
     except FileNotFoundError:
@@ -149,7 +149,7 @@ def held_by_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[
 
 
 def _recorded(path: Path) -> bool:
-    """Make the record; tell whether there was none before of a process that may still run."""
+    """Make the record; return whether there was none before of a process that may still run."""
     try:
         changed, owner = path.stat().st_mtime, _owner(path)
         if owner is None:

@@ -12,7 +12,7 @@ __all__ = ["COLOURS", "MEANINGS", "Mode"]
 
 
 class Mode(IntEnum):
-    """What a cell is doing; stored as ``int8``."""
+    """Control mode of a cell; stored as ``int8``."""
 
     REST = 0
     HOLD = 1

@@ -26,7 +26,7 @@ BROKEN = (
 
 
 class Head(NamedTuple):
-    """What an array is, as its head says it."""
+    """Header of an array."""
 
     shape: tuple[int, ...]
     kind: np.dtype[Any]

@@ -28,7 +28,7 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 
 
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-    """Build a part from what a section says."""
+    """Build a part from its section."""
     known = quantities(kind)
     refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
     given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}

@@ -26,7 +26,7 @@ def host() -> str:
 
 
 def may_have_made(pid: int, changed: float) -> bool:
-    """Tell whether a process of this machine may be the one that made a file or folder.
+    """Return whether a process of this machine may be the one that made a file or folder.
 
     Numbers of processes are used again: one that was started after the last change is another one.
 

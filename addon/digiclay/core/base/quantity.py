@@ -42,7 +42,7 @@ WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|in
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is known of one parameter besides its value.
+    """Declaration of one parameter.
 
     Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
     ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
@@ -151,7 +151,7 @@ def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: A
 
 
 def _finite(value: float) -> bool:
-    """Tell whether a number is finite as a float; a whole number can be too large for one."""
+    """Return whether a number is finite as a float; a whole number can be too large for one."""
     try:
         return math.isfinite(value)
     except OverflowError:

@@ -77,7 +77,7 @@ def lock_beside(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class Claim:
-    """The right to write a folder, while the block of `claimed` lasts."""
+    """Lock of a folder for writing, for the block of `claimed`."""
 
     out: Path
     overwrite: bool
@@ -139,7 +139,7 @@ def claimed(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Cl
 
 
 def busy(path: Path, how: str) -> str:
-    """Say that somebody else is at a path."""
+    """Return the error for a path that another process has locked."""
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 

@@ -54,7 +54,7 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
-    """Return what a small file says; None where it cannot be read."""
+    """Return the content of a small JSON file; None where it cannot be read."""
     try:
         read = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):

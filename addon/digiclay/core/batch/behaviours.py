@@ -69,7 +69,7 @@ def _drives(drives: Sequence[Drive]) -> Drives:
 
 @dataclass(frozen=True, eq=False)
 class _Behaviour:
-    """What both share: no memory, and no cells to control but those near a finger and those that move.
+    """Common part: no memory, control of the cells near a fingertip and of those in motion only.
 
     Attributes
     ----------

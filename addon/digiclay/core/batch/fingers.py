@@ -22,7 +22,7 @@ CHUNK = 256
 
 @dataclass(frozen=True, eq=False)
 class Fingers:
-    """How the fingers come in t control periods, at p instants of each.
+    """Fingertip paths over t control periods, at p instants of each.
 
     The last axis is b, or 1 where all runs have one and the same finger; see `touch.Approach`.
 
@@ -69,7 +69,7 @@ def still_coming(
 
 
 def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
-    """Tell whether two runs have the same finger at the same times."""
+    """Return whether two runs have the same finger at the same times."""
     (system, way), (first, its) = one, other
     assert system.cell.touch is not None
     assert first.cell.touch is not None

@@ -102,7 +102,7 @@ def put_together(systems: Sequence[System]) -> Stack:
 
 
 def _laminar(system: System) -> bool:
-    """Tell whether no valve without load is turbulent."""
+    """Return whether no valve without load is turbulent."""
     return system.cell.flow.knee > system.cell.supply.largest
 
 
@@ -124,7 +124,7 @@ def _movement(systems: Sequence[System], cell: Cell) -> Movement:
 
 
 def _as(first: System, system: System) -> bool:
-    """Tell whether a run's cells move as those of the first one; how its finger is made does not matter."""
+    """Return whether a run's cells move as those of the first one; how its finger is made does not matter."""
     own, other = system.cell, first.cell
     if own.touch and other.touch:
         own = replace(own, touch=replace(own.touch, fingertip=other.touch.fingertip))

@@ -29,7 +29,7 @@ MARGIN = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Gathering:
-    """What decides which cells can change.
+    """Criteria of active cells.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ def _wider(disc: Disc, margin: float) -> Disc:
 
 
 def _inside(inner: Disc, outer: Disc) -> bool:
-    """Tell whether every disc lies inside that other."""
+    """Return whether every disc lies inside that other."""
     (x, y, radius), (other_x, other_y, limit) = inner, outer
     held = np.hypot(x - other_x, y - other_y) + radius <= limit
     held |= radius < 0.0

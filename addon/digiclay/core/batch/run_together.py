@@ -32,7 +32,7 @@ __all__ = ["judge_of", "judge_together", "run_together"]
 
 @dataclass(frozen=True)
 class _End:
-    """What counts of the state a run ended in, see `run_together.Ended`."""
+    """Summary of the final state of a run, see `run_together.Ended`."""
 
     period: int
     memory: Any

@@ -22,7 +22,7 @@ __all__ = ["Unlike", "unlike"]
 
 @dataclass(frozen=True, eq=False)
 class Unlike:
-    """The closed-form step for b runs; for what is not said here see `steppers.bernoulli_plan`.
+    """Closed-form step for b runs; see also `steppers.bernoulli_plan`.
 
     Attributes
     ----------

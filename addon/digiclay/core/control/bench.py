@@ -16,7 +16,7 @@ __all__ = ["Bench"]
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """The device, as its maker would describe it to a controller.
+    """Data of the device for a controller.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ Modes = NDArray[np.int8]
 
 
 class Patch(NamedTuple):
-    """The controller's memory: where the finger presses, and which way it travels.
+    """Memory of the controller: position of the contact and direction of the fingertip.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class CellStates(Tracking):
 
     @property
     def set_point(self) -> SetPoint:
-        """Force asked of every cell that follows the finger."""
+        """Set point of every following cell."""
         return SetPoint(self.force_setpoint, per_cell=True)
 
     def check(self) -> None:
@@ -119,7 +119,7 @@ class CellStates(Tracking):
 
 @dataclass(frozen=True)
 class CellStatesControl:
-    """Method II, put together for a bed.
+    """Controller of Method II for a bed.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class CellStatesControl:
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
-        """Let every cell follow its arrows, then act as its mode says; see `interfaces.Controller`."""
+        """Apply the transitions of every cell, then the control of its mode; see `interfaces.Controller`."""
         seen = seen._replace(force=above(seen.force, self.floor)) if self.floor else seen
         mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)
@@ -237,7 +237,7 @@ class CellStatesControl:
         return memory, mode, target
 
     def _resting(self, mode: Modes, target: Floats, force: Floats) -> Modes:
-        """Tell apart the cells on a virtual spring: pressed, holding a formed height, or at rest."""
+        """Divide the cells on a virtual spring: pressed, holding a formed height, or at rest."""
         spring = mode <= Mode.HOLD
         spring |= mode == Mode.SPRING
         formed = np.abs(target - self.actuator.rest_height) > self.parameters.dead_band

@@ -28,7 +28,7 @@ OPENINGS = np.linspace(0.0, 1.0, 129)
 
 @dataclass(frozen=True)
 class DriveParameters(ControlParameters):
-    """What every behaviour's height control needs."""
+    """Parameters of the height control of every behaviour."""
 
     settling_time: float = quantity(
         20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
@@ -38,7 +38,7 @@ class DriveParameters(ControlParameters):
 
 @dataclass(frozen=True)
 class TouchParameters(DriveParameters):
-    """What a behaviour needs that goes by the force on each cell."""
+    """Parameters of the behaviours that use the force on each cell."""
 
     felt_force: float = quantity(
         5e-3,
@@ -59,7 +59,7 @@ def feeling_above(floor: float, parameters: Touch) -> Touch:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Valve commands for wanted speeds.
+    """Conversion of pin speeds to valve commands.
 
     Attributes
     ----------

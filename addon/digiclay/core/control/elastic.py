@@ -25,7 +25,7 @@ STILL = 0.2
 
 @dataclass(frozen=True)
 class Elastic(TouchParameters):
-    """A spring under every pin, and what damps it."""
+    """Spring and damper under every pin."""
 
     stiffness: float = quantity(20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0)
     damping: float = quantity(5.0, "force over speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
@@ -33,7 +33,7 @@ class Elastic(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class ElasticControl:
-    """The elastic behaviour, put together for a bed.
+    """Controller of the elastic behaviour for a bed.
 
     Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
     """

@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ForceDisplay(TouchParameters):
-    """The field, and how the cells follow it."""
+    """Field of forces, and the motion of the cells."""
 
     field: str = quantity("wave", "shape of the field: its name, or a file .npy of forces, N")
     force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_m", above=0.0)
@@ -51,7 +51,7 @@ class ForceDisplay(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class ForceDisplayControl:
-    """Force display, put together for a bed.
+    """Controller of the force display for a bed.
 
     A cell that feels the finger: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
     A cell remembers for how many periods it has felt nothing.
@@ -80,7 +80,7 @@ class ForceDisplayControl:
         return memory, None
 
     def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
-        """Let cells that feel the finger press back, the others rest; see `interfaces.Controller`."""
+        """Control the force of touched cells and the height of the others; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         asked = self.field.take(cells_at(self.grid, seen.place))
         pressed = seen.force >= known.felt_force

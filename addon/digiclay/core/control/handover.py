@@ -22,20 +22,20 @@ Floats = NDArray[np.float64]
 
 
 class Handed(NamedTuple):
-    """The memory of both: how far the display is, and what the method remembers."""
+    """Memory of both: progress of the display, and memory of the control method."""
 
     display: Progress
     method: Any
 
     @property
     def losses(self) -> int | None:
-        """How often the method lost the finger, where it counts that."""
+        """Number of losses of the method, where it counts them."""
         return getattr(self.method, "losses", None)
 
 
 @dataclass(frozen=True, eq=False)
 class Handover:
-    """Display, then method; without a method the shape stands.
+    """Display, then control method; without a method the shape stays.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Handover:
         return Handed(self.display.begin(), self.method.begin() if self.method else None)
 
     def displayed(self, memory: Handed) -> bool:
-        """Tell whether the shape stands, and the method has taken over."""
+        """Return whether the shape stands, and the method has taken over."""
         return memory.display.move >= len(self.display.moves)
 
     def attend(

@@ -15,7 +15,7 @@ __all__ = ["Master", "Phase", "VirtualMaster"]
 
 
 class Phase(IntEnum):
-    """What the master is doing."""
+    """Phase of the master."""
 
     IDLE = 0
     SPRING = 1
@@ -23,7 +23,7 @@ class Phase(IntEnum):
 
 
 class Master(NamedTuple):
-    """The controller's memory.
+    """Memory of the controller.
 
     Attributes
     ----------
@@ -112,5 +112,5 @@ class VirtualMaster(Tracking):
 
     @property
     def set_point(self) -> SetPoint:
-        """Force asked of all cells together."""
+        """Set point of all cells together."""
         return SetPoint(self.force_setpoint)

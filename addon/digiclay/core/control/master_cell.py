@@ -15,7 +15,7 @@ __all__ = ["MasterCell", "master_cell"]
 
 @dataclass(frozen=True)
 class MasterCell:
-    """One unloaded cell, in plain numbers: the valve's opening is known exactly, its flow is averaged.
+    """One unloaded cell in plain numbers: exact valve opening, averaged flow.
 
     Attributes
     ----------

@@ -13,17 +13,17 @@ __all__ = ["METHODS", "ControlParameters", "Method"]
 
 @dataclass(frozen=True)
 class ControlParameters(Parameters):
-    """Base of every method's parameters."""
+    """Base of the parameters of all control methods."""
 
     @property
     def set_point(self) -> SetPoint | None:
-        """Force asked for; None where the method asks for none."""
+        """Set point; None for a method without one."""
         return None
 
 
 @dataclass(frozen=True)
 class Method:
-    """Where a method is, and what it needs.
+    """Module of a control method, and its requirements.
 
     Attributes
     ----------

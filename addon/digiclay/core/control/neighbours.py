@@ -27,7 +27,7 @@ def cells_at(grid: Grid, place: Floats) -> Cells:
 
 @dataclass(frozen=True)
 class Exchange:
-    """How neighbours even out in one control period.
+    """Exchange between neighbours in one control period.
 
     Attributes
     ----------

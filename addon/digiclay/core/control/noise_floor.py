@@ -24,7 +24,7 @@ def above(force: Floats, floor: float) -> Floats:
 
 
 def check_told(carried: float, field: str, asked: float, floor: float) -> None:
-    """Refuse noise that hides what is asked for: the finger would never be felt where it should be held.
+    """Refuse noise above the set point, since contact would not be detected.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Plastic(TouchParameters):
-    """A Bingham body under every pin: rigid up to a yield force, viscous above."""
+    """Bingham body under every pin: rigid up to a yield force, viscous above."""
 
     yield_force: float = quantity(0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0)
     damping: float = quantity(
@@ -32,7 +32,7 @@ class Plastic(TouchParameters):
     )
 
     def check(self) -> None:
-        """A cell that yields is felt."""
+        """The yield force is at least the felt force."""
         if not self.yield_force >= self.felt_force:
             rule = f"must be at least felt_force, {self.felt_force:g} N"
             raise ParameterError("Plastic", "yield_force", rule, f"{self.yield_force:g} N")
@@ -40,7 +40,7 @@ class Plastic(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class PlasticControl:
-    """The plastic behaviour, put together for a bed.
+    """Controller of the plastic behaviour for a bed.
 
     Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
     the pin stays; left alone, it goes to the deepest height it was pressed to.

@@ -32,7 +32,7 @@ CYCLE = 2
 
 
 class Listening(NamedTuple):
-    """The controller's memory: the disc that listens, m (a negative radius: none), and periods done."""
+    """Memory of the controller: listening disc, m (a negative radius: none), and number of periods."""
 
     x: float = 0.0
     y: float = 0.0
@@ -42,7 +42,7 @@ class Listening(NamedTuple):
 
 @dataclass(frozen=True)
 class PushPull(DriveParameters):
-    """How pins listen, and how they give way."""
+    """Motion of listening pins, and their compliance."""
 
     listening_speed: float = quantity(
         8e-3, "speed of a free listening pin, up and down", unit="m/s", symbol="v_l", above=0.0
@@ -64,7 +64,7 @@ class PushPull(DriveParameters):
     )
 
     def check(self) -> None:
-        """A pin that is moved must give way more readily than one that listens."""
+        """The following speed is at least the listening speed."""
         if not self.following_speed >= self.listening_speed:
             rule = f"must be at least listening_speed, {self.listening_speed:g} m/s"
             raise ParameterError("PushPull", "following_speed", rule, f"{self.following_speed:g} m/s")
@@ -72,7 +72,7 @@ class PushPull(DriveParameters):
 
 @dataclass(frozen=True, eq=False)
 class PushPullControl:
-    """Push and pull, put together for a bed.
+    """Controller of push and pull for a bed.
 
     With e = H_com - H at the end of a cycle, a cell is pushed where e > θ and pulled where e < -θ; its
     commanded height is then dragged along, to within θ of the measured one. A cell remembers how many

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A controller that measures nothing and commands what was recorded.
+    """Controller with recorded commands and without measurements.
 
     Attributes
     ----------

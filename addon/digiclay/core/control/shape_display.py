@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 class Move(NamedTuple):
-    """One move of a refresh: rows `first` to `last` go a share of the way from rest to the shape."""
+    """Move of a refresh: rows `first` to `last` go a share of the distance from rest to the shape."""
 
     first: int
     last: int
@@ -35,7 +35,7 @@ class Move(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The controller's memory: which move is under way, and for how many periods."""
+    """Memory of the controller: current move and its number of periods."""
 
     move: int = 0
     periods: int = 0
@@ -43,7 +43,7 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True)
 class ShapeDisplay(DriveParameters):
-    """What is displayed, and how the surface gets there."""
+    """Displayed shape and its refresh."""
 
     shape: str = quantity("dome", "displayed shape: its name, or a file .npy of heights, m")
     amplitude: float = quantity(
@@ -82,7 +82,7 @@ class ShapeDisplay(DriveParameters):
 
 @dataclass(frozen=True, eq=False)
 class ShapeDisplayControl:
-    """Shape display, put together for a bed.
+    """Controller of the shape display for a bed.
 
     A move is over when its cells are within the dead band of their heights, or the patience is over.
     While there are moves all cells take part; afterwards those that stand at their heights are let go.

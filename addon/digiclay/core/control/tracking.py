@@ -14,7 +14,7 @@ __all__ = ["Tracking"]
 
 @dataclass(frozen=True)
 class Tracking(ControlParameters):
-    """Height control of the cells, and the finger's direction."""
+    """Height control of the cells, and direction of the fingertip."""
 
     position_gain: float = quantity(
         500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0

@@ -22,7 +22,7 @@ ABEAM = 1e-12
 
 
 class Heading(NamedTuple):
-    """Where the direction was last settled, m, and the direction: a unit vector, 0, 0 before any travel."""
+    """Position of the last direction, m, and the direction: a unit vector, 0, 0 before any travel."""
 
     x: float = 0.0
     y: float = 0.0

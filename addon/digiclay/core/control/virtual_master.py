@@ -39,7 +39,7 @@ CODES = (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
 
 @dataclass(frozen=True)
 class VirtualMasterControl:
-    """Method I, put together for a bed.
+    """Controller of Method I for a bed.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class VirtualMasterControl:
         return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
 
     def _given_up(self, master: Master) -> bool:
-        """Tell whether the finger has been away for longer than the loss time."""
+        """Return whether the finger has been away for longer than the loss time."""
         return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
 
     def _lead(self, master: Master, force: float) -> Master:
@@ -221,7 +221,7 @@ class VirtualMasterControl:
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
-        """What tells cells apart.
+        """Thresholds of the cells.
 
         No force; how far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the
         height of a pin at rest, and how far from it one counts as formed, m. Circles are widened

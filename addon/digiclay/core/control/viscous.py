@@ -31,7 +31,7 @@ BORDER = 0.1
 
 
 class Spot(NamedTuple):
-    """The controller's memory: the box that holds all displaced cells, m; empty before any touch."""
+    """Memory of the controller: the box around all displaced cells, m; empty before any touch."""
 
     left: float = math.inf
     right: float = -math.inf
@@ -57,7 +57,7 @@ class Spot(NamedTuple):
 
 @dataclass(frozen=True)
 class Viscous(TouchParameters):
-    """A spring and a damper side by side under every pin, and the exchange between neighbours."""
+    """Spring and damper in parallel under every pin, and the exchange between neighbours."""
 
     damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
     recovery_time: float = quantity(
@@ -70,7 +70,7 @@ class Viscous(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class ViscousControl:
-    """The viscous behaviour, put together for a bed.
+    """Controller of the viscous behaviour for a bed.
 
     ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbours exchange,
     then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a

@@ -86,7 +86,7 @@ def _wider(disc: Disc | None, margin: float) -> Disc | None:
 
 
 def _holds(outer: Disc | None, inner: Disc | None) -> bool:
-    """Tell whether all of `inner` is in `outer`."""
+    """Return whether all of `inner` is in `outer`."""
     if inner is None:
         return True
     return outer is not None and math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2]

@@ -92,7 +92,7 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
 
 
 class _Ready(NamedTuple):
-    """What every period needs of one gathered set: made once for it.
+    """Constants of an active set, for many periods.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ Cells = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Rows:
-    """Which row of a cell's state holds what.
+    """Meaning of the rows of a cell's state.
 
     The first `physics` rows (height first, m) are the continuous state of `alike.Cell`;
     then come the commands on their way to the valve, oldest first; the height a cell is
@@ -81,7 +81,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """The cells that take part, taken out of the bed; they alone change.
+    """Active cells, with their rows outside the bed's array.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class Gathered:
 
 
 class Part(NamedTuple):
-    """Rows of the first gathered cells; `Rows` and `Gathered` say what they are."""
+    """Rows of the first active cells, as `Rows` and `Gathered` define them."""
 
     cells: Cells
     place: Floats
@@ -179,7 +179,7 @@ class Part(NamedTuple):
 
 
 class State(NamedTuple):
-    """A session at the start of a control period.
+    """State of a session at the start of a control period.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """All that does not change in a session.
+    """Constants of a session.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ MOST_POINTS = 50_000_000
 
 @dataclass(frozen=True)
 class Model(Parameters):
-    """What is made of a formed surface."""
+    """Selection of bodies of a formed surface."""
 
     kind: str = quantity("solid", "kind of mesh", choices=tuple(KINDS))
     skin: str = quantity("bilinear", "skin between the pins; pins have none", choices=tuple(SKINS))

@@ -103,7 +103,7 @@ def _count(value: Any) -> int:
 
 
 class _File:
-    """The tables of a glTF, and the buffers read so far."""
+    """Tables of a glTF, and the buffers read so far."""
 
     def __init__(self, path: Path, tree: dict[str, Any], binary: bytes | None) -> None:
         self._path, self._tree, self._binary = path, tree, binary

@@ -33,7 +33,7 @@ BOM = b"\xef\xbb\xbf"
 
 
 class Read(NamedTuple):
-    """A mesh as a file gives it.
+    """Mesh in the form of its file.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ MOST_PARTS, DEEPEST = 1_000_000, 64
 
 @dataclass
 class _Object:
-    """What a model says of an object; vertices and triangles are flat."""
+    """Object of a model; vertices and triangles are flat."""
 
     support: bool
     vertices: array[float] = field(default_factory=lambda: array("d"))
@@ -59,7 +59,7 @@ class _Object:
 
 @dataclass
 class _Model:
-    """What the parts read so far hold."""
+    """Content of the parts read so far."""
 
     unit: float = UNITS["millimeter"]
     objects: dict[Key, _Object] = field(default_factory=dict)
@@ -70,7 +70,7 @@ class _Model:
 
 @dataclass(frozen=True)
 class _Extent:
-    """What an object comes to with all that stands in it: triangles, meshes, and how deep they stand."""
+    """Size of an object with its components: triangles, meshes, and depth of nesting."""
 
     triangles: int
     meshes: int
@@ -122,7 +122,7 @@ def _inside(part: str, target: str) -> str:
 
 
 def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start: Any) -> None:
-    """Read a part of the zip, telling `start` of each element: its name and its attributes."""
+    """Read a part of the zip; call `start` with name and attributes of each element."""
     entry = archive.getinfo(part)
     model.unpacked += entry.file_size  # no more than that is unpacked, whatever there is
     refuse_size(name, model.unpacked, part)

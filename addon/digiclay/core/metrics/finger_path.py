@@ -30,7 +30,7 @@ def in_contact(total_force: ArrayLike) -> Rows:
 
 @dataclass(frozen=True, eq=False)
 class CellSums:
-    """What the metrics take of t rows of n cells: sums over the cells, and the first and last heights.
+    """Sums over the cells of t rows of n cells, and the first and last heights.
 
     Attributes
     ----------

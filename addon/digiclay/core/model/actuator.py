@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Actuator(Parameters):
-    """A single-acting cylinder: the pin is its rod."""
+    """Single-acting cylinder with the pin as its rod."""
 
     bore: float = quantity(
         2e-3, "inner diameter of the cylinder", unit="m", symbol="D_a", source="P", above=0.0

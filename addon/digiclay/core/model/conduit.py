@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Conduit(Parameters):
-    """A straight round channel."""
+    """Straight round channel."""
 
     length: float = quantity(10e-3, "length", unit="m", symbol="L_c", at_least=0.0)
     diameter: float = quantity(0.8e-3, "inner diameter", unit="m", symbol="D_c", above=0.0)
@@ -32,7 +32,7 @@ class Conduit(Parameters):
 
 @dataclass(frozen=True)
 class OrificeAndConduit(Orifice):
-    """Valve and conduit in series: the drops add, the flow is one.
+    """Valve and conduit in series: the drops add, the flow is the same.
 
     Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
     smaller flow holds, as without a conduit.

@@ -11,14 +11,14 @@ __all__ = ["Delay", "Queue", "queue"]
 
 @dataclass(frozen=True)
 class Delay(Parameters):
-    """The valve sees a command `dead_time` after the controller gave it."""
+    """Dead time: a command acts `dead_time` after the controller issued it."""
 
     dead_time: float = quantity(1e-3, "dead time", unit="s", symbol="t_d", at_least=0.0)
 
 
 @dataclass(frozen=True)
 class Queue:
-    """Commands on their way, and when in a period the valve sees the next one.
+    """Queued commands, and the instant of the next one within a period.
 
     The queue holds the last `length` commands, oldest first, the newest pushed at the
     start of the period. Until `cut` the valve sees the oldest; after it, the next.

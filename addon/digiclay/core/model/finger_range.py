@@ -51,7 +51,7 @@ def largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> 
 
 
 def beyond_words(force: float | None, indentation: float | None) -> str:
-    """Say what is beyond a finger; nothing where nothing is.
+    """Return the message on values beyond the contact law; empty without any.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ Movement = Callable[[Floats], Floats]
 
 
 class Flow(Protocol):
-    """Valve, with or without a conduit: opening and pressure drop to flow."""
+    """Flow law of the valve, with or without a conduit, from opening and pressure drop."""
 
     @property
     def knee(self) -> float: ...
@@ -55,7 +55,7 @@ class Flow(Protocol):
 
 
 class Lag(Protocol):
-    """How the valve's opening follows its command; `own` are the state rows it owns, shape (rows, n)."""
+    """Response of the valve's opening to its command; `own` are its state rows, shape (rows, n)."""
 
     @property
     def rows(self) -> int: ...
@@ -70,7 +70,7 @@ class Lag(Protocol):
 
 
 class Pulp(Protocol):
-    """How the pulp under the finger relaxes; `own` are its state rows, shape (rows, k)."""
+    """Relaxation of the pulp; `own` are its state rows, shape (rows, k)."""
 
     @property
     def rows(self) -> int: ...
@@ -87,7 +87,7 @@ class Pulp(Protocol):
 
 
 class Sensors(Protocol):
-    """What the controller gets to know of forces and heights; `own` are the state rows it owns."""
+    """Measured forces and heights for the controller; `own` are their state rows."""
 
     @property
     def rows(self) -> int: ...
@@ -102,7 +102,7 @@ class Sensors(Protocol):
 
 
 class Truth(NamedTuple):
-    """What there is to be measured, of some cells, between two control periods.
+    """True quantities of some cells between two control periods.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Truth(NamedTuple):
 
 
 class Stepper(Protocol):
-    """How a block of cells is moved on by one control period."""
+    """Integration of a block of cells over one control period."""
 
     @property
     def name(self) -> str: ...
@@ -178,7 +178,7 @@ class Segment:
 
 
 class Measurement(NamedTuple):
-    """What a controller sees of some cells.
+    """Measured quantities of some cells.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class Measurement(NamedTuple):
 
 
 class Orders(NamedTuple):
-    """What a controller makes of a measurement, (m,) each: targets, m; modes; valve commands."""
+    """Output of a controller, (m,) each: targets, m; modes; valve commands."""
 
     target: Floats
     mode: NDArray[np.int8]
@@ -210,7 +210,7 @@ class Orders(NamedTuple):
 
 
 class Controller(Protocol):
-    """A strategy: parameters only; its memory is handed in and handed back."""
+    """Control method with its parameters; its memory is an argument and a result."""
 
     @property
     def name(self) -> str: ...

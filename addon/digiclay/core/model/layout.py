@@ -68,7 +68,7 @@ class Layout(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The cells' positions, and quick answers to "which cells are near here?".
+    """Positions of the cells, and fast search for the cells near a point.
 
     Attributes
     ----------

@@ -64,7 +64,7 @@ class Unrelaxed:
 
 
 class PerfectSensors:
-    """No sensor model: the controller knows the true forces and heights."""
+    """No sensor model: measured forces and heights are the true ones."""
 
     rows = 0
 

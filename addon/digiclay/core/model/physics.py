@@ -24,7 +24,7 @@ GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)
 
 @dataclass(frozen=True)
 class Cell:
-    """The parts every cell is made of.
+    """Parts of every cell.
 
     A block of n cells has state rows ``y`` of shape (r, n): height, m; the pulp's rows (used
     for the first k cells, which the finger may touch); the lag's rows.
@@ -55,7 +55,7 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """How fast a pin without load goes through a valve that is wide open, m/s.
+    """Speeds of a pin without load behind a fully open valve, m/s.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ WORD = 2**64
 
 @dataclass(frozen=True)
 class Sensing(Parameters):
-    """How the cells' sensors differ from perfect ones; 0 leaves an effect out."""
+    """Parameters of the sensor model; 0 omits an effect."""
 
     force_noise: float = quantity(
         0.0, "standard deviation of the force sensors", unit="N", symbol="σ_F", at_least=0.0, at_most=100.0
@@ -160,7 +160,7 @@ class Noisy:
 
 @dataclass(frozen=True)
 class Quantised:
-    """Readings in whole steps, the nearest one (halfway: the even one); a step of 0 rounds nothing.
+    """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing.
 
     Attributes
     ----------

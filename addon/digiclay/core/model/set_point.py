@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A force asked for.
+    """Set point of the total force.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class SetPoint:
     per_cell: bool = False
 
     def total(self, following: ArrayLike) -> Floats:
-        """Return the total force asked for while so many cells follow the finger, N.
+        """Return the set point for a number of following cells, N.
 
         ``F_ref`` for all cells together, ``n F_ref`` for n cells that follow; NaN where none does,
         since then no force is asked for.
@@ -46,5 +46,5 @@ class SetPoint:
 
 
 def asked(set_point: SetPoint | None, following: ArrayLike) -> Floats:
-    """Return the `SetPoint.total`, N; NaN throughout for a method that asks for no force."""
+    """Return the `SetPoint.total`, N; NaN throughout for a method without a set point."""
     return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)

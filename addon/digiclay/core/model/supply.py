@@ -15,7 +15,7 @@ __all__ = ["Supply"]
 
 @dataclass(frozen=True)
 class Supply(Parameters):
-    """Reservoirs at constant gauge pressure: the sign of the opening picks one."""
+    """Reservoirs at constant gauge pressure, selected by the sign of the opening."""
 
     high: float = quantity(
         0.5e5, "gauge pressure of the reservoir that raises pins", unit="Pa", symbol="P_high", source="P"

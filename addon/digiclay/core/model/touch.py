@@ -38,7 +38,7 @@ Window = tuple[float, float, float, float, float, float]
 
 @dataclass(eq=False)
 class Coming:
-    """The finger's way through t control periods, at p instants of each.
+    """Fingertip path over t control periods, at p instants of each.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Coming:
 
 
 class Approach(NamedTuple):
-    """The finger in one control period of its way."""
+    """Fingertip path in one control period."""
 
     coming: Coming
     period: int

@@ -46,7 +46,7 @@ class Waypoint(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Waypoints of the fingertip's lowest point, and its orientation there.
+    """Waypoints of the fingertip's lowest point, with orientations.
 
     *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
     and no coordinate overshoots a waypoint. *linear* joins them by straight lines.

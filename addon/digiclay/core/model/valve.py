@@ -46,7 +46,7 @@ class Valve(Parameters):
 
 @dataclass(frozen=True)
 class Orifice:
-    """The flow law of a valve in a fluid, ready to be evaluated.
+    """Flow law of a valve in a fluid.
 
     Laminar branch ``Q = g ΔP`` with ``g = laminar |K|^power``; turbulent branch
     ``Q = a sqrt(ΔP)`` with ``a = turbulent |K|``. The smaller of the two holds: they

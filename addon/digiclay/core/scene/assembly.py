@@ -93,7 +93,7 @@ def _pulp(finger: Finger) -> Pulp:
 
 
 def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
-    """Return what the controller gets to know: all there is, less what each part takes away."""
+    """Return the sensor chain of a scene."""
     known = scene.sensors
     if known is None:
         return None

@@ -37,7 +37,7 @@ CHUNK = 64
 
 @dataclass(frozen=True)
 class Recorder(Parameters):
-    """Keeps the state of every cell, one row every so many control periods, and the last."""
+    """Recording interval, in control periods."""
 
     every: int = quantity(1, "control periods per row of the history", at_least=1)
 
@@ -47,7 +47,7 @@ class Recorder(Parameters):
 
 
 class Recording:
-    """The rows of one session, preallocated.
+    """Rows of one session, preallocated.
 
     Row i is the state at ``time[i]``; ``command[i]`` and ``mode[i]`` are those given in the
     control period that starts then. Nothing is commanded after the last row: its command is

@@ -40,7 +40,7 @@ def find(word: str) -> Path:
 
 
 class Setting(NamedTuple):
-    """What an option of the command line changes of a scene file.
+    """Change of a scene file by an option of the command line.
 
     Attributes
     ----------

@@ -112,7 +112,7 @@ def parameters(section: str, method: str) -> type[Parameters]:
 
 @dataclass(frozen=True)
 class Simulation(Parameters):
-    """How time is cut up, and how much of it there is."""
+    """Periods, steps and duration of the simulation."""
 
     control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
     physics_step: float = quantity(5e-3, "longest physics step", unit="s", symbol="h", above=0.0)
@@ -157,7 +157,7 @@ class Finger:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that decides a session; equal scenes give equal sessions, bit for bit.
+    """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
     A part that is None is left out: it costs nothing, and its module is not imported.
 
@@ -232,5 +232,5 @@ class Scene:
 
     @property
     def set_point(self) -> SetPoint | None:
-        """Force the control asks for; None where it asks for none."""
+        """Set point of the control; None without one."""
         return self.control.set_point if self.control else None

@@ -161,7 +161,7 @@ def _method(control: dict[str, Any] | None) -> str:
 
 
 def _forms_one(method: str, own: dict[str, Any]) -> bool:
-    """Tell whether a method forms a blister; refuse a section [blister] where it does not."""
+    """Return whether a method forms a blister; refuse a section [blister] where it does not."""
     if METHODS[method].blister is None and own:
         raise ParameterError(
             "blister", "", f"must be left out: the method {method} forms no blister", shown(own)

@@ -76,7 +76,7 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorMonitor:
-    """The reference that follows a live session for a stretch now and then.
+    """Reference solution beside a live session, over a stretch at intervals.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class ErrorMonitor:
 
 
 def has_every_command(scene: Scene) -> bool:
-    """Tell whether a run of this scene keeps every command: with a recorder that keeps every period."""
+    """Return whether a run of this scene keeps every command: with a recorder that keeps every period."""
     return scene.recorder is not None and scene.recorder.every == 1
 
 

@@ -82,7 +82,7 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
 
 
 def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:
-    """Tell whether a run's folder has all that belongs into it: copies break off half way.
+    """Return whether a run's folder has all that belongs into it: copies break off half way.
 
     Parameters
     ----------

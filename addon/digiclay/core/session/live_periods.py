@@ -35,7 +35,7 @@ SLACK = 1e-6
 
 @dataclass(frozen=True)
 class Clock:
-    """What a live session knows of the wall's time.
+    """Wall clock of a live session.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def _affordable(clock: Clock, gone: float) -> int:
 
 
 def spent(clock: Clock, count: int, took: float) -> Clock:
-    """Return the clock that knows what `count` periods took, s."""
+    """Return the clock after `count` periods of a measured duration, s."""
     if count < 1 or took <= 0.0:
         return clock
     each = took / count

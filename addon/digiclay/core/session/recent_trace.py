@@ -26,7 +26,7 @@ SPAN, ROWS = 10.0, 1000
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A ring of rows: one that is full drops its oldest for each new one.
+    """Ring buffer of rows: a new row replaces the oldest.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Trace:
 
     @property
     def set_point(self) -> Floats:
-        """Total force asked for, shape (k,), N; NaN where none is."""
+        """Set point, shape (k,), N; NaN without one."""
         return self.rows[:, 2]
 
     @property

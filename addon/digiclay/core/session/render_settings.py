@@ -24,7 +24,7 @@ MOST_FRAMES = 100_000
 
 @dataclass(frozen=True)
 class Picture(Parameters):
-    """What stills, turntables and films have in common."""
+    """Common settings of stills, turntables and films."""
 
     width: int = quantity(960, "width in pixels", at_least=16, at_most=16384)
     height: int = quantity(600, "height in pixels", at_least=16, at_most=16384)
@@ -45,7 +45,7 @@ class Still(Picture):
 
 @dataclass(frozen=True)
 class Moving(Picture):
-    """What turntables and films have in common."""
+    """Common settings of turntables and films."""
 
     rate: int = quantity(25, "frames shown in a second", at_least=1, at_most=240)
 
@@ -59,7 +59,7 @@ class Moving(Picture):
 
 @dataclass(frozen=True)
 class Turntable(Moving):
-    """The bed turning once about itself, as it is at one instant."""
+    """One rotation of the bed at one instant."""
 
     when: str = quantity("end", "the instant", choices=("last touch", "end"))
     frames: int = quantity(75, "frames of the whole turn", at_least=2, at_most=MOST_FRAMES)
@@ -72,7 +72,7 @@ class Turntable(Moving):
 
 @dataclass(frozen=True)
 class Film(Moving):
-    """A session, or a part of it, from its recorded states."""
+    """Session, or a part of it, from its recorded states."""
 
     arrows: bool = quantity(True, "whether arrows show the force on each pin")
     strip: bool = quantity(True, "whether a strip in the picture shows the total force over time")

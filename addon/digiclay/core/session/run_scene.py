@@ -33,7 +33,7 @@ History = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a session came to.
+    """Results of a session.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def run(
 
 
 class Ended(Protocol):
-    """What counts of the state a session ended in."""
+    """Summary of a session's final state."""
 
     @property
     def period(self) -> int: ...
@@ -203,7 +203,7 @@ def _metrics(
     took: float,
     versions: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return what a run is judged by, and under what it was made."""
+    """Return the metrics of a run, and the conditions of its simulation."""
     simulated = done * scene.simulation.control_period
     known: dict[str, Any] = {
         "scene": scene.name,

@@ -41,7 +41,7 @@ REMEDY = "Reset the session to begin with a bed at rest."
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What bytes hold: the header, and the arrays by their names in `State` and `Gathered`."""
+    """Content of a snapshot: the header, and the arrays by their names in `State` and `Gathered`."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
@@ -215,7 +215,7 @@ def _arrays(
 
 
 def _sound(kept: Kept, count: int) -> bool:
-    """Tell whether the arrays hold what those of a state can hold."""
+    """Return whether the arrays hold what those of a state can hold."""
     arrays = kept.arrays
     cells = arrays["cells"]
     return bool(

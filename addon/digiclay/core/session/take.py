@@ -45,7 +45,7 @@ MOST_PARTS = 64
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """A stretch of a session.
+    """Stretch of a session.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _path(times: Floats, poses: Floats) -> Path:
 
 
 def _rests(system: System, start: bytes) -> bool:
-    """Tell whether a state is that of a bed nothing has happened to, however long it has waited."""
+    """Return whether a state is that of a bed nothing has happened to, however long it has waited."""
     state, rest = unpacked(system, start), begin(system)
     return (
         all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))

@@ -25,7 +25,7 @@ THIN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Heights a bed is to display, and what of the shape it cannot.
+    """Heights of a bed for a shape, and the parts of the shape beyond them.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Heights over a rectangle of pixels; a pixel is one unit wide, its value stands in its middle.
+    """Heights over a rectangle of pixels; a pixel is one unit wide, with its value in the middle.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ Flags = NDArray[np.bool_]
 
 
 class Placement(NamedTuple):
-    """How a shape's plan lies on the bed: bed = file * factor + offset; m, and m per file's unit."""
+    """Transformation of a shape's plan: bed = file * factor + offset; m, and m per file's unit."""
 
     factor_x: float
     factor_y: float
@@ -25,7 +25,7 @@ class Placement(NamedTuple):
 
 
 class Tops(NamedTuple):
-    """A shape's top surface at the pins of a bed, (n,) each.
+    """Top surface of a shape at the pins of a bed, (n,) each.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class Tops(NamedTuple):
 
 
 class Relief(Protocol):
-    """A shape in the unit of its file."""
+    """Shape in the unit of its file."""
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name in messages."""
         ...
 
     @property

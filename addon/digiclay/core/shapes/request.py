@@ -25,7 +25,7 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Shape(Parameters):
-    """A shape from outside: where it comes from, how it is laid onto the bed, how the bed gets there."""
+    """External shape: source, placement on the bed, refresh."""
 
     file: str = quantity("dome", "name of a sample shape, or a mesh, a picture or a file .npy")
     heights: str = quantity("", "heights of all cells, packed as text, in place of the file")

@@ -37,7 +37,7 @@ PRESSED, FREE = 0.1, 0.001
 
 @dataclass(frozen=True, eq=False)
 class AdaptivePlan:
-    """What all periods share.
+    """Constants of all periods.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class AdaptivePlan:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """As accurate as asked for, and as stable as the closed-form step.
+    """Error within a tolerance, stability of the closed-form step.
 
     Attributes
     ----------

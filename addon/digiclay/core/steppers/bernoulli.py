@@ -49,7 +49,7 @@ class BernoulliExponential:
 
 
 class Block:
-    """A block of cells, ready to be moved on period by period: its rows, and the arrays to work in.
+    """Block of cells for integration over many periods: its rows, and work arrays.
 
     What is in the arrays before a period does not count. Numpy takes two operands of one shape
     twice as fast as an array and a number, so constants are arrays as well.

@@ -41,7 +41,7 @@ MOST_BOW = 1.5
 
 @dataclass(frozen=True, eq=False)
 class BernoulliPlan:
-    """What all periods share. Heights under the finger are counted in 1/m, tensions in b/m.
+    """Constants of all periods. Heights under the fingertip are in 1/m, tensions in b/m.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ ASTRAY = 0.01
 
 @dataclass(frozen=True, eq=False)
 class ExplicitPlan:
-    """What all periods share.
+    """Constants of all periods.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ExplicitPlan:
 
 @dataclass(frozen=True)
 class Explicit:
-    """A method that marches through the segments of a period; each says how far one step goes.
+    """Base of the explicit steppers, which march through the segments of a period.
 
     Notes
     -----

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 class Strain(NamedTuple):
-    """What a step finds, for k cells, (k,), or for k cells of b runs, (k, b).
+    """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b).
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Strain(NamedTuple):
 
 
 class Way(NamedTuple):
-    """What comes of a step.
+    """Result of a step.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Valve:
-    """The flow through the valves of a step.
+    """Flow through the valves of a step.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RichardsonPlan:
-    """What all periods share.
+    """Constants of all periods.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class RichardsonPlan:
 
 @dataclass(frozen=True)
 class Richardson:
-    """Order 3 where the problem is smooth; as stable as the closed-form step."""
+    """Order 3 for smooth problems, stability of the closed-form step."""
 
     name = "richardson"
     order = 3

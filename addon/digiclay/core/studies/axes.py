@@ -25,7 +25,7 @@ SYNTAX = "must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C"
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter that varies.
+    """One varied parameter.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Column:
-    """An axis in numbers.
+    """Axis as numbers.
 
     Attributes
     ----------

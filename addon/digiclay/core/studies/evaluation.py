@@ -75,7 +75,7 @@ def find_figure(word: str) -> str:
 
 @dataclass(frozen=True)
 class Bundles:
-    """The points of a sweep, in bundles that run at a time.
+    """Points of a sweep in bundles that run together.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ def _make_record(result: Result, *, errors: bool) -> Record:
 
 
 class StackWarning(RuntimeWarning):
-    """A stack failed as a whole for a reason that is no user's to mend."""
+    """Failure of a whole batch by no fault of the user."""
 
 
 def evaluate_bundle(

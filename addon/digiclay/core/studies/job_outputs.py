@@ -25,7 +25,7 @@ KEYS = ("export", "errors", *SECTIONS)
 
 @dataclass(frozen=True)
 class Outputs:
-    """What is made of a run.
+    """Outputs of a run.
 
     Attributes
     ----------

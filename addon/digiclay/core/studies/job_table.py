@@ -40,7 +40,7 @@ WHICH = ("scenes", "methods", "settings")
 
 @dataclass(frozen=True)
 class Job:
-    """One scene with one method and one setting.
+    """One scene with one control method and one setting.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Batch:
-    """The jobs of a file, and what is made of each."""
+    """Jobs of a JOBS file, and their outputs."""
 
     name: str
     jobs: tuple[Job, ...]
@@ -116,7 +116,7 @@ def job_outputs(path: Path) -> Outputs:
 
 
 def _scenes(table: Mapping[str, Any]) -> list[str]:
-    """Return what the file says its scenes are."""
+    """Return the scenes of the file."""
     words = table.get("scenes")
     if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
         value = "none" if words is None else shown(words)

@@ -43,7 +43,7 @@ BANDS = (0.5, 0.25)
 
 
 class Omission(NamedTuple):
-    """Something a scene can do without.
+    """Part or refinement that a scene can omit.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Omission(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """What leaving something out did.
+    """Effect of an omission.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Tried(NamedTuple):
 
 @dataclass(frozen=True)
 class Fitted:
-    """A scene that keeps to a budget.
+    """Scene within a budget.
 
     Attributes
     ----------
@@ -106,12 +106,12 @@ class Fitted:
 
     @property
     def error(self) -> float:
-        """What was then measured of the budget, m."""
+        """Measured height error, m."""
         return self.departure + self.own_error
 
     @property
     def left_out(self) -> list[str]:
-        """What the scene does without."""
+        """Omissions of the scene."""
         return [one.said for one in self.tried if one.kept]
 
 

@@ -34,7 +34,7 @@ Outcome = TypeVar("Outcome")
 
 @dataclass(frozen=True)
 class Kind:
-    """What a series is called, the file by which its folder is known, and the folders in it."""
+    """Kind of a series: its name, the file that identifies its folder, and the folders in it."""
 
     name: str
     mark: str
@@ -108,12 +108,12 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _is_ours(path: Path, kind: Kind) -> bool:
-    """Tell whether a folder is of this kind, or is left of one that did not come so far."""
+    """Return whether a folder is of this kind, or is left of one that did not come so far."""
     return (path / kind.mark).is_file() or _is_bare(path, kind)
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:
-    """Tell whether nothing has been done in a folder: there is but the frame of a series."""
+    """Return whether nothing has been done in a folder: there is but the frame of a series."""
     for found in path.iterdir():
         frame = found.name in (LOCK, kind.mark) or is_unfinished(found)
         if not frame and not (found.name in kind.folders and found.is_dir() and not any(found.iterdir())):

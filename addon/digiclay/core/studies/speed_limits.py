@@ -24,7 +24,7 @@ REST = 0.3
 
 @dataclass(frozen=True)
 class Criterion(Parameters):
-    """When a finger counts as followed: never lost, always touched, its blister near, its force near."""
+    """Criteria of tracking: no loss, contact in every row, small lag, small RFD."""
 
     lag: float = quantity(3e-3, "largest lag of the blister, a pitch", unit="m", above=0.0)
     deviation: float = quantity(0.2, "largest RFD, half of Method I's set point", unit="N", above=0.0)
@@ -38,7 +38,7 @@ class Criterion(Parameters):
 
 @dataclass(frozen=True)
 class Follows:
-    """How well a finger was followed in the judged part of a trial.
+    """Quality of tracking in the evaluated part of a trial.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Follows:
     rfd: float
 
     def meets(self, criterion: Criterion) -> bool:
-        """Tell whether this counts as followed."""
+        """Return whether this counts as followed."""
         held = self.losses == 0 and self.loss_share == 0.0
         return held and self.lag < criterion.lag and self.rfd < criterion.deviation
 

@@ -34,7 +34,7 @@ NOTE = re.compile(r'  # [^"\n]*$', re.MULTILINE)
 
 @dataclass(frozen=True)
 class Folder:
-    """Where a sweep is kept."""
+    """Folder of a sweep."""
 
     path: Path
 

@@ -28,7 +28,7 @@ TRIAL_METRICS: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What a session came to.
+    """Results of a trial session.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Trial:
 
     @property
     def losses(self) -> int | None:
-        """How often the controller lost the finger; None for one that does not count."""
+        """Number of losses; None for a controller that does not count them."""
         return None if self.loss_times is None else len(self.loss_times)
 
     @property

@@ -19,7 +19,7 @@ SHOWS = (1.0, 3.0)
 
 @dataclass(eq=False)
 class Branch:
-    """Nodes at both ends, and the points from one to the other."""
+    """Nodes at both ends, and the points between them."""
 
     nodes: list[int]
     points: Floats
@@ -36,7 +36,7 @@ End = tuple[int, int]
 
 @dataclass(eq=False)
 class Network:
-    """Nodes and branches; changed as it is worked on, and thrown away after that."""
+    """Nodes and branches, modified in place and discarded afterwards."""
 
     place: list[Floats]
     half: list[float]

@@ -33,7 +33,7 @@ THROUGH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A line from pin to pin.
+    """Line from pin to pin.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) 
 
 
 def reaches_out(points: Floats, half: float, pitch: float) -> bool:
-    """Tell whether a free branch is longer than the flank of the line it stands on.
+    """Return whether a free branch is longer than the flank of the line it stands on.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ NOTCH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Crest:
-    """A line along a feature.
+    """Line along a feature.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Crest:
 
 
 class Ridge(NamedTuple):
-    """What belongs together of a feature: lines that meet, or the top of a mound.
+    """Connected part of a feature: lines that meet, or the top of a mound.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ CHUNK = 1 << 21
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A ridge with its crests, or a mound.
+    """Ridge with its crests, or mound.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ Indices = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Finding(Parameters):
-    """What counts as a feature."""
+    """Criteria of a feature."""
 
     threshold: float = quantity(
         0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", at_least=1e-6
@@ -41,7 +41,7 @@ DEEP = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A boss or a crease: a part of the skin more than the threshold off its former place.
+    """Boss or crease: region of the skin beyond the threshold from the former surface.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Feature:
 
     @property
     def form(self) -> str:
-        """What a person calls it: ridge, mound, plateau; valley, hollow, basin; ring; or several of them."""
+        """Form: ridge, mound, plateau; valley, hollow, basin; ring; or several of them."""
         line, top, plain = FORMS[self.kind]
         if not self.crests:
             return plain if self.flat else top
@@ -80,7 +80,7 @@ class Feature:
 
     @property
     def name(self) -> str:
-        """The name it has in files and in Blender."""
+        """Name in files and in Blender."""
         return f"{self.kind}_{self.number}"
 
     @property

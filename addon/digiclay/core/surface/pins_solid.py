@@ -33,7 +33,7 @@ STEP = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """The bed divided into parts, one a pin; the sides of a part stand one after the other.
+    """Division of the bed into parts, one a pin, with the sides of each part in sequence.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -
 
 
 def _counted(counts: Codes) -> tuple[Codes, Codes]:
-    """Return each index as often as its count says, and which time it is."""
+    """Return each index repeated by its count, and the number of the repetition."""
     index = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
     return index, np.arange(len(index)) - first[index]

@@ -34,7 +34,7 @@ TO_AND_FRO = (0.5, -0.53)
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """One feature's heights between the pins, and how far its flanks are away at most."""
+    """Heights of one feature between the pins, and the largest distance of its flanks."""
 
     lattice: Lattice
     off: Floats

@@ -22,7 +22,7 @@ Indices = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """The points of a skin, row by row.
+    """Points of a skin, row by row.
 
     Attributes
     ----------

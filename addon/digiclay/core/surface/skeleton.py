@@ -164,7 +164,7 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
 
 
 def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
-    """Tell whether a line two pins wide goes on from a pin with two neighbours: all beyond them lies ahead.
+    """Return whether a line two pins wide goes on from a pin with two neighbours: all beyond them lies ahead.
 
     Beside a line, what is beyond them lies along it.
     """
@@ -183,7 +183,7 @@ def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], c
 
 
 def _is_simple(code: int, ways: int) -> bool:
-    """Tell whether what is left stays joined as it is without a pin whose neighbours have these bits."""
+    """Return whether what is left stays joined as it is without a pin whose neighbours have these bits."""
     there = [bool(code >> bit & 1) for bit in range(ways)]
     if ways == 6:
         return sum(there[k] and not there[k - 1] for k in range(ways)) == 1
