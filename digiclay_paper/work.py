@@ -120,7 +120,7 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
 
 
 def _numbers(results: Results) -> dict[str, Any]:
-    """Return what was measured, as it is written to ``summary.json``; SI units."""
+    """Return what was measured, as it is written to ``metrics.json``; SI units."""
     return {
         "criterion": {"lag": results.criterion.lag, "rfd": results.criterion.deviation},
         "slow": results.slow,

@@ -28,7 +28,7 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
 
 
 def noted(found: Fitted) -> dict[str, Any]:
-    """Return what ``summary.json`` holds of it."""
+    """Return what ``metrics.json`` holds of it."""
     return {
         "allowed": found.budget,
         "measured": found.error,

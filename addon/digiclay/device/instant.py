@@ -142,7 +142,7 @@ def read(path: Path, index: int = -1) -> Instant:
     Parameters
     ----------
     path : Path
-        The ``history.npz`` in a run's folder; sizes come from the ``schema.toml`` beside it.
+        The ``history.npz`` in a run's folder; sizes come from the ``scene.toml`` beside it.
     index : int, optional
         The row; negative rows count from the last one.
 

@@ -1,1 +1,1 @@
-"""What every other package of the core stands on: errors, quantities, cell modes, files."""
+"""Base of all other packages of the core: errors, quantities, cell modes, files."""

@@ -1,1 +1,1 @@
-"""Many sessions in one call: the last axis of every array is the run."""
+"""Batches: several runs in one call, with the run as the last array axis."""

@@ -1,4 +1,4 @@
-"""Elastic and plastic behaviour of a batch: `run_by_run.elastic` and `run_by_run.plastic`.
+"""Elastic and plastic behaviour of a batch: `control.elastic` and `control.plastic`.
 
 See there for what they do and why.
 """
@@ -28,7 +28,7 @@ REST, HOLD, SPRING, FORCE_FOLLOW = (
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Valve commands for wanted speeds, see `run_by_run.drive.Drive`.
+    """Valve commands for wanted speeds, see `control.drive.Drive`.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Drives:
         return command
 
     def approach(self, error: Floats) -> Floats:
-        """Return the speed that takes a pin to its height, m/s; see `run_by_run.drive.Drive.approach`."""
+        """Return the speed that takes a pin to its height, m/s; see `control.drive.Drive.approach`."""
         speed: Floats = np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
         return speed
 

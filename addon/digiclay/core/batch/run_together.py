@@ -32,7 +32,7 @@ __all__ = ["judge_of", "judge_together", "run_together"]
 
 @dataclass(frozen=True)
 class _End:
-    """Summary of the final state of a run, see `run_together.Ended`."""
+    """Summary of the final state of a run, see `run_scene.Ended`."""
 
     period: int
     memory: Any
@@ -142,7 +142,7 @@ def run_together(
     number : int
         Which of the scenes has come to its end.
     result : Result or DigiclayError
-        As `run_together.run` would return or raise it. Its history is valid until the next result is
+        As `run_scene.run` would return or raise it. Its history is valid until the next result is
         asked for. Its run time is a share, see `_Now`.
     """
     systems, refused = _assembled(scenes)

@@ -106,7 +106,7 @@ def _felt(held: Gathered, rows: Rows) -> Floats:
 
 
 def summary(trace: CellSums, way: Way, grid: Grid, set_point: SetPoint | None) -> dict[str, float | None]:
-    """Return what `summary.compute_metrics` makes of the history that a trace is of.
+    """Return what `compute_metrics` makes of the history that a trace is of.
 
     Parameters
     ----------

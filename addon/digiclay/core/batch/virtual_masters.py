@@ -1,4 +1,4 @@
-"""Method I for a batch: `run_by_run.virtual_master` with an axis for the runs.
+"""Method I for a batch: `control.virtual_master` with an axis for the runs.
 
 See there for what it does and why. Where a single run asks "if", here all runs go both ways, and
 `np.where` or a mask takes what holds.
@@ -38,7 +38,7 @@ IDLE, SPRINGING, SHAPING = (float(phase) for phase in Phase)
 
 
 class Masters(NamedTuple):
-    """The memory of all runs; (b,) each, see `run_by_run.master.Master`."""
+    """The memory of all runs; (b,) each, see `control.master.Master`."""
 
     phase: Floats
     x: Floats
@@ -242,7 +242,7 @@ class VirtualMasters:
         return master, target
 
     def _shape(self, distance: Floats) -> Floats:
-        """Return the profile p(r), see `run_by_run.blister.Blister.shape`."""
+        """Return the profile p(r), see `control.blister.Blister.shape`."""
         blister = self.blister
         if blister.profile == "gaussian":
             bell: Floats = np.exp(distance * distance * (-0.5 / blister.sigma**2))

@@ -27,7 +27,7 @@ Cells = NDArray[np.intp]
 class Rows:
     """Meaning of the rows of a cell's state.
 
-    The first `physics` rows (height first, m) are the continuous state of `alike.Cell`;
+    The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
     then come the commands on their way to the valve, oldest first; the height a cell is
     commanded to, m; the force on it at the end of the last period, N; and what the
     controller and the sensors remember of each cell.

@@ -1,1 +1,1 @@
-"""The continuous model: bed, fluid, supply, valve, cylinder, fingertip, pulp, sensors; their interfaces."""
+"""Continuous model: bed, fluid, supply, valve, cylinder, fingertip, pulp, sensors; their interfaces."""

@@ -153,7 +153,7 @@ class Stepper(Protocol):
         plan : object
             From `plan`.
         driven : ndarray (r + q, n)
-            State rows, see `alike.Cell`, then the commands of the queue, oldest first.
+            State rows, see `physics.Cell`, then the commands of the queue, oldest first.
         near : int
             Number k of cells, the first, that the finger may touch.
         """

@@ -45,7 +45,7 @@ class Result:
     run_time : float
         Time the simulation took, s; neither building nor writing is in it.
     metrics : dict
-        What ``summary.json`` holds; SI units.
+        What ``metrics.json`` holds; SI units.
     """
 
     scene: Scene
@@ -235,7 +235,7 @@ def _metrics(
 
 
 def save(result: Result, folder: Path) -> None:
-    """Write ``schema.toml``, ``history.npz`` and ``summary.json`` into an existing folder.
+    """Write ``scene.toml``, ``history.npz`` and ``metrics.json`` into an existing folder.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Shapes from outside, fitted to a bed: height maps, meshes, arrays."""
+"""Input shapes, fitted to a bed: height maps, meshes, arrays."""

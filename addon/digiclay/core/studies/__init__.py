@@ -1,1 +1,1 @@
-"""Series of sessions: sweeps, batches of jobs, budgets, trials."""
+"""Series of sessions: sweeps, job series, budgets, trials."""

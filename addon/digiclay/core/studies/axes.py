@@ -30,7 +30,7 @@ class Axis:
     Attributes
     ----------
     key : str
-        Section and key, ``run_by_run.force_gain``.
+        Section and key, ``control.force_gain``.
     words : tuple of str
         Its values as a scene file would say them.
     logarithmic : bool

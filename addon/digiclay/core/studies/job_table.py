@@ -1,6 +1,6 @@
 """Jobs of a JOBS file: scenes × methods × settings, each self-contained.
 
-A job's folder holds ``schema.toml``, every parameter of its session, and ``job.toml``, what is
+A job's folder holds ``scene.toml``, every parameter of its session, and ``job.toml``, what is
 made of the run. Whoever has that folder and this package can do the job, on any machine.
 """
 
