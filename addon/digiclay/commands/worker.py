@@ -110,7 +110,7 @@ class Process:
 
 
 class Processes:
-    """The processes of a series: they are asked to stop together, and none is left when the block ends.
+    """All processes of a series: stopped together, and ended at the end of the block.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
 
 @dataclass(frozen=True)
 class Waypoint(Parameters):
-    """Where the fingertip is at one time."""
+    """Pose of the fingertip at one time."""
 
     time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
     position: tuple[float, ...] = quantity(
