@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
+from ..base.arrays import constants
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
@@ -49,7 +49,7 @@ class Blister(Parameters):
         if self.profile == "gaussian":
             bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
             return bell
-        rim, slope, flat = filled(self.cone, distance.shape[-1])
+        rim, slope, flat = constants(self.cone, distance.shape)
         cone: Floats = rim - distance
         cone *= slope
         np.minimum(cone, flat, out=cone)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
-from ..base.counting import some
+from ..base.arrays import any_true, constants
 from ..base.quantity import Parameters, quantity
 
 __all__ = ["Servo", "locked_under_overload"]
@@ -29,7 +28,7 @@ class Servo(Parameters):
 
     def command(self, target: Floats, height: Floats) -> Floats:
         """Return valve commands, shape (n,), for commanded and measured heights, m."""
-        gain, band, most, least, none = filled((self.gain, self.dead_band, 1.0, -1.0, 0.0), target.size)
+        gain, band, most, least, none = constants((self.gain, self.dead_band, 1.0, -1.0, 0.0), target.shape)
         error = target - height
         command: Floats = error * gain
         np.minimum(command, most, out=command)
@@ -52,7 +51,7 @@ def locked_under_overload(command: Floats, force: Floats, limit: float) -> Float
     limit : float
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
-    overload = force >= filled((limit,), force.size)[0]
-    if not some(overload):
+    overload = force >= constants((limit,), force.shape)[0]
+    if not any_true(overload):
         return command
     return np.where(overload & (command > 0.0), 0.0, command)

@@ -13,8 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
-from ..base.counting import how_many, some
+from ..base.arrays import any_true, constants, count_true
 from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
@@ -112,11 +111,11 @@ class VirtualMasterControl:
         if total < known.felt_force:
             return self._alone(master)
         if master.phase is not Phase.IDLE:
-            none = filled(self.limits, force.size)[0]
+            none = constants(self.limits, force.shape)[0]
             far = beyond(master.x, master.y, known.radius * (1.0 + ON_THE_SIDE), place) > none
             far &= force != none
             felt = total
-            if some(far):
+            if any_true(far):
                 felt, x, y = place.dot(np.where(far, none, force)).tolist()[:3]
             if felt >= known.felt_force:
                 x, y = x / felt, y / felt
@@ -176,7 +175,7 @@ class VirtualMasterControl:
 
     def _left_alone(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        rest, band = filled(self.limits, target.size)[-2:]
+        rest, band = constants(self.limits, target.shape)[-2:]
         off = target - rest
         np.abs(off, off)
         # False and True are the codes of these two modes.
@@ -186,9 +185,9 @@ class VirtualMasterControl:
     def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         blister, stroke = self.blister, self.actuator.stroke
-        limits = filled(self.limits, seen.target.size)
+        limits = constants(self.limits, seen.target.shape)
         _, abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = limits
-        edge, formed, spring, follow, froze = filled(CODES, seen.target.size, np.int8)
+        edge, formed, spring, follow, froze = constants(CODES, seen.target.shape, np.int8)
         distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
         inside = distance <= radius
         ring = distance <= edge_radius
@@ -196,7 +195,7 @@ class VirtualMasterControl:
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
         facing = ahead >= abeam
         facing &= ring
-        count = how_many(facing)
+        count = count_true(facing)
         if count:
             master = master.with_edge(float(facing.astype(np.float64).dot(seen.height)) / count)
         frozen = ahead < behind * distance
@@ -205,7 +204,7 @@ class VirtualMasterControl:
         frozen &= inside
         frozen &= seen.force < release
         profile = blister.surface(distance, min(max(master.edge, 0.0), stroke), master.height)
-        if some(frozen):
+        if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
             outgrown = np.maximum if master.height >= master.edge else np.minimum
             np.putmask(profile, frozen, outgrown(profile, seen.target))

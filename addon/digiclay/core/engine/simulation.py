@@ -114,7 +114,7 @@ def _ready(system: System, held: Gathered) -> _Ready:
             Measurement(part.place, part.height, part.force, part.target, part.mode, part.controlled)
             for part in (held.touched, held.all)
         )
-        movement = system.stepper.bind(system.plan, held.driven, held.near)
+        movement = system.stepper.prepare(system.plan, held.driven, held.near)
         known = held.ready[system.plan] = _Ready(touched, everything, movement)
     return known
 
