@@ -148,7 +148,7 @@ def _reach(scene: Scene, position: Floats, following: Floats) -> Floats:
 def _share(blister: Blister, distance: Floats) -> Floats:
     """Return the profile p(d), 0 outside the blister."""
     inside = np.maximum(distance, 0.0)
-    share: Floats = np.where(inside < blister.radius, np.maximum(blister.shape(inside), 0.0), 0.0)
+    share: Floats = np.where(inside < blister.radius, np.maximum(blister.evaluate_profile(inside), 0.0), 0.0)
     return share
 
 

@@ -113,7 +113,7 @@ class Scripted:
         """Return the number of periods done."""
         return 0
 
-    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
+    def locate(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
         """Ask for the whole bed."""
         return memory, (0.0, 0.0, 1.0)
 

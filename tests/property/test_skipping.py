@@ -38,9 +38,9 @@ class Everywhere:
         """Return the inner memory."""
         return self.inner.begin()
 
-    def attend(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float]]:
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float]]:
         """Attend as the inner one does, but ask for all cells."""
-        return self.inner.attend(memory, touched)[0], (0.0, 0.0, 1.0)
+        return self.inner.locate(memory, touched)[0], (0.0, 0.0, 1.0)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Command as the inner one does."""

@@ -40,6 +40,7 @@ def seen(
         REST + (full + target) * 1e-3,
         np.full(25, mode, np.int8),
         np.zeros((behaviour.rows, 25)),
+        np.arange(25),
     )
 
 
@@ -50,7 +51,7 @@ def middle(value: float) -> np.ndarray:
 
 def orders(behaviour: Any, measurement: Measurement) -> Orders:
     """Return what a behaviour makes of a first measurement."""
-    memory, _ = behaviour.attend(behaviour.begin(), measurement)
+    memory, _ = behaviour.locate(behaviour.begin(), measurement)
     return behaviour.command(memory, measurement)[1]
 
 
@@ -77,10 +78,8 @@ def test_commands_are_openings(method: str) -> None:
 def test_an_untouched_bed_at_rest_is_left_alone(method: str) -> None:
     behaviour = control(method)
     untouched = seen(behaviour)
-    nobody = Measurement(
-        untouched.place[:, :0], *(untouched.height[:0],) * 3, untouched.mode[:0], untouched.own[:, :0]
-    )
-    memory, disc = behaviour.attend(behaviour.begin(), nobody)
+    nobody = Measurement(*(values[..., :0] for values in untouched))
+    memory, disc = behaviour.locate(behaviour.begin(), nobody)
     given = behaviour.command(memory, untouched)[1]
     assert disc is None
     assert not given.command.any()
@@ -198,9 +197,9 @@ def test_a_viscous_cell_relaxes_exactly_over_a_period() -> None:
 def test_the_cells_asked_for_hold_all_displaced_ones() -> None:
     behaviour = control("viscous")
     dent = seen(behaviour, target=middle(-5.0), force=middle(20.0))
-    memory, _ = behaviour.attend(behaviour.begin(), dent)
+    memory, _ = behaviour.locate(behaviour.begin(), dent)
     memory, _ = behaviour.command(memory, dent)
-    _, (x, y, radius) = behaviour.attend(memory, dent)
+    _, (x, y, radius) = behaviour.locate(memory, dent)
     # The four neighbours, 3 mm away, in a box of 6 x 6 mm, and a margin of two pitches.
     assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert radius == pytest.approx(np.hypot(3e-3, 3e-3) + 6e-3)
@@ -213,7 +212,7 @@ def cycle(behaviour: Any, measurement: Measurement) -> Orders:
     """Return the orders at the end of a cycle of listening."""
     memory = behaviour.begin()
     for _ in range(2):
-        memory, _ = behaviour.attend(memory, measurement)
+        memory, _ = behaviour.locate(memory, measurement)
         memory, given = behaviour.command(memory, measurement)
     return given
 
@@ -246,8 +245,8 @@ def test_a_pin_let_go_stays_where_it_was_let_go() -> None:
     still = seen(behaviour, height=middle(-0.5))
     memory, target = behaviour.begin(), still.target
     for _ in range(12):
-        now = Measurement(still.place, still.height, still.force, target, still.mode, still.own)
-        memory, _ = behaviour.attend(memory, now)
+        now = still._replace(target=target)
+        memory, _ = behaviour.locate(memory, now)
         memory, given = behaviour.command(memory, now)
         target = given.target
     assert target[12] == pytest.approx(REST - 0.5e-3)
@@ -265,7 +264,7 @@ def test_a_listening_pin_goes_down_as_fast_as_up() -> None:
 def test_a_listening_pin_s_speeds_are_alike_under_unlike_reservoirs() -> None:
     table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
     drive = assemble(resolve(table)).controller.drive
-    up, down = drive.at_speed(np.array([8e-3, -8e-3]))
+    up, down = drive.open_for(np.array([8e-3, -8e-3]))
     # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the opening.
     # The conduit and the table's interpolation change it by some percent.
     assert -down / up == pytest.approx(2.0, rel=0.05)

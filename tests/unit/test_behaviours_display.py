@@ -41,7 +41,7 @@ def test_a_move_waits_no_longer_than_its_patience() -> None:
     behaviour = control(shape="pyramid", refresh="one_time", patience=0.05)
     bed, full = grid(Layout(5, 5)), np.full(25, 40e-3)
     place, mode = bed.place(np.arange(25)), np.zeros(25, np.int8)
-    stuck = Measurement(place, full, np.zeros(25), full, mode, np.zeros((0, 25)))
+    stuck = Measurement(place, full, np.zeros(25), full, mode, np.zeros((0, 25)), np.arange(25))
     memory = behaviour.begin()
     for _ in range(5 * 10 + 1):
         memory, _ = behaviour.command(memory, stuck)
@@ -51,7 +51,9 @@ def test_a_move_waits_no_longer_than_its_patience() -> None:
 def test_a_move_waits_as_long_as_its_patience() -> None:
     behaviour = control(shape="pyramid", refresh="one_time", patience=0.0525)
     place, full = grid(Layout(5, 5)).place(np.arange(25)), np.full(25, 40e-3)
-    stuck = Measurement(place, full, np.zeros(25), full, np.zeros(25, np.int8), np.zeros((0, 25)))
+    stuck = Measurement(
+        place, full, np.zeros(25), full, np.zeros(25, np.int8), np.zeros((0, 25)), np.arange(25)
+    )
     memory, moves = behaviour.begin(), []
     for _ in range(25):
         memory, _ = behaviour.command(memory, stuck)
@@ -93,7 +95,9 @@ def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_fing
     place, full = grid(Layout(1, 1)).place(np.arange(1)), np.full(1, 40e-3)
     mode, own, follows = np.full(1, Mode.FORCE_FOLLOW, np.int8), np.zeros((behaviour.rows, 1)), []
     for _ in range(6):
-        _, given = behaviour.command(None, Measurement(place, full, np.zeros(1), full, mode, own))
+        _, given = behaviour.command(
+            None, Measurement(place, full, np.zeros(1), full, mode, own, np.arange(1))
+        )
         mode = given.mode
         follows.append(bool(mode[0] == Mode.FORCE_FOLLOW))
     # 4 periods of 5 ms are within 22.5 ms, 5 are not.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from digiclay.core.control.drive import Drive
 from digiclay.core.control.named_shapes import SHAPES, named
-from digiclay.core.control.neighbours import cells_at, exchange
+from digiclay.core.control.viscous import make_exchange
 from digiclay.core.model.layout import Grid, Layout, grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -36,18 +36,18 @@ def test_a_pin_without_load_moves_at_the_speed_asked_for(gap: str, share: float)
     system = assemble(resolve(table))
     cell, drive = system.cell, system.controller.drive
     wanted = np.array([share * drive.up[-1]])
-    opening = drive.at_speed(wanted)
+    opening = drive.open_for(wanted)
     speed = cell.flow.flow(opening, cell.supply.pressure(opening)) / cell.actuator.area
     # A chord of the parabola between two of 128 steps is off by at most 1/4 of a step squared, 1.5e-5.
     assert speed == pytest.approx(wanted, abs=2e-5 * drive.up[-1])
 
 
 def test_more_than_a_pin_can_do_opens_the_valve_fully() -> None:
-    assert driven().at_speed(np.array([-1.0, 1.0])).tolist() == [-1.0, 1.0]
+    assert driven().open_for(np.array([-1.0, 1.0])).tolist() == [-1.0, 1.0]
 
 
 def test_no_speed_is_a_shut_valve() -> None:
-    assert driven().at_speed(np.zeros(1))[0] == 0.0
+    assert driven().open_for(np.zeros(1))[0] == 0.0
 
 
 def test_a_height_within_the_dead_band_is_left_alone() -> None:
@@ -60,17 +60,10 @@ def test_a_height_amiss_is_mended_with_the_settling_time() -> None:
 
 def test_reservoirs_that_cannot_raise_a_pin_give_finite_commands() -> None:
     drive = driven(supply={"high": -0.1e5, "low": -0.5e5})
-    assert np.all(np.abs(drive.at_speed(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
+    assert np.all(np.abs(drive.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
 
 
 # Neighbours
-
-
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_cells_are_found_again_by_where_they_stand(arrangement: str) -> None:
-    plan = bed(arrangement, 6, 9)
-    cells = np.random.default_rng(2).permutation(plan.count)
-    assert np.array_equal(cells_at(plan, plan.place(cells)), cells)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -79,7 +72,7 @@ def test_neighbours_are_the_nearest_cells(arrangement: str) -> None:
     cells = np.random.default_rng(3).permutation(plan.count)
     found = {
         frozenset((int(cells[one]), int(cells[other])))
-        for ones, others, _ in exchange(plan, 1e-5, 5e-3).pairs(cells)
+        for ones, others, _ in make_exchange(plan, 1e-5, 5e-3).find_pairs(cells)
         for one, other in zip(ones, others, strict=True)
     }
     place = plan.positions
@@ -97,7 +90,7 @@ def test_no_pair_of_neighbours_exchanges_twice(arrangement: str) -> None:
     plan = bed(arrangement)
     pairs = [
         frozenset(map(int, pair))
-        for ones, others, _ in exchange(plan, 1e-5, 5e-3).pairs(np.arange(plan.count))
+        for ones, others, _ in make_exchange(plan, 1e-5, 5e-3).find_pairs(np.arange(plan.count))
         for pair in zip(ones, others, strict=True)
     ]
     assert len(pairs) == len(set(pairs))
@@ -106,12 +99,12 @@ def test_no_pair_of_neighbours_exchanges_twice(arrangement: str) -> None:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_values_spread_alike_along_x_and_y(arrangement: str) -> None:
     plan = bed(arrangement, 31, 31)
-    rule, cells = exchange(plan, 10e-6, 5e-3), np.arange(plan.count)
+    rule, cells = make_exchange(plan, 10e-6, 5e-3), np.arange(plan.count)
     values = np.zeros(plan.count)
     centre = plan.count // 2
     values[centre] = 1.0
     for _ in range(50):
-        values = rule.evened(cells, values)
+        values = rule.even_out(cells, values)
     x, y = plan.x - plan.x[centre], plan.y - plan.y[centre]
     spread = np.array([values @ x**2, values @ y**2])
     # Variance 2 D t = 2 x 10 mm²/s x 0.25 s; the limit on the rates takes 1 - (1 - e^-a)/a of it, with
@@ -124,7 +117,7 @@ def test_values_spread_alike_along_x_and_y(arrangement: str) -> None:
 def test_no_exchange_overshoots_however_long_the_period(arrangement: str, period: float) -> None:
     plan = bed(arrangement)
     values = np.where(np.arange(plan.count) % 2, 1.0, 0.0)
-    evened = exchange(plan, 10e-6, period).evened(np.arange(plan.count), values)
+    evened = make_exchange(plan, 10e-6, period).even_out(np.arange(plan.count), values)
     assert evened.min() >= -1e-12  # rounding
     assert evened.max() <= 1.0 + 1e-12
 
@@ -133,14 +126,14 @@ def test_what_neighbours_exchange_adds_up_to_nothing() -> None:
     plan = bed("hexagonal")
     cells = np.random.default_rng(4).permutation(plan.count)[:30]
     values = np.random.default_rng(5).normal(size=30)
-    evened = exchange(plan, 50e-6, 5e-3).evened(cells, values)
+    evened = make_exchange(plan, 50e-6, 5e-3).even_out(cells, values)
     assert evened.sum() == pytest.approx(values.sum(), abs=1e-13)  # rounding of 30 numbers of size 1
     assert np.abs(evened - values).max() > 0.01
 
 
 def test_a_bed_of_one_cell_has_no_neighbours() -> None:
-    rule = exchange(bed("aligned", 1, 1), 1e-5, 5e-3)
-    assert rule.evened(np.zeros(1, np.intp), np.ones(1)).tolist() == [1.0]
+    rule = make_exchange(bed("aligned", 1, 1), 1e-5, 5e-3)
+    assert rule.even_out(np.zeros(1, np.intp), np.ones(1)).tolist() == [1.0]
 
 
 # Shapes

@@ -32,14 +32,13 @@ def seen(
     for cell, value in (mode or {}).items():
         modes[cell] = value
     level = np.full(bed.count, REST)
-    return Measurement(
-        bed.place(np.arange(bed.count)), level, forces, level.copy(), modes, np.zeros((1, bed.count))
-    )
+    cells = np.arange(bed.count)
+    return Measurement(bed.place(cells), level, forces, level.copy(), modes, np.zeros((1, bed.count)), cells)
 
 
 def ordered(measured: Measurement, memory: Patch | None = None) -> tuple[Patch, Orders]:
-    """Let the controller attend and command."""
-    memory, _ = CONTROL.attend(memory or CONTROL.begin(), measured)
+    """Let the controller locate the finger and command."""
+    memory, _ = CONTROL.locate(memory or CONTROL.begin(), measured)
     return CONTROL.command(memory, measured)
 
 
@@ -134,18 +133,18 @@ def test_a_cell_behind_a_travelling_finger_is_frozen_at_its_command() -> None:
     modes = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 3: Mode.BLISTER}
     measured = seen({MIDDLE: 0.04}, modes)
     measured.target[MIDDLE - 3] = 47e-3
-    memory, _ = CONTROL.attend(Patch(x=-2e-3, heading=Heading(-2e-3), felt=True), measured)
+    memory, _ = CONTROL.locate(Patch(x=-2e-3, heading=Heading(-2e-3), felt=True), measured)
     _, orders = CONTROL.command(memory, measured)
     assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
 
 
 def test_a_finger_that_jumps_farther_than_r_vm_is_counted_as_lost() -> None:
-    memory, _ = CONTROL.attend(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))
+    memory, _ = CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))
     assert memory.losses == 1
 
 
 def test_the_controlled_disc_reaches_the_edge_of_the_outermost_pressed_cell() -> None:
-    _, disc = CONTROL.attend(CONTROL.begin(), seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}))
+    _, disc = CONTROL.locate(CONTROL.begin(), seen({MIDDLE - 1: 0.1, MIDDLE + 1: 0.1}))
     assert disc == pytest.approx((0.0, 0.0, 3e-3 + BLISTER.edge_radius), abs=1e-9)
 
 
@@ -187,5 +186,5 @@ def test_a_following_cell_counts_to_the_patch_with_what_it_reads() -> None:
     # A finger that rises presses with less than the noise hides; where it is shows nevertheless.
     following = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE + 1: Mode.CRITICAL}
     measured = seen({MIDDLE: 10e-3, MIDDLE + 1: 10e-3, MIDDLE + 3: 24e-3}, following)
-    memory, _ = NOISY.attend(NOISY.begin(), measured)
+    memory, _ = NOISY.locate(NOISY.begin(), measured)
     assert memory.x - BED.x[MIDDLE] == pytest.approx(1.5e-3, abs=1e-12)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.control.master import Master, Phase
-from digiclay.core.control.master_cell import master_cell
+from digiclay.core.control.master_cell import make_master_cell
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.fluid import Fluid
@@ -47,17 +47,17 @@ def test_the_speed_is_that_of_the_valve_s_flow_law(parts: dict[str, Any], openin
     supply = one.supply.high if opening > 0.0 else one.supply.low
     flow = one.flow.flow(np.array([opening]), np.array([supply]))[0]
     # Another order of the same few products: rounding.
-    assert master_cell(one, 5e-3).speed(opening) == pytest.approx(flow / one.actuator.area, rel=1e-14)
+    assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(flow / one.actuator.area, rel=1e-14)
 
 
 @pytest.mark.parametrize("parts", CELLS.values(), ids=CELLS.keys())
 def test_a_shut_valve_stands_still(parts: dict[str, Any]) -> None:
-    assert master_cell(cell(**parts), 5e-3).speed(0.0) == 0.0
+    assert make_master_cell(cell(**parts), 5e-3).speed(0.0) == 0.0
 
 
 def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
     one, period, start, command = cell(), 5e-3, 0.3, 0.9
-    found, _ = master_cell(one, period).after(40e-3, start, command)
+    found, _ = make_master_cell(one, period).advance(40e-3, start, command)
     times = (np.arange(2000) + 0.5) / 2000 * period
     opening = command + (start - command) * np.exp(-times / one.lag.time_constant)
     flow = one.flow.flow(opening, np.full(2000, one.supply.high))
@@ -67,16 +67,16 @@ def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
 
 def test_felt_again_it_is_elsewhere_and_no_longer_alone_and_else_the_same() -> None:
     heading = Heading(0.1, 0.2, 1.0, 0.0)
-    assert MASTER.at(21.0, 22.0, heading) == MASTER._replace(x=21.0, y=22.0, heading=heading, alone=0)
+    assert MASTER.move_to(21.0, 22.0, heading) == MASTER._replace(x=21.0, y=22.0, heading=heading, alone=0)
 
 
 def test_led_it_has_another_height_and_opening_and_phase_and_is_else_the_same() -> None:
-    led = MASTER.led(Phase.SHAPING, 23.0, 0.5)
+    led = MASTER.lead(Phase.SHAPING, 23.0, 0.5)
     assert led == MASTER._replace(phase=Phase.SHAPING, height=23.0, opening=0.5)
 
 
 def test_the_height_it_is_led_to_with_the_finger_on_it_is_where_the_finger_was_felt() -> None:
-    assert MASTER._replace(alone=0).led(Phase.SHAPING, 23.0, 0.5).felt == 23.0
+    assert MASTER._replace(alone=0).lead(Phase.SHAPING, 23.0, 0.5).felt == 23.0
 
 
 def test_in_another_surface_only_its_edge_is_another() -> None:

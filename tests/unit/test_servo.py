@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.control.servo import Servo, locked_under_overload
+from digiclay.core.control.servo import Tracking, lock_overloaded
 
 #: What the high reservoir can lift: 0.5 bar on a bore of 2 mm.
 LIFT = 0.157
@@ -12,7 +12,7 @@ LIFT = 0.157
 
 def commands(error: list[float]) -> list[float]:
     """Return the commands for height errors in mm."""
-    return Servo().command(50e-3 + np.array(error) * 1e-3, np.full(len(error), 50e-3)).tolist()
+    return Tracking().command(50e-3 + np.array(error) * 1e-3, np.full(len(error), 50e-3)).tolist()
 
 
 def test_the_command_is_the_gain_times_the_error() -> None:
@@ -32,17 +32,17 @@ def test_an_error_just_beyond_the_dead_band_is_not() -> None:
 
 
 def test_an_overloaded_cell_is_locked_instead_of_raised() -> None:
-    locked = locked_under_overload(np.array([0.5, 0.5]), np.array([0.16, 0.15]), LIFT)
+    locked = lock_overloaded(np.array([0.5, 0.5]), np.array([0.16, 0.15]), LIFT)
     assert locked.tolist() == [0.0, 0.5]
 
 
 def test_an_overloaded_cell_may_be_lowered() -> None:
-    assert locked_under_overload(np.array([-0.5]), np.array([1.0]), LIFT).tolist() == [-0.5]
+    assert lock_overloaded(np.array([-0.5]), np.array([1.0]), LIFT).tolist() == [-0.5]
 
 
 def test_without_any_cell_there_is_nothing_to_lock() -> None:
-    assert locked_under_overload(np.empty(0), np.empty(0), LIFT).size == 0
+    assert lock_overloaded(np.empty(0), np.empty(0), LIFT).size == 0
 
 
 def test_without_gain_nothing_moves() -> None:
-    assert Servo(gain=0.0).command(np.ones(3), np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
+    assert Tracking(position_gain=0.0).command(np.ones(3), np.zeros(3)).tolist() == [0.0, 0.0, 0.0]

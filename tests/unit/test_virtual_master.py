@@ -25,39 +25,41 @@ def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measu
     """Return a measurement of pressed cells: x, y in mm and force in N."""
     x, y, force = np.array(presses).reshape(-1, 3).T
     level, rest = np.full(x.size, height * 1e-3), np.full(x.size, Mode.REST, np.int8)
-    return Measurement(place(x * 1e-3, y * 1e-3), level, force, level, rest, np.empty((0, x.size)))
+    return Measurement(
+        place(x * 1e-3, y * 1e-3), level, force, level, rest, np.empty((0, x.size)), np.arange(x.size)
+    )
 
 
 # Locate
 
 
 def test_the_master_is_at_the_centroid_of_the_forces() -> None:
-    memory, _ = control().attend(control().begin(), touched((0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)))
+    memory, _ = control().locate(control().begin(), touched((0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)))
     assert (memory.x, memory.y) == pytest.approx((0.75e-3, 1.5e-3), abs=1e-15)
 
 
 def test_at_first_touch_all_cells_count() -> None:
-    memory, _ = control().attend(control().begin(), touched((-20, 0, 0.1), (20, 0, 0.3)))
+    memory, _ = control().locate(control().begin(), touched((-20, 0, 0.1), (20, 0, 0.3)))
     assert memory.x == pytest.approx(10e-3, abs=1e-15)
 
 
 def test_later_only_cells_near_the_master_count() -> None:
-    memory, _ = control().attend(master(), touched((0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)))
+    memory, _ = control().locate(master(), touched((0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)))
     assert memory.x == pytest.approx(3e-3, abs=1e-15)
 
 
 def test_the_reference_is_the_surface_at_first_touch() -> None:
-    memory, _ = control().attend(control().begin(), touched((0, 0, 0.05), height=52.0))
+    memory, _ = control().locate(control().begin(), touched((0, 0, 0.05), height=52.0))
     assert memory.reference == pytest.approx(52e-3)
 
 
 def test_a_force_too_small_to_be_a_finger_starts_nothing() -> None:
-    memory, disc = control().attend(control().begin(), touched((0, 0, 0.9e-3)))
+    memory, disc = control().locate(control().begin(), touched((0, 0, 0.9e-3)))
     assert (memory.phase, disc) == (Phase.IDLE, None)
 
 
 def test_the_cells_asked_for_reach_to_the_edge_ring() -> None:
-    _, disc = control().attend(master(), touched((0, 0, 0.4)))
+    _, disc = control().locate(master(), touched((0, 0, 0.4)))
     assert disc == pytest.approx((0.0, 0.0, 18.5e-3))
 
 
@@ -65,31 +67,31 @@ def test_the_cells_asked_for_reach_to_the_edge_ring() -> None:
 
 
 def test_first_touch_starts_the_virtual_spring() -> None:
-    memory, _ = control().attend(control().begin(), touched((0, 0, 0.1)))
+    memory, _ = control().locate(control().begin(), touched((0, 0, 0.1)))
     assert memory.phase is Phase.SPRING
 
 
 def test_shaping_starts_at_the_set_point() -> None:
     memory = master(phase=Phase.SPRING)
-    phases = [control().attend(memory, touched((0, 0, force)))[0].phase for force in (0.399, 0.401)]
+    phases = [control().locate(memory, touched((0, 0, force)))[0].phase for force in (0.399, 0.401)]
     assert phases == [Phase.SPRING, Phase.SHAPING]
 
 
 def test_the_force_that_is_held_is_that_on_all_touched_cells() -> None:
     # The centroid takes those within r_VM of the master alone; a flank pressed farther off is felt as well.
-    memory, _ = control().attend(master(phase=Phase.SPRING), touched((0, 0, 0.3), (9, 0, 0.11)))
+    memory, _ = control().locate(master(phase=Phase.SPRING), touched((0, 0, 0.3), (9, 0, 0.11)))
     assert (memory.phase, memory.x) == (Phase.SHAPING, 0.0)
 
 
 def test_shaping_goes_on_below_the_set_point() -> None:
-    assert control().attend(master(), touched((0, 0, 0.1)))[0].phase is Phase.SHAPING
+    assert control().locate(master(), touched((0, 0, 0.1)))[0].phase is Phase.SHAPING
 
 
 def settled(memory: Master, force: float, count: int = 600) -> Master:
     """Return the master after some periods of a steady force."""
     method = control()
     for _ in range(count):
-        memory, _ = method.attend(memory, touched((0, 0, force)))
+        memory, _ = method.locate(memory, touched((0, 0, force)))
     return memory
 
 
@@ -137,7 +139,7 @@ def moved(memory: Master, *path_x: float) -> Master:
     """Return the master after the finger has been at some x, mm, one period each."""
     method = control()
     for x in path_x:
-        memory, _ = method.attend(memory, touched((x, 0, 0.4)))
+        memory, _ = method.locate(memory, touched((x, 0, 0.4)))
     return memory
 
 
@@ -163,7 +165,7 @@ def test_a_fast_finger_gets_its_direction_in_one_period() -> None:
 def alone(memory: Master, count: int) -> Master:
     """Return the master after some periods without a finger."""
     for _ in range(count):
-        memory, _ = control().attend(memory, touched())
+        memory, _ = control().locate(memory, touched())
     return memory
 
 
@@ -182,17 +184,17 @@ def test_a_finger_lost_before_shaping_is_no_loss() -> None:
 
 
 def test_a_finger_felt_again_in_time_is_not_lost() -> None:
-    memory, _ = control().attend(alone(master(), 9), touched((0, 0, 0.4)))
+    memory, _ = control().locate(alone(master(), 9), touched((0, 0, 0.4)))
     assert alone(memory, 10).losses == 0
 
 
 def test_a_finger_that_comes_down_elsewhere_starts_anew_and_is_counted() -> None:
-    memory, _ = control().attend(master(), touched((-18, 0, 0.1), height=43.0))
+    memory, _ = control().locate(master(), touched((-18, 0, 0.1), height=43.0))
     assert (memory.phase, memory.x, memory.losses) == (Phase.SPRING, pytest.approx(-18e-3), 1)
 
 
 def test_a_new_touch_after_a_loss_starts_the_virtual_spring() -> None:
-    memory, _ = control().attend(alone(master(), 11), touched((3, 3, 0.1)))
+    memory, _ = control().locate(alone(master(), 11), touched((3, 3, 0.1)))
     assert (memory.phase, memory.losses) == (Phase.SPRING, 1)
 
 
@@ -205,17 +207,17 @@ def hearing(floor: float) -> VirtualMasterControl:
 
 
 def test_a_reading_that_may_be_noise_is_no_finger() -> None:
-    phases = [hearing(10e-3).attend(Master(), touched((0, 0, force)))[0].phase for force in (9.9e-3, 10.1e-3)]
+    phases = [hearing(10e-3).locate(Master(), touched((0, 0, force)))[0].phase for force in (9.9e-3, 10.1e-3)]
     assert phases == [Phase.IDLE, Phase.SPRING]
 
 
 def test_readings_that_may_be_noise_do_not_add_up_to_a_finger() -> None:
-    memory, _ = hearing(10e-3).attend(Master(), touched(*[(3.0 * x, 0, 9e-3) for x in range(5)]))
+    memory, _ = hearing(10e-3).locate(Master(), touched(*[(3.0 * x, 0, 9e-3) for x in range(5)]))
     assert memory.phase is Phase.IDLE
 
 
 def test_noise_does_not_draw_the_master_aside() -> None:
-    memory, _ = hearing(10e-3).attend(master(), touched((0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)))
+    memory, _ = hearing(10e-3).locate(master(), touched((0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)))
     assert memory.x == pytest.approx(-1.5e-3, abs=1e-15)
 
 
@@ -223,12 +225,12 @@ def test_what_noise_hides_next_to_the_master_counts_to_the_force_that_is_held() 
     # 0.39 N are felt: what lies below the floor makes it more or less than the set point, 0.4 N.
     start = master(phase=Phase.SPRING)
     near = [touched((0, 0, 0.39), (6, 0, hidden), (-6, 0, 9e-3)) for hidden in (2e-3, -2e-3)]
-    phases = [hearing(10e-3).attend(start, seen)[0].phase for seen in near]
+    phases = [hearing(10e-3).locate(start, seen)[0].phase for seen in near]
     assert phases == [Phase.SHAPING, Phase.SPRING]
 
 
 def test_what_noise_hides_farther_off_does_not() -> None:
     start = master(phase=Phase.SPRING)
     far = [touched((0, 0, 0.395), (9, 0, force)) for force in (9.9e-3, 10.1e-3)]
-    phases = [hearing(10e-3).attend(start, seen)[0].phase for seen in far]
+    phases = [hearing(10e-3).locate(start, seen)[0].phase for seen in far]
     assert phases == [Phase.SPRING, Phase.SHAPING]

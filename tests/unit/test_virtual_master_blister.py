@@ -22,8 +22,8 @@ BESIDE = {"x": 0.4e-3, "y": 0.2e-3}
 def bed(height: float = 40.0, mode: Mode = Mode.REST) -> Measurement:
     """Return a measurement of a whole bed that nobody touches."""
     level, modes = np.full(BED.count, height * 1e-3), np.full(BED.count, mode, np.int8)
-    places = BED.place(np.arange(BED.count))
-    return Measurement(places, level, np.zeros(BED.count), level.copy(), modes, np.empty((0, BED.count)))
+    cells, free, own = np.arange(BED.count), np.zeros(BED.count), np.empty((0, BED.count))
+    return Measurement(BED.place(cells), level, free, level.copy(), modes, own, cells)
 
 
 def at(x: float, y: float) -> int:
@@ -45,7 +45,7 @@ def test_cells_of_the_blister_are_commanded_to_its_profile(profile: str) -> None
     blister = Blister(profile=profile)
     _, orders = created(master(), bed(), blister)
     inside = np.hypot(BED.x, BED.y) <= 15e-3
-    expected = 40e-3 + blister.shape(np.hypot(BED.x, BED.y)[inside]) * 5e-3
+    expected = 40e-3 + blister.evaluate_profile(np.hypot(BED.x, BED.y)[inside]) * 5e-3
     # A circle may be widened by a billionth, for the sake of cells exactly on it.
     assert orders.target[inside] == pytest.approx(expected, abs=1e-10)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.base.quantity import Parameters, quantities
-from ..core.control.master_cell import master_cell
+from ..core.control.master_cell import make_master_cell
 from ..core.engine.simulation import System
 from ..core.scene.assembly import assemble
 from ..core.scene.recorder import available_memory, bytes_needed
@@ -51,14 +51,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def description(scene: Scene, system: System) -> Iterator[str]:
-    """Give the lines that describe a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    system : System
-        Assembled from it.
-    """
+    """Give the lines that describe a scene."""
     yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
     yield f"\nThe line from finger to pins (preset {scene.preset})"
     for place, section in PLACES:
@@ -94,7 +87,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
 def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     """Give what a pin can do, and how long the bed takes over it."""
     actuator, supply = scene.actuator, scene.supply
-    speed = master_cell(system.cell, system.period).speed
+    speed = make_master_cell(system.cell, system.period).speed
     up, down = speed(1.0), 0.0 - speed(-1.0)
     yield "free speed", f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load"
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
@@ -144,15 +137,7 @@ def _parameters(part: Parameters) -> str:
 
 
 def human(value: object, unit: str) -> str:
-    """Write a value in the unit people read.
-
-    Parameters
-    ----------
-    value : object
-        In SI.
-    unit : str
-        SI unit; empty where there is none.
-    """
+    """Write a value in the unit people read."""
     factor, name = READ.get(unit, (1.0, unit))
     return f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)
 

@@ -61,15 +61,7 @@ class Card:
 
 
 def page(title: str, summary: str, cards: Sequence[Card]) -> str:
-    """Return the page of a batch.
-
-    Parameters
-    ----------
-    title : str
-    summary : str
-    cards : sequence of Card
-        One a job.
-    """
+    """Return the page of a batch."""
     return "\n".join(
         [
             "<!doctype html>",

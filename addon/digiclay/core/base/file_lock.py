@@ -132,14 +132,6 @@ def held_by_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[
 
     What another machine holds has to be removed by hand when that one has crashed: the refusal says so.
     The parameters are those of `held`.
-
-    Parameters
-    ----------
-    path : Path
-    refusal : str
-        What is said when another process holds it.
-    patience : float
-        How long to wait for it, s.
     """
     deadline = time.monotonic() + patience
     while not _recorded(path):

@@ -16,12 +16,12 @@ from ..engine.state import Rows
 from ..engine.system import System
 from ..model.interfaces import Measurement
 from . import beds
+from .alike import Movement, Touches
 from .beds import NO_DISC, Beds, Disc, Gathered
 from .broadcasting import Floats, numbers
 from .fingers import Fingers, undersides
-from .movement import BatchMovement
 from .padding import Gathering, taken_along, taking_part
-from .run_by_run import StackedController
+from .run_by_run import join_discs
 
 __all__ = ["Stack", "advance", "begin", "blow_up", "broken", "follow", "kept"]
 
@@ -35,23 +35,27 @@ class Stack:
     systems : tuple of System
         Those of the runs.
     rows : Rows
-    controller : StackedController or None
-        None: every valve stays shut.
-    plan : object
-        Of the steppers; the first run's own where the cells of all runs are alike.
+    touch : Touches or None
+    pulp_rows : slice
+        The rows that the relaxation owns.
+    controller : object
+        From `stack.control`; None: every valve stays shut.
+    movement : Movement
     gathering : Gathering
     """
 
     systems: tuple[System, ...]
     rows: Rows
-    controller: StackedController | None
-    plan: Any
+    touch: Touches | None
+    pulp_rows: slice
+    controller: Any
+    movement: Movement
     gathering: Gathering
 
 
 def begin(stack: Stack) -> Beds:
     """Return the beds before the sessions."""
-    memory = stack.controller.begin() if stack.controller else None
+    memory = [system.controller.begin() if system.controller else None for system in stack.systems]
     heights = numbers([system.cell.actuator.rest_height for system in stack.systems])
     return beds.at_rest(stack.rows, stack.systems[0].grid.count, heights, memory)
 
@@ -66,7 +70,7 @@ def advance(stack: Stack, state: Beds, coming: Fingers | None) -> Beds:
     coming : Fingers or None
         How the fingers come in some periods, this one among them.
     """
-    memory, control = _attend(stack, state)
+    memory, control = _locate(stack, state)
     window = coming.window[state.period - coming.first] if coming else None
     held = taking_part(stack.gathering, state, window, control)
     if held.cells.size:
@@ -77,21 +81,19 @@ def advance(stack: Stack, state: Beds, coming: Fingers | None) -> Beds:
 
 def _move(stack: Stack, held: Gathered, coming: Fingers | None, period: int) -> None:
     """Move the gathered cells on by a control period, and work out the forces at its end."""
-    count = held.near
+    count, driven = held.near, held.block[stack.rows.driven]
     none = np.empty((stack.systems[0].instants.size, 0, held.cells.shape[1]))
     under = undersides(coming, period, held.place[:, :count]) if coming and count else none
-    held.block[stack.rows.force, :count] = _movement(stack, held)(under)
-
-
-def _movement(stack: Stack, held: Gathered) -> BatchMovement:
-    """Return what moves the gathered cells: prepared once for each set."""
-    known: BatchMovement | None = held.ready.get(stack.plan)
-    if known is None:
-        first, driven = stack.systems[0], held.block[stack.rows.driven]
-        alike, valve = stack.plan is first.plan, first.cell.lag_rows.start
-        known = BatchMovement(first.stepper, stack.plan, alike, driven, held.near, valve)
-        held.ready[stack.plan] = known
-    return known
+    # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
+    valves = driven[stack.systems[0].cell.lag_rows.start :, count:]
+    awake = np.einsum("rwb,rwb->w", valves, valves)
+    chosen = np.concatenate([np.arange(count), count + np.flatnonzero(awake)])
+    moved = driven.take(chosen, axis=1)
+    stack.movement.advance(moved, under)
+    driven[:, chosen] = moved
+    if stack.touch and count:
+        near = held.block[:, :count]
+        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
 
 
 def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> Beds:
@@ -114,23 +116,24 @@ def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> B
     if held.cells.size:
         _queue(held.block[rows.commands], leader.gathered.block[rows.command])
         _move(stack, held, coming, state.period)
-    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, None)
+    return Beds(state.period + 1, state.rows, state.modes, state.aged, held, state.memory)
 
 
-def _attend(stack: Stack, state: Beds) -> tuple[Any, Disc]:
+def _locate(stack: Stack, state: Beds) -> tuple[Any, Disc]:
     """Let the controllers take in the touched cells; return their memory and the discs they will control."""
     if stack.controller is None:
-        return None, NO_DISC
+        return state.memory, NO_DISC
     touched = _measured(stack, state.gathered, state.gathered.near)
-    memory, disc = stack.controller.attend(state.memory, touched)
-    return memory, disc
+    memory, discs = stack.controller.locate(state.memory, touched)
+    return memory, join_discs(discs)
 
 
 def _measured(stack: Stack, held: Gathered, count: int) -> Measurement:
     """Measure the first `count` of the gathered cells of every run."""
     rows, block = stack.rows, held.block[:, :count]
     mode, place, own = held.mode[:count], held.place[:, :count], block[rows.controlled]
-    return Measurement(place, block[0], block[rows.force], block[rows.target], mode, own)
+    seen = block[0], block[rows.force], block[rows.target]
+    return Measurement(place, *seen, mode, own, held.cells[:count])
 
 
 def _command(stack: Stack, held: Gathered, memory: Any) -> Any:
@@ -177,14 +180,12 @@ def blow_up(stack: Stack, state: Beds, run: int) -> DivergenceError:
     )
 
 
-def kept(state: Beds, controller: StackedController | None, runs: Sequence[int]) -> Beds:
+def kept(state: Beds, runs: Sequence[int]) -> Beds:
     """Return the beds of some of the runs.
 
     Parameters
     ----------
     state : Beds
-    controller : StackedController or None
-        Of all runs.
     runs : sequence of int
     """
     chosen, held = np.array(runs, np.intp), state.gathered
@@ -200,7 +201,7 @@ def kept(state: Beds, controller: StackedController | None, runs: Sequence[int])
         held.peak[chosen],
         until=0,
     )
-    memory = controller.kept(state.memory, chosen) if controller else None
+    memory = [state.memory[run] for run in runs]
     several = (state.rows, state.modes, state.aged)
     rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
     return Beds(state.period, rows, modes, aged, gathered, memory)

@@ -6,15 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ..engine.system import System
-from ..model.physics import Cell
+from ..model.physics import Cell, Speeds, speeds
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Stack
-from .broadcasting import kind, numbers, together
+from .alike import Alike, Extrapolated, Movement, cell_of_all, touches
+from .broadcasting import kind, numbers
 from .padding import Gathering
-from .run_by_run import RunByRun, StackedController
+from .run_by_run import join_controllers
 
 __all__ = ["STACKED", "put_together", "structure", "why_not"]
 
@@ -67,7 +70,7 @@ def structure(scene: Scene) -> Any:
         return (*common, physics, replace(scene.simulation, duration=0.0))
     system = assemble(scene)
     nodes = tuple((part.start, part.stop) for plan in _plans(system) for part in plan.nodes)
-    return (*common, kind(physics), system.rows, nodes, system.instants.size, _laminar(system))
+    return (*common, kind(physics), system.rows, nodes, system.instants.size)
 
 
 def _plans(system: System) -> tuple[BernoulliPlan, ...]:
@@ -82,39 +85,44 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
 
 def put_together(systems: Sequence[System]) -> Stack:
     """Put systems of one structure together."""
-    first, cell = systems[0], together([system.cell for system in systems])
+    first, cell = systems[0], cell_of_all([system.cell for system in systems])
     period = numbers([system.period for system in systems])
     rise = period * numbers([system.fastest for system in systems])
+    parts = [system.cell.touch for system in systems if system.cell.touch]
+    touch = touches(parts) if parts else None
     return Stack(
         tuple(systems),
         first.rows,
-        _controller(systems, cell),
-        together([system.plan for system in systems]),
-        Gathering(first.grid, first.rows, cell, period, rise),
+        touch,
+        cell.pulp_rows,
+        join_controllers([system.controller for system in systems]) if first.controller else None,
+        _movement(systems, cell),
+        Gathering(first.grid, first.rows, cell, touch, period, rise),
     )
 
 
-def _laminar(system: System) -> bool:
-    """Return whether no valve without load is turbulent."""
-    return system.cell.flow.knee > system.cell.supply.largest
+def _movement(systems: Sequence[System], cell: Cell) -> Movement:
+    """Return how the cells of all runs are moved."""
+    first = systems[0]
+    plans = tuple(zip(*(_plans(system) for system in systems), strict=True))
+    if not plans or (len(plans) == 1 and all(_as(first, system) for system in systems)):
+        return Alike(first.stepper, first.plan)
+    from .unlike import unlike
+
+    movements = [unlike(cell, of_all) for of_all in plans]
+    if len(movements) == 1:
+        return movements[0]
+    alone = [speeds(system.cell) for system in systems]
+    of_all_runs = Speeds(numbers([one.fall for one in alone]), numbers([one.rise for one in alone]))
+    coarse, fine = movements
+    return Extrapolated(cell, coarse, fine, of_all_runs, numbers([system.period for system in systems]))
 
 
-def _controller(systems: Sequence[System], cell: Cell) -> StackedController | None:
-    """Return the method for all runs, or None: every valve stays shut."""
-    controllers: list[Any] = [system.controller for system in systems]
-    if controllers[0] is None:
-        return None
-    match controllers[0].name:
-        case "virtual_master":
-            from .virtual_masters import virtual_masters
-
-            return virtual_masters(controllers, cell, all(_laminar(system) for system in systems))
-        case "elastic":
-            from .behaviours import elastics
-
-            return elastics(controllers)
-        case "plastic":
-            from .behaviours import plastics
-
-            return plastics(controllers)
-    return RunByRun(tuple(controllers))
+def _as(first: System, system: System) -> bool:
+    """Return whether a run's cells move as those of the first one; how its finger is made does not matter."""
+    own, other = system.cell, first.cell
+    if own.touch and other.touch:
+        own = replace(own, touch=replace(own.touch, fingertip=other.touch.fingertip))
+    alike = own == other and system.period == first.period
+    plans = zip(_plans(system), _plans(first), strict=True)
+    return alike and all(np.array_equal(one.response, another.response) for one, another in plans)

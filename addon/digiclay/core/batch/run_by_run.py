@@ -1,42 +1,23 @@
-"""Controllers of a batch, and the adapter of controllers for single runs."""
+"""Controllers of a batch as one controller, which is again a `interfaces.Controller`.
+
+Its memory is a list, one memory a run; instead of a disc it gives a list of discs, or None where no run
+asks for one.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..control.runs import BatchControl
 from ..model.interfaces import Controller, Measurement, Orders
-from .beds import Disc
-from .broadcasting import numbers
+from .beds import NO_DISC, Disc
+from .broadcasting import numbers, together
 
-__all__ = ["RunByRun", "StackedController"]
-
-
-class StackedController(Protocol):
-    """A method for b runs at once: `interfaces.Controller` with one axis more, the last, for the runs."""
-
-    def begin(self) -> Any:
-        """Return the memory of all runs before the sessions."""
-        ...
-
-    def attend(self, memory: Any, touched: Measurement) -> tuple[Any, Disc]:
-        """Take in the cells the fingers may touch; return memory and the discs to control."""
-        ...
-
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
-        """Return memory and orders for the cells of the discs and all that still move."""
-        ...
-
-    def kept(self, memory: Any, runs: NDArray[np.intp]) -> Any:
-        """Return the memory of some of the runs."""
-        ...
-
-    def of(self, memory: Any, run: int) -> Any:
-        """Return the memory of one run as its own controller would have it."""
-        ...
+__all__ = ["RunByRun", "join_controllers", "join_discs"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,46 +31,41 @@ class RunByRun:
 
     controllers: tuple[Controller, ...]
 
-    def begin(self) -> list[Any]:
-        """Return the memories before the sessions."""
-        return [controller.begin() for controller in self.controllers]
-
-    def attend(self, memory: list[Any], touched: Measurement) -> tuple[list[Any], Disc]:
-        """Let each take in its cells; see `StackedController`."""
-        after, discs = [], []
-        for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True)):
-            own, disc = controller.attend(known, _of(touched, run))
-            after.append(own)
-            discs.append(disc or (0.0, 0.0, -1.0))
-        x, y, radius = (numbers(values) for values in zip(*discs, strict=True))
-        return after, (x, y, radius)
+    def locate(self, memory: list[Any], touched: Measurement) -> tuple[list[Any], list[Any]]:
+        """Let each take in its cells."""
+        found = [
+            controller.locate(known, _take_run(touched, run))
+            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+        ]
+        return [known for known, _ in found], [disc for _, disc in found]
 
     def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Orders]:
-        """Let each give its orders; see `StackedController`."""
-        after, orders = [], []
-        for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True)):
-            own, given = controller.command(known, _of(seen, run))
-            after.append(own)
-            orders.append((given.target, given.mode, given.command))
-        target, mode, command = (np.stack(values, axis=-1) for values in zip(*orders, strict=True))
-        return after, Orders(target, mode, command)
-
-    def kept(self, memory: list[Any], runs: NDArray[np.intp]) -> list[Any]:
-        """Return the memory of some of the runs."""
-        return [memory[run] for run in runs.tolist()]
-
-    def of(self, memory: list[Any], run: int) -> Any:
-        """Return the memory of one run."""
-        return memory[run]
+        """Let each give its orders."""
+        given = [
+            controller.command(known, _take_run(seen, run))
+            for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
+        ]
+        orders = zip(*(orders for _, orders in given), strict=True)
+        return [known for known, _ in given], Orders(*(np.stack(rows, axis=-1) for rows in orders))
 
 
-def _of(seen: Measurement, run: int) -> Measurement:
+def join_controllers(controllers: Sequence[Any]) -> Any:
+    """Return one controller for all runs: the method's own where its formulas hold for many at once."""
+    if isinstance(controllers[0], BatchControl):
+        return replace(together(controllers), runs=tuple(controllers))
+    return RunByRun(tuple(controllers))
+
+
+def join_discs(discs: list[tuple[float, float, float] | None] | None) -> Disc:
+    """Return the discs x, y, radius of all runs, m, as arrays (b,); a negative radius where there is none."""
+    if discs is None:
+        return NO_DISC
+    x, y, radius = zip(*((0.0, 0.0, -1.0) if disc is None else disc for disc in discs), strict=True)
+    return numbers(x), numbers(y), numbers(radius)
+
+
+def _take_run(seen: Measurement, run: int) -> Measurement:
     """Return what is measured of one run."""
-    return Measurement(
-        np.ascontiguousarray(seen.place[..., run]),
-        seen.height[:, run],
-        seen.force[:, run],
-        seen.target[:, run],
-        seen.mode[:, run],
-        seen.own[..., run],
-    )
+    rows: list[Any] = [one[..., run] for one in seen]
+    rows[0] = np.ascontiguousarray(rows[0])
+    return Measurement(*rows)

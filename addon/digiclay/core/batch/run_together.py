@@ -104,7 +104,7 @@ def _played(
             left = np.flatnonzero(~over).tolist()
             runs, ends = tuple(runs[place] for place in left), ends[left]
             if runs:
-                state = kept(state, stack.controller, left)
+                state = kept(state, left)
                 stack, coming = put_together([systems[run] for run in runs]), None
 
 
@@ -115,8 +115,7 @@ def _way(scene: Scene) -> Trajectory:
 
 def _judged(now: _Now, place: int, scene: Scene, rows: Any, versions: Mapping[str, str]) -> Result:
     """Return the result of a run that has come to its end; without a history where there are no rows."""
-    memory = now.stack.controller.of(now.state.memory, place) if now.stack.controller else None
-    end = _End(now.state.period, memory)
+    end = _End(now.state.period, now.state.memory[place])
     return judged(scene, now.stack.systems[place], rows, end, now.share, versions)
 
 
@@ -192,7 +191,7 @@ class _Judges:
         if runs != self._runs:
             left = [self._runs.index(run) for run in runs]
             self._runs, self._largest = runs, self._largest[:, left]
-            self._state = kept(self._state, None, left)
+            self._state = kept(self._state, left)
             self._stack, self._coming = put_together([self._systems[run] for run in runs]), None
         ways = [self._ways[run] for run in runs]
         self._coming = still_coming(self._coming, self._stack.systems, ways, self._state.period)

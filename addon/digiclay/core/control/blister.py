@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import constants
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
+from .runs import fill
 
 __all__ = ["Blister"]
 
@@ -40,7 +40,7 @@ class Blister(Parameters):
             rule = f"must be above the radius, {self.radius:g} m"
             raise ParameterError("Blister", "edge_radius", rule, f"{self.edge_radius:g} m")
 
-    def shape(self, distance: Floats) -> Floats:
+    def evaluate_profile(self, distance: Floats) -> Floats:
         """Return the profile p(r), 1 at the centre, for distances r inside the blister, m.
 
         *cone*: 1 on the flat top, then falling linearly to 0 at the radius.
@@ -49,27 +49,23 @@ class Blister(Parameters):
         if self.profile == "gaussian":
             bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
             return bell
-        rim, slope, flat = constants(self.cone, distance.shape)
+        rim, slope, most = fill((self.radius, 1.0 / (self.radius - self.flat_radius), 1.0), distance)
         cone: Floats = rim - distance
         cone *= slope
-        np.minimum(cone, flat, out=cone)
+        np.minimum(cone, most, out=cone)
         return cone
 
-    @cached_property
-    def cone(self) -> tuple[float, float, float]:
-        """The cone's radius, m, its slope, 1/m, and its top."""
-        return self.radius, 1.0 / (self.radius - self.flat_radius), 1.0
+    def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
+        """Return heights ``edge + p(r) (top - edge)``, m.
 
-    def height(self, distance: Floats, edge: float, top: Floats | float) -> Floats:
-        """Return ``edge + p(r) (top - edge)``, m, at distances r from the virtual master."""
-        height = self.shape(distance)
+        Parameters
+        ----------
+        distance : ndarray (m,) or (m, b)
+            From the middle, m.
+        edge, top : float or ndarray (m,) or (b,)
+            Heights of the surface around the blister and of its top, m.
+        """
+        height = self.evaluate_profile(distance)
         height *= top - edge
         height += edge
         return height
-
-    def surface(self, distance: Floats, edge: float, top: float) -> Floats:
-        """Return `height` at distances inside the blister, of one virtual master."""
-        if self.profile == "gaussian":
-            return self.height(distance, edge, top)
-        cone: Floats = np.interp(distance, (self.flat_radius, self.radius), (top, edge))
-        return cone

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true
+from ..base.counting import some
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -22,15 +22,13 @@ from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import ON_THE_SIDE
 from ..model.set_point import SetPoint
-from .bench import Bench
 from .blister import Blister
-from .noise_floor import above, check_told
-from .servo import locked_under_overload
-from .tracking import Tracking
+from .device_info import DeviceInfo, check_floor, suppress_noise
+from .servo import Tracking, lock_overloaded
 from .transitions import BY_FORCE, BY_PLACE, changed
-from .travel import ABEAM, Heading, ahead_of, square_distance, turned
+from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
 
-__all__ = ["CellStates", "CellStatesControl", "Patch", "assembled"]
+__all__ = ["CellStates", "CellStatesControl", "Patch", "build"]
 
 Floats = NDArray[np.float64]
 Modes = NDArray[np.int8]
@@ -151,31 +149,31 @@ class CellStatesControl:
         """Return the memory before a session."""
         return Patch()
 
-    def attend(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
+    def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
         """Find where the finger presses, and how far its blister can reach; see `interfaces.Controller`."""
         pressed = touched.force > self._least(touched.mode)
-        if not any_true(pressed):
+        if not some(pressed):
             return memory, None
         force, place = touched.force[pressed], touched.place[:, pressed]
         total, x, y = np.dot(place[:3], force).tolist()
         x, y = x / total, y / total
-        radius = math.sqrt(float(square_distance(x, y, place).max()))
+        radius = math.sqrt(float(measure_square(x, y, place).max()))
         if not memory.felt:
             edge = float(np.dot(force, touched.height[pressed])) / total
             memory = memory._replace(heading=Heading(x, y), edge=edge)
         elif math.hypot(x - memory.x, y - memory.y) > self.parameters.jump:
             memory = memory._replace(heading=Heading(x, y), losses=memory.losses + 1)
-        heading = turned(memory.heading, x, y, self.parameters.travel)
+        heading = update_heading(memory.heading, x, y, self.parameters.travel)
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
         """Apply the transitions of every cell, then the control of its mode; see `interfaces.Controller`."""
-        seen = seen._replace(force=above(seen.force, self.floor)) if self.floor else seen
+        seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
         mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
-        if any_true(under):
+        if some(under):
             memory, mode, target = self._around(memory, seen, mode, under, target)
             memory = memory._replace(felt=True)
         else:
@@ -211,15 +209,15 @@ class CellStatesControl:
     ) -> tuple[Patch, Modes, Floats]:
         """Form the blister around the cells under the finger: their neighbourhoods superposed."""
         blister, place = self.blister, seen.place
-        distance = np.sqrt(square_distance(place[1, under], place[2, under], place))
+        distance = np.sqrt(measure_square(place[1, under], place[2, under], place))
         nearest = distance.min(axis=0)
         in_blister = nearest < blister.radius * (1.0 - ON_THE_SIDE)
         at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - ON_THE_SIDE))
-        ahead = ahead_of(memory.heading, memory.x, memory.y, place)
+        ahead = measure_lead(memory.heading, memory.x, memory.y, place)
         facing = seen.height[at_edge & (ahead >= -ABEAM)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
-        from_patch = np.sqrt(square_distance(memory.x, memory.y, place))
+        from_patch = np.sqrt(measure_square(memory.x, memory.y, place))
         left_behind = (ahead < self.parameters.behind * from_patch) & (nearest > blister.flat_radius)
         left_behind &= in_blister
         conditions = {
@@ -229,9 +227,9 @@ class CellStatesControl:
             "outside": ~(in_blister | at_edge),
         }
         mode = changed(mode, BY_PLACE, conditions)
-        weight = np.maximum(blister.shape(distance), 0.0)
+        weight = np.maximum(blister.evaluate_profile(distance), 0.0)
         top = np.dot(seen.height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
-        shape = blister.height(nearest, memory.edge, top + self.parameters.rise)
+        shape = blister.interpolate(nearest, memory.edge, top + self.parameters.rise)
         shape = np.minimum(np.maximum(shape, 0.0), self.actuator.stroke)
         np.putmask(target, mode == Mode.BLISTER, shape)
         return memory, mode, target
@@ -250,12 +248,10 @@ class CellStatesControl:
         """Return valve commands: force control under the finger, springs and profile elsewhere."""
         known = self.parameters
         springs = (mode <= Mode.EDGE) | (mode == Mode.SPRING)
-        command = self.parameters.servo.command(
-            target - springs * seen.force / known.spring_stiffness, seen.height
-        )
+        command = self.parameters.command(target - springs * seen.force / known.spring_stiffness, seen.height)
         follow = known.force_gain * (known.force_setpoint - seen.force)
         np.putmask(command, under, np.minimum(np.maximum(follow, -1.0), 1.0))
-        return locked_under_overload(command, seen.force, self.lift)
+        return lock_overloaded(command, seen.force, self.lift)
 
 
 def _under_finger(mode: Modes) -> NDArray[np.bool_]:
@@ -264,9 +260,11 @@ def _under_finger(mode: Modes) -> NDArray[np.bool_]:
     return following
 
 
-def assembled(parameters: CellStates, bench: Bench) -> CellStatesControl:
-    """Put Method II together for a device; the bench has a blister."""
-    assert bench.blister is not None
-    asked, floor = parameters.force_setpoint, bench.force_floor
-    check_told(asked, "force_setpoint", asked, floor)
-    return CellStatesControl(parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, floor)
+def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:
+    """Put Method II together for a device; the device has a blister."""
+    assert device.blister is not None
+    asked, floor = parameters.force_setpoint, device.force_floor
+    check_floor(asked, "force_setpoint", asked, floor)
+    return CellStatesControl(
+        parameters, device.blister, device.cell.actuator, device.lift, device.period, floor
+    )

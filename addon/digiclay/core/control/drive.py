@@ -8,17 +8,29 @@ of a pin without load, and heights come in exponentially.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
 from ..base.quantity import quantity
+from ..model.actuator import Actuator
+from ..model.interfaces import Measurement
 from ..model.physics import Cell
 from .methods import ControlParameters
+from .runs import BatchControl
+from .servo import declare_dead_band, lock_overloaded
 
-__all__ = ["Drive", "DriveParameters", "TouchParameters", "check_damping", "drive", "feeling_above"]
+__all__ = [
+    "CellwiseControl",
+    "Drive",
+    "DriveParameters",
+    "TouchParameters",
+    "check_damping",
+    "make_drive",
+    "raise_felt_force",
+]
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +45,7 @@ class DriveParameters(ControlParameters):
     settling_time: float = quantity(
         20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
     )
-    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
+    dead_band: float = declare_dead_band()
 
 
 @dataclass(frozen=True)
@@ -52,7 +64,7 @@ class TouchParameters(DriveParameters):
 Touch = TypeVar("Touch", bound=TouchParameters)
 
 
-def feeling_above(floor: float, parameters: Touch) -> Touch:
+def raise_felt_force(floor: float, parameters: Touch) -> Touch:
     """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0."""
     return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
@@ -67,7 +79,7 @@ class Drive:
         s.
     dead_band : float
         m.
-    up, down : ndarray (129,)
+    up, down : ndarray (129,) or (129, b)
         Speed of a pin without load at `OPENINGS`, towards either reservoir, growing, m/s.
     lift : float
         Force the high reservoir can lift, N.
@@ -79,12 +91,22 @@ class Drive:
     down: Floats
     lift: float
 
-    def at_speed(self, speed: Floats) -> Floats:
-        """Return valve commands, shape (m,), that move pins without load at some speeds, m/s, up positive."""
+    def command(self, speed: Floats, force: Floats) -> Floats:
+        """Return valve commands for some speeds; a pin pressed harder than can be lifted is locked.
+
+        Parameters
+        ----------
+        speed : ndarray (m,) or (m, b)
+            As in `open_for`, m/s.
+        force : ndarray (m,) or (m, b)
+            N.
+        """
+        return lock_overloaded(self.open_for(speed), force, self.lift)
+
+    def open_for(self, speed: Floats) -> Floats:
+        """Return valve commands that move pins without load at speeds of shape (m[, b]), m/s, up positive."""
         size = np.abs(speed)
-        return np.where(
-            speed > 0.0, np.interp(size, self.up, OPENINGS), -np.interp(size, self.down, OPENINGS)
-        )
+        return np.where(speed > 0.0, _look_up(size, self.up), -_look_up(size, self.down))
 
     def approach(self, error: Floats) -> Floats:
         """Return the speed that takes a pin to its height, m/s, for commanded less measured heights, m.
@@ -95,8 +117,57 @@ class Drive:
         return speed
 
 
-def drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
+@dataclass(frozen=True, eq=False)
+class CellwiseControl(BatchControl):
+    """Controller without memory: the orders for a cell depend on that cell alone.
+
+    Attributes
+    ----------
+    parameters : DriveParameters
+    actuator : Actuator
+    drive : Drive
+    """
+
+    parameters: DriveParameters
+    actuator: Actuator
+    drive: Drive
+
+    rows = 0
+
+    def begin(self) -> None:
+        """Nothing to remember but the cells' own rows."""
+
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
+        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
+        return memory, None
+
+
+def _look_up(speed: Floats, speeds: Floats) -> Floats:
+    """Return the openings that give some speeds.
+
+    Parameters
+    ----------
+    speed : ndarray (m,) or (m, b)
+        m/s.
+    speeds : ndarray (129,) or (129, b)
+        At `OPENINGS`, m/s; a table a run where they differ.
+    """
+    if speeds.ndim == 1:
+        openings: Floats = np.interp(speed, speeds, OPENINGS)
+        return openings
+    runs = zip(speed.T, speeds.T, strict=True)
+    return np.stack([np.interp(own, table, OPENINGS) for own, table in runs], axis=-1)
+
+
+def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
     """Make the drive for a device.
+
+    Parameters
+    ----------
+    parameters : DriveParameters
+    cell : Cell
+    period : float
+        Control period, s.
 
     Raises
     ------

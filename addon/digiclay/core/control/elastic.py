@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
-from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
-from .servo import locked_under_overload
+from .device_info import DeviceInfo
+from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
-__all__ = ["Elastic", "ElasticControl", "assembled"]
+__all__ = ["Elastic", "ElasticControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -32,40 +31,32 @@ class Elastic(TouchParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticControl:
+class ElasticControl(CellwiseControl):
     """Controller of the elastic behaviour for a bed.
 
     Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
     """
 
     parameters: Elastic
-    actuator: Actuator
-    drive: Drive
 
     name = "elastic"
-    rows = 0
 
-    def begin(self) -> None:
-        """Nothing to remember."""
-
-    def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
-        return memory, None
-
-    def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Let pressed cells give way, and the others spring back; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
         pressed = seen.force >= known.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)
         giving = (known.stiffness * error - seen.force) / known.damping
-        command = self.drive.at_speed(np.where(pressed, giving, self.drive.approach(error)))
-        command = locked_under_overload(command, seen.force, self.drive.lift)
+        speed = np.where(pressed, giving, self.drive.approach(error))
         mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
-        return memory, Orders(np.full(seen.height.size, rest), mode, command)
+        target = np.full(seen.height.shape, rest)
+        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
 
 
-def assembled(parameters: Elastic, bench: Bench) -> ElasticControl:
+def build(parameters: Elastic, device: DeviceInfo) -> ElasticControl:
     """Put the elastic behaviour together for a device."""
-    check_damping(parameters.damping, bench.cell, bench.period, parameters.stiffness)
-    parameters = feeling_above(bench.force_floor, parameters)
-    return ElasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))
+    check_damping(parameters.damping, device.cell, device.period, parameters.stiffness)
+    parameters = raise_felt_force(device.force_floor, parameters)
+    return ElasticControl(
+        parameters, device.cell.actuator, make_drive(parameters, device.cell, device.period)
+    )

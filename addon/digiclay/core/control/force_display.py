@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +11,13 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
-from ..model.layout import Grid
-from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
+from .device_info import DeviceInfo, check_floor
+from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 from .named_shapes import FILE, check_shape, from_file, named
-from .neighbours import cells_at
-from .noise_floor import check_told
-from .servo import locked_under_overload
+from .runs import take_cells
 
-__all__ = ["ForceDisplay", "ForceDisplayControl", "assembled"]
+__all__ = ["ForceDisplay", "ForceDisplayControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +47,7 @@ class ForceDisplay(TouchParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ForceDisplayControl:
+class ForceDisplayControl(CellwiseControl):
     """Controller of the force display for a bed.
 
     A cell that feels the finger: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
@@ -58,47 +55,37 @@ class ForceDisplayControl:
 
     Attributes
     ----------
-    field : ndarray (n,)
+    field : ndarray (n,) or (n, b)
         F_com of every cell of the bed, N.
     """
 
     parameters: ForceDisplay
-    grid: Grid
-    actuator: Actuator
-    drive: Drive
     period: float
     field: Floats
 
     name = "force_display"
     rows = 1
 
-    def begin(self) -> None:
-        """Nothing to remember but the cells' own rows."""
-
-    def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
-        return memory, None
-
-    def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Control the force of touched cells and the height of the others; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
-        asked = self.field.take(cells_at(self.grid, seen.place))
+        asked = take_cells(self.field, seen.cells)
         pressed = seen.force >= known.felt_force
         alone = np.where(pressed, 0.0, seen.own[0] + 1.0)
         kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= known.release_time)
         felt = pressed | kept
         seen.own[0] = np.where(felt, alone, 0.0)
-        limit = min(rest + known.rise, self.actuator.stroke)
+        limit = np.minimum(rest + known.rise, self.actuator.stroke)
         pressing = np.minimum(
             (asked - seen.force) / known.damping, (limit - seen.height) / self.drive.settling_time
         )
         speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
-        command = locked_under_overload(self.drive.at_speed(speed), seen.force, self.drive.lift)
         mode = np.where(felt, np.int8(Mode.FORCE_FOLLOW), np.int8(Mode.REST))
-        return memory, Orders(np.full(seen.height.size, rest), mode, command)
+        target = np.full(seen.height.shape, rest)
+        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
 
 
-def assembled(parameters: ForceDisplay, bench: Bench) -> ForceDisplayControl:
+def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
     """Put force display together for a device.
 
     Raises
@@ -106,24 +93,23 @@ def assembled(parameters: ForceDisplay, bench: Bench) -> ForceDisplayControl:
     ParameterError
         When the field asks for more than a pin can press or less than it feels, or its file cannot be used.
     """
-    check_damping(parameters.damping, bench.cell, bench.period)
-    check_told(parameters.force, "force", parameters.force, bench.force_floor)
-    parameters = feeling_above(bench.force_floor, parameters)
+    check_damping(parameters.damping, device.cell, device.period)
+    check_floor(parameters.force, "force", parameters.force, device.force_floor)
+    parameters = raise_felt_force(device.force_floor, parameters)
     if parameters.field.endswith(FILE):
-        field = from_file("field", parameters.field, bench.grid, parameters.felt_force, bench.lift, "N")
+        field = from_file("field", parameters.field, device.grid, parameters.felt_force, device.lift, "N")
     else:
-        field = parameters.force * (1.0 + parameters.contrast * named(parameters.field, bench.grid))
-        if field.max() >= bench.lift:
-            rule = f"must keep the field below what a pin can press, {bench.lift:.3g} N"
+        field = parameters.force * (1.0 + parameters.contrast * named(parameters.field, device.grid))
+        if field.max() >= device.lift:
+            rule = f"must keep the field below what a pin can press, {device.lift:.3g} N"
             raise ParameterError("control", "force", rule, f"{field.max():.3g} N at its largest")
         if field.min() < parameters.felt_force:
             rule = f"must keep the field at or above control.felt_force, {parameters.felt_force:g} N"
             raise ParameterError("control", "contrast", rule, f"{field.min():.3g} N at its smallest")
     return ForceDisplayControl(
         parameters,
-        bench.grid,
-        bench.cell.actuator,
-        drive(parameters, bench.cell, bench.period),
-        bench.period,
+        device.cell.actuator,
+        make_drive(parameters, device.cell, device.period),
+        device.period,
         field,
     )

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.interfaces import Controller, Measurement, Orders
-from ..model.layout import Grid
 from ..shapes.request import Shape
-from .bench import Bench
+from .device_info import DeviceInfo
 from .drive import DriveParameters
-from .neighbours import cells_at
-from .shape_display import Progress, ShapeDisplay, ShapeDisplayControl, assembled
+from .shape_display import Progress, ShapeDisplay, ShapeDisplayControl, build
 
 __all__ = ["Handed", "Handover", "handover"]
 
@@ -41,7 +39,6 @@ class Handover:
     ----------
     display : ShapeDisplayControl
     method : Controller or None
-    grid : Grid
     raised : ndarray (n,) or None
         Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it
         sees the bed without them, so that the shape is what its cells go back to.
@@ -49,7 +46,6 @@ class Handover:
 
     display: ShapeDisplayControl
     method: Controller | None
-    grid: Grid
     raised: Floats | None
 
     @property
@@ -70,16 +66,16 @@ class Handover:
         """Return whether the shape stands, and the method has taken over."""
         return memory.display.move >= len(self.display.moves)
 
-    def attend(
+    def locate(
         self, memory: Handed, touched: Measurement
     ) -> tuple[Handed, tuple[float, float, float] | None]:
         """Let the one whose turn it is look at the touched cells; see `interfaces.Controller`."""
         if not self.displayed(memory):
-            progress, disc = self.display.attend(memory.display, touched)
+            progress, disc = self.display.locate(memory.display, touched)
             return memory._replace(display=progress), disc
         if self.method is None:
             return memory, None
-        known, disc = self.method.attend(memory.method, self._lowered(touched))
+        known, disc = self.method.locate(memory.method, self._lowered(touched))
         return memory._replace(method=known), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Orders]:
@@ -89,7 +85,7 @@ class Handover:
             return memory._replace(display=progress), orders
         known, orders = self.method.command(memory.method, self._lowered(seen))
         if self.raised is not None:
-            target = orders.target + self.raised.take(self._cells(seen))
+            target = orders.target + self.raised.take(seen.cells)
             orders = Orders(target, orders.mode, orders.command)
         return memory._replace(method=known), orders
 
@@ -97,34 +93,28 @@ class Handover:
         """Return what the method is to see: the bed without the shape, where its cells go back to rest."""
         if self.raised is None:
             return seen
-        raised = self.raised.take(self._cells(seen))
-        return Measurement(
-            seen.place, seen.height - raised, seen.force, seen.target - raised, seen.mode, seen.own
-        )
-
-    def _cells(self, seen: Measurement) -> NDArray[np.intp]:
-        """Return the numbers of the cells that are seen."""
-        return cells_at(self.grid, seen.place)
+        raised = self.raised.take(seen.cells)
+        return seen._replace(height=seen.height - raised, target=seen.target - raised)
 
 
-def handover(shape: Shape, bench: Bench, method: Controller | None, *, recovers: bool) -> Handover:
+def handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
     """Put a shape's display in front of a method.
 
     Parameters
     ----------
     shape : Shape
         Says how the surface gets there.
-    bench : Bench
+    device : DeviceInfo
         With the heights to display.
     method : Controller or None
     recovers : bool
         Whether the method's cells go back to rest.
     """
-    assert bench.heights is not None
+    assert device.heights is not None
     # As quick as a display is by itself, and never quicker than its control period allows.
-    settling = max(DriveParameters().settling_time, 2.0 * bench.period)
+    settling = max(DriveParameters().settling_time, 2.0 * device.period)
     known = ShapeDisplay(
         refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling
     )
-    raised = bench.heights - bench.cell.actuator.rest_height if recovers else None
-    return Handover(assembled(known, bench), method, bench.grid, raised)
+    raised = device.heights - device.cell.actuator.rest_height if recovers else None
+    return Handover(build(known, device), method, raised)

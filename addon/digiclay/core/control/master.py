@@ -1,4 +1,4 @@
-"""Virtual master of Method I: gains, thresholds and memory."""
+"""Virtual master of Method I: gains, thresholds, memory and the decisions of a control period."""
 
 from __future__ import annotations
 
@@ -6,12 +6,23 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
+from ..base.modes import Mode
 from ..base.quantity import quantity
+from ..model.actuator import Actuator
 from ..model.set_point import SetPoint
-from .tracking import Tracking
-from .travel import Heading
+from .blister import Blister
+from .master_cell import MasterCell
+from .runs import BatchControl
+from .servo import Tracking
+from .travel import Heading, update_heading
 
-__all__ = ["Master", "Phase", "VirtualMaster"]
+__all__ = ["Master", "MasterControl", "Phase", "VirtualMaster"]
+
+
+#: Where an idle master of a stack stands, m: so far away that no cell is in its blister.
+NOWHERE = 1e3
+#: Plain numbers: numpy takes an enumeration's member ten times as long.
+SPRING, FORCE_FOLLOW = int(Mode.SPRING), int(Mode.FORCE_FOLLOW)
 
 
 class Phase(IntEnum):
@@ -60,12 +71,12 @@ class Master(NamedTuple):
 
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
-    def at(self, x: float, y: float, heading: Heading) -> Master:
+    def move_to(self, x: float, y: float, heading: Heading) -> Master:
         """Return the master where it has felt the finger."""
         kept = self.height, self.opening, self.reference, self.edge
         return Master(self.phase, x, y, *kept, heading, self.felt, 0, self.losses)
 
-    def led(self, phase: Phase, height: float, opening: float) -> Master:
+    def lead(self, phase: Phase, height: float, opening: float) -> Master:
         """Return the master after a period, with its valve's opening."""
         felt = height if self.alone == 0 else self.felt
         place, kept = (self.x, self.y), (self.reference, self.edge)
@@ -114,3 +125,126 @@ class VirtualMaster(Tracking):
     def set_point(self) -> SetPoint:
         """Set point of all cells together."""
         return SetPoint(self.force_setpoint)
+
+
+@dataclass(frozen=True, eq=False)
+class MasterControl(BatchControl):
+    """Decisions about one virtual master in a control period, in plain numbers.
+
+    Attributes
+    ----------
+    parameters : VirtualMaster
+    blister : Blister
+    actuator : Actuator
+        The cells' cylinders.
+    model : MasterCell
+        The master's own cylinder and valve.
+    period : float
+        Control period, s.
+    """
+
+    parameters: VirtualMaster
+    blister: Blister
+    actuator: Actuator
+    model: MasterCell
+    period: float
+
+    def follow(
+        self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float,
+        surface: float,
+    ) -> Master:  # fmt: skip
+        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
+
+        Parameters
+        ----------
+        master : Master
+        total, x, y : float
+            Sum of the forces on all cells, N, and their moments with x and y, N m.
+        near, near_x, near_y : float
+            Those of the cells near the master.
+        surface : float
+            Sum of force times height, N m.
+        """
+        known = self.parameters
+        if total < known.felt_force:
+            return self.wait(master)
+        if master.phase is not Phase.IDLE:
+            if near >= known.felt_force:
+                x, y = near_x / near, near_y / near
+                return master.move_to(x, y, update_heading(master.heading, x, y, known.travel))
+            # The finger has jumped out of reach: this is a new touch elsewhere.
+            master = master._replace(losses=master.losses + 1)
+        x, y, surface = x / total, y / total, surface / total
+        return Master(
+            Phase.SPRING,
+            x,
+            y,
+            surface,
+            0.0,
+            reference=surface,
+            edge=self.keep_in_stroke(surface),
+            felt=surface,
+            heading=Heading(x, y),
+            losses=master.losses,
+        )
+
+    def wait(self, master: Master) -> Master:
+        """Count the periods without a finger; give it up after the loss time."""
+        if master.phase is Phase.IDLE:
+            return master
+        if not self.is_given_up(master):
+            return master._replace(alone=master.alone + 1)
+        lost = master.phase is Phase.SHAPING
+        return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
+
+    def is_given_up(self, master: Master) -> bool:
+        """Tell whether the finger has been away for longer than the loss time."""
+        return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
+
+    def lead(self, master: Master, force: float) -> Master:
+        """VM Control and VM Model: the effort, and the height a real cell would make of it."""
+        known, phase = self.parameters, master.phase
+        if phase is Phase.IDLE:
+            return master
+        # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
+        if self.is_given_up(master):
+            return master._replace(height=master.felt)
+        if force >= known.force_setpoint:
+            phase = Phase.SHAPING
+        if phase is Phase.SPRING:
+            effort = known.position_gain * (master.reference - force / known.spring_stiffness - master.height)
+        else:
+            effort = known.force_gain * (known.force_setpoint - force)
+        height, opening = self.model.advance(master.height, master.opening, min(max(effort, -1.0), 1.0))
+        return master.lead(phase, height, opening)
+
+    def find_disc(self, master: Master) -> tuple[float, float, float] | None:
+        """Return the disc that a master controls, m."""
+        return None if master.phase is Phase.IDLE else (master.x, master.y, self.blister.edge_radius)
+
+    def is_active(self, master: Master) -> bool:
+        """Tell whether a master follows a finger."""
+        return master.phase is not Phase.IDLE
+
+    def get_place(self, master: Master) -> tuple[float, float]:
+        """Return where a master is, m."""
+        return master.x, master.y
+
+    def get_pose(self, master: Master) -> tuple[float, float, float, float]:
+        """Return where a master is, m, and which way it travels."""
+        _, _, toward_x, toward_y = master.heading
+        if master.phase is Phase.IDLE:
+            return NOWHERE, NOWHERE, toward_x, toward_y
+        return master.x, master.y, toward_x, toward_y
+
+    def set_edge(self, master: Master, level: float, count: int) -> Master:
+        """Put a master into a surface whose height is the mean of some cells'; `level` is their sum, m."""
+        return master.with_edge(self.keep_in_stroke(level / count)) if count else master
+
+    def keep_in_stroke(self, height: float) -> float:
+        """Return a height that a pin can have, m."""
+        return min(max(height, 0.0), self.actuator.stroke)
+
+    def get_heights(self, master: Master) -> tuple[float, float, int]:
+        """Return the heights of the surface around a master and of itself, m, and the mode of felt cells."""
+        return master.edge, master.height, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING

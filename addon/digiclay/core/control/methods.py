@@ -28,7 +28,7 @@ class Method:
     Attributes
     ----------
     module : str
-        Within the core; holds a function ``assembled(parameters, bench)``.
+        Within the core; holds a function ``build(parameters, device)``.
     parameters : str
         Class of its parameters there.
     blister : mapping or None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +11,11 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
-from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
-from .noise_floor import check_told
-from .servo import locked_under_overload
+from .device_info import DeviceInfo, check_floor
+from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
-__all__ = ["Plastic", "PlasticControl", "assembled"]
+__all__ = ["Plastic", "PlasticControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +37,7 @@ class Plastic(TouchParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class PlasticControl:
+class PlasticControl(CellwiseControl):
     """Controller of the plastic behaviour for a bed.
 
     Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
@@ -47,20 +45,10 @@ class PlasticControl:
     """
 
     parameters: Plastic
-    actuator: Actuator
-    drive: Drive
 
     name = "plastic"
-    rows = 0
 
-    def begin(self) -> None:
-        """Nothing to remember but the cells' targets."""
-
-    def attend(self, memory: None, touched: Measurement) -> tuple[None, None]:
-        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
-        return memory, None
-
-    def command(self, memory: None, seen: Measurement) -> tuple[None, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Let cells give way that are pressed beyond yield, hold the others; see `interfaces.Controller`."""
         known = self.parameters
         pressed = seen.force >= known.felt_force
@@ -70,17 +58,18 @@ class PlasticControl:
         back = self.drive.approach(target - seen.height)
         speed = np.where(pressed, np.minimum(back, 0.0), back)
         np.putmask(speed, yielding, (known.yield_force - seen.force) / known.damping)
-        command = locked_under_overload(self.drive.at_speed(speed), seen.force, self.drive.lift)
         formed = np.abs(target - self.actuator.rest_height) > known.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, pressed, np.int8(Mode.SPRING))
         np.putmask(mode, yielding, np.int8(Mode.FORCE_FOLLOW))
-        return memory, Orders(target, mode, command)
+        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
 
 
-def assembled(parameters: Plastic, bench: Bench) -> PlasticControl:
+def build(parameters: Plastic, device: DeviceInfo) -> PlasticControl:
     """Put the plastic behaviour together for a device."""
-    check_damping(parameters.damping, bench.cell, bench.period)
-    check_told(parameters.yield_force, "yield_force", parameters.yield_force, bench.force_floor)
-    parameters = feeling_above(bench.force_floor, parameters)
-    return PlasticControl(parameters, bench.cell.actuator, drive(parameters, bench.cell, bench.period))
+    check_damping(parameters.damping, device.cell, device.period)
+    check_floor(parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor)
+    parameters = raise_felt_force(device.force_floor, parameters)
+    return PlasticControl(
+        parameters, device.cell.actuator, make_drive(parameters, device.cell, device.period)
+    )

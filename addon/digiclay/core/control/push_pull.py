@@ -19,11 +19,11 @@ from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import ON_THE_SIDE
-from .bench import Bench
-from .drive import Drive, DriveParameters, drive
-from .travel import square_distance
+from .device_info import DeviceInfo
+from .drive import Drive, DriveParameters, make_drive
+from .travel import measure_square
 
-__all__ = ["Listening", "PushPull", "PushPullControl", "assembled"]
+__all__ = ["Listening", "PushPull", "PushPullControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class PushPullControl:
         """Return the memory before a session."""
         return Listening()
 
-    def attend(
+    def locate(
         self, memory: Listening, touched: Measurement
     ) -> tuple[Listening, tuple[float, float, float] | None]:
         """Listen where a hand may be; see `interfaces.Controller`.
@@ -112,7 +112,7 @@ class PushPullControl:
         """Drag commanded heights along, and move every pin up or down; see `interfaces.Controller`."""
         known, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
-        listening = square_distance(memory.x, memory.y, seen.place) <= limit
+        listening = measure_square(memory.x, memory.y, seen.place) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle lies behind: what is left of it is no ripple
             target = self._dragged(seen, listening)
@@ -126,7 +126,7 @@ class PushPullControl:
         formed = np.abs(target - self.actuator.rest_height) > known.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
-        return memory, Orders(target, mode, self.drive.at_speed(speed))
+        return memory, Orders(target, mode, self.drive.open_for(speed))
 
     def _dragged(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
         """Return the targets after a cycle; what the cells remember is brought up to date in place."""
@@ -145,7 +145,7 @@ class PushPullControl:
         return followed
 
 
-def assembled(parameters: PushPull, bench: Bench) -> PushPullControl:
+def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
     """Put push and pull together for a device.
 
     Raises
@@ -153,17 +153,17 @@ def assembled(parameters: PushPull, bench: Bench) -> PushPullControl:
     ParameterError
         When a pin's own ripple would be a touch.
     """
-    ripple = parameters.listening_speed * bench.period
-    if bench.height_floor:
-        threshold = max(parameters.threshold, ripple + bench.height_floor)
+    ripple = parameters.listening_speed * device.period
+    if device.height_floor:
+        threshold = max(parameters.threshold, ripple + device.height_floor)
         parameters = replace(parameters, threshold=threshold)
     if not parameters.threshold > ripple:
         rule = f"must be above a listening pin's own way in a control period, {ripple:g} m"
         raise ParameterError("control", "threshold", rule, f"{parameters.threshold:g} m")
     return PushPullControl(
         parameters,
-        bench.cell.actuator,
-        drive(parameters, bench.cell, bench.period),
-        bench.period,
-        bench.grid.layout.pitch,
+        device.cell.actuator,
+        make_drive(parameters, device.cell, device.period),
+        device.period,
+        device.grid.layout.pitch,
     )

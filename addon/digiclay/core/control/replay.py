@@ -47,7 +47,7 @@ class Replay:
         """Return the number of periods played."""
         return 0
 
-    def attend(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float] | None]:
+    def locate(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float] | None]:
         """Take every commanded cell along."""
         return memory, self.disc
 
@@ -55,5 +55,5 @@ class Replay:
         """Return the commands of the period."""
         command = np.zeros(seen.height.size)
         if memory < len(self.commands):
-            command = self.commands[memory, self.grid.at(seen.place[1], seen.place[2])]
+            command = self.commands[memory, seen.cells]
         return memory + 1, Orders(seen.target, seen.mode, command)

@@ -1,34 +1,56 @@
-"""Proportional control of a cell's height."""
+"""Height control of the tracking methods, and the lock of overloaded cells."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, constants
-from ..base.quantity import Parameters, quantity
+from ..base.counting import some
+from ..base.quantity import quantity
+from .methods import ControlParameters
+from .runs import fill
 
-__all__ = ["Servo", "locked_under_overload"]
+__all__ = ["Tracking", "declare_dead_band", "lock_overloaded"]
 
 Floats = NDArray[np.float64]
 
 
+def declare_dead_band() -> Any:
+    """Declare the parameter that every height control has."""
+    return quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
+
+
 @dataclass(frozen=True)
-class Servo(Parameters):
-    """``K_com = K_p (H_com - H)``, limited to [-1, 1], zero within a dead band.
+class Tracking(ControlParameters):
+    """Common part of the tracking methods: height control of cells, direction of the fingertip."""
 
-    The flow goes with the square of the opening, so a cell comes in like 1/t and would
-    never be at rest without the dead band.
-    """
-
-    gain: float = quantity(500.0, "proportional gain", unit="1/m", symbol="K_p", at_least=0.0)
-    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
+    position_gain: float = quantity(
+        500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
+    )
+    dead_band: float = declare_dead_band()
+    travel: float = quantity(
+        1.5e-3, "distance travelled that determines the direction", unit="m", symbol="d_t", above=0.0
+    )
+    behind: float = quantity(
+        -0.3, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
+    )
 
     def command(self, target: Floats, height: Floats) -> Floats:
-        """Return valve commands, shape (n,), for commanded and measured heights, m."""
-        gain, band, most, least, none = constants((self.gain, self.dead_band, 1.0, -1.0, 0.0), target.shape)
+        """Return ``K_com = K_p (H_com - H)``, limited to [-1, 1], zero within the dead band.
+
+        The flow goes with the square of the opening, so a cell comes in like 1/t and would
+        never be at rest without the dead band.
+
+        Parameters
+        ----------
+        target, height : ndarray (m,) or (m, b)
+            Commanded and measured, m.
+        """
+        numbers = (self.position_gain, self.dead_band, 1.0, -1.0, 0.0)
+        gain, band, most, least, none = fill(numbers, target)
         error = target - height
         command: Floats = error * gain
         np.minimum(command, most, out=command)
@@ -38,20 +60,22 @@ class Servo(Parameters):
         return command
 
 
-def locked_under_overload(command: Floats, force: Floats, limit: float) -> Floats:
-    """Return commands with cells locked that are pressed harder than the high reservoir can lift.
+def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:
+    """Lock cells that are pressed harder than the high reservoir can lift, in place; return the commands.
 
     Opening to it would lower them, and a proportional controller would open further.
 
     Parameters
     ----------
-    command : ndarray (n,)
-    force : ndarray (n,)
+    command : ndarray (m,) or (m, b)
+    force : ndarray (m,) or (m, b)
         N.
-    limit : float
+    limit : float or ndarray (b,)
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
-    overload = force >= constants((limit,), force.shape)[0]
-    if not any_true(overload):
-        return command
-    return np.where(overload & (command > 0.0), 0.0, command)
+    limit, shut = fill((limit, 0.0), force)
+    overload = force >= limit
+    if some(overload):
+        overload &= command > shut
+        np.putmask(command, overload, shut)
+    return command

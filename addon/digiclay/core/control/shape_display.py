@@ -15,13 +15,11 @@ from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import Grid
-from .bench import Bench
-from .drive import Drive, DriveParameters, drive
+from .device_info import DeviceInfo
+from .drive import Drive, DriveParameters, make_drive
 from .named_shapes import FILE, check_shape, from_file, named
-from .neighbours import cells_at
-from .servo import locked_under_overload
 
-__all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "assembled"]
+__all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +112,7 @@ class ShapeDisplayControl:
         """Return the memory before a session."""
         return Progress()
 
-    def attend(
+    def locate(
         self, memory: Progress, touched: Measurement
     ) -> tuple[Progress, tuple[float, float, float] | None]:
         """Ask for all cells while there is a move to make; see `interfaces.Controller`."""
@@ -126,8 +124,7 @@ class ShapeDisplayControl:
         if memory.move < len(self.moves):
             memory, target = self._moved(memory, seen)
         error = target - seen.height
-        command = self.drive.at_speed(self.drive.approach(error))
-        command = locked_under_overload(command, seen.force, self.drive.lift)
+        command = self.drive.command(self.drive.approach(error), seen.force)
         formed = np.abs(target - rest) > self.parameters.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
@@ -135,7 +132,7 @@ class ShapeDisplayControl:
 
     def _moved(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
         """Return the progress and the targets of the move under way; on to the next if it is over."""
-        cells, rest = cells_at(self.grid, seen.place), self.actuator.rest_height
+        cells, rest = seen.cells, self.actuator.rest_height
         row, target = cells // self.grid.layout.columns, seen.target.copy()
         goal = self.heights.take(cells)
         while memory.move < len(self.moves):
@@ -149,7 +146,7 @@ class ShapeDisplayControl:
         return memory, target
 
 
-def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
+def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
     """Put shape display together for a device; a shape of the scene's own is displayed in place of its own.
 
     Raises
@@ -157,9 +154,9 @@ def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
     ParameterError
         When the shape leaves the stroke, or its file cannot be used.
     """
-    actuator, grid = bench.cell.actuator, bench.grid
-    if bench.heights is not None:
-        heights = bench.heights
+    actuator, grid = device.cell.actuator, device.grid
+    if device.heights is not None:
+        heights = device.heights
     elif parameters.shape.endswith(FILE):
         heights = from_file("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
     else:
@@ -172,9 +169,9 @@ def assembled(parameters: ShapeDisplay, bench: Bench) -> ShapeDisplayControl:
         parameters,
         grid,
         actuator,
-        drive(parameters, bench.cell, bench.period),
+        make_drive(parameters, device.cell, device.period),
         heights,
         parameters.moves(grid.layout.rows),
-        math.ceil(parameters.patience / bench.period),
+        math.ceil(parameters.patience / device.period),
         (0.0, 0.0, float(np.hypot(grid.x, grid.y).max())),
     )

@@ -7,12 +7,20 @@ rests keeps its direction, and what it has formed is not called back.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ABEAM", "Heading", "ahead_of", "beyond", "seen_from", "square_distance", "turned"]
+__all__ = [
+    "ABEAM",
+    "Heading",
+    "measure_excess",
+    "measure_lead",
+    "measure_offsets",
+    "measure_square",
+    "update_heading",
+]
 
 Floats = NDArray[np.float64]
 
@@ -30,14 +38,23 @@ class Heading(NamedTuple):
     toward_y: float = 0.0
 
 
-def turned(heading: Heading, x: float, y: float, travel: float) -> Heading:
-    """Return the heading of a finger that is now at x, y, m; new once it has travelled `travel`, m."""
+def update_heading(heading: Heading, x: float, y: float, travel: float) -> Heading:
+    """Return the heading of a finger; a new one once it has travelled far enough.
+
+    Parameters
+    ----------
+    heading : Heading
+    x, y : float
+        Where the finger is now, m.
+    travel : float
+        Distance that settles the direction, m.
+    """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
     return heading if way < travel else Heading(x, y, dx / way, dy / way)
 
 
-def ahead_of(heading: Heading, x: float, y: float, place: Floats) -> Floats:
+def measure_lead(heading: Heading, x: float, y: float, place: Floats) -> Floats:
     """Return how far cells lie ahead of a point, m; negative behind it, 0 before any travel.
 
     Parameters
@@ -53,37 +70,57 @@ def ahead_of(heading: Heading, x: float, y: float, place: Floats) -> Floats:
     return ahead
 
 
-def seen_from(heading: Heading, x: float, y: float, place: Floats) -> tuple[Floats, Floats]:
-    """Return distances from a point, and how far cells lie ahead of it, see `ahead_of`; shape (m,), m.
+def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, place: Floats) -> tuple[Floats, Floats]:
+    """Return distances from a point, and how far cells lie ahead of it, see `measure_lead`.
 
     Parameters
     ----------
-    heading : Heading
-    x, y : float
+    x, y : float or ndarray (b,)
         The point, m.
-    place : ndarray (6, m)
+    toward_x, toward_y : float or ndarray (b,)
+        The direction, a unit vector.
+    place : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y² of the cells.
+
+    Returns
+    -------
+    distance, ahead : ndarray (m,) or (m, b)
+        m.
     """
-    _, _, toward_x, toward_y = heading
-    forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
-    distance, ahead = np.array((_circle(x, y), forward)).dot(place)
-    np.abs(distance, distance)  # at the point itself rounding may leave a negative square
+    if place.ndim == 2:  # one product
+        forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
+        distance, ahead = np.array((_circle(x, y), forward)).dot(place)
+        np.abs(distance, distance)  # at the point itself rounding may leave a negative square
+    else:
+        dx, dy = place[1] - x, place[2] - y
+        ahead = dx * toward_x
+        ahead += dy * toward_y
+        dx *= dx
+        dy *= dy
+        distance = np.add(dx, dy, out=dx)
     np.sqrt(distance, distance)
     return distance, ahead
 
 
-def beyond(x: float, y: float, radius: float, place: Floats) -> Floats:
-    """Return by how much the squares of distances from a point exceed that of a radius, shape (m,), m².
+def measure_excess(x: Any, y: Any, radius: Any, place: Floats) -> Floats:
+    """Return by how much the squares of distances from a point exceed that of a radius, m².
 
     Parameters
     ----------
-    x, y, radius : float
+    x, y, radius : float or ndarray (b,)
         m.
-    place : ndarray (6, m)
+    place : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y² of the cells.
     """
-    excess: Floats = np.array(_circle(x, y, radius)).dot(place)
-    return excess
+    if place.ndim == 2:  # one product
+        excess: Floats = np.array(_circle(x, y, radius)).dot(place)
+        return excess
+    dx, dy = place[1] - x, place[2] - y
+    dx *= dx
+    dy *= dy
+    square: Floats = np.add(dx, dy, out=dx)
+    square -= radius * radius
+    return square
 
 
 def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
@@ -91,7 +128,7 @@ def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
     return (x * x + y * y - radius * radius, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0)
 
 
-def square_distance(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
+def measure_square(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
     """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
 
     Parameters

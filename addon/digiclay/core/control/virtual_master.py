@@ -3,65 +3,54 @@
 Locate, control, model, create: where the finger presses; a virtual spring until the force
 reaches its set point, then force control; a cylinder and valve like a real one turns the
 effort into the master's height; the cells around follow the blister's profile.
+
+What concerns cells holds for those of one run, (m,), and of a stack, (m, b); what concerns a
+master is decided in plain numbers, run by run.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, constants, count_true
+from ..base.counting import how_many, some
 from ..base.modes import Mode
-from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import ON_THE_SIDE
-from .bench import Bench
-from .blister import Blister
-from .master import Master, Phase, VirtualMaster
-from .master_cell import MasterCell, master_cell
-from .noise_floor import above, check_told
-from .servo import locked_under_overload
-from .travel import ABEAM, Heading, beyond, seen_from, turned
+from .device_info import DeviceInfo, check_floor, suppress_noise
+from .master import Master, MasterControl, Phase, VirtualMaster
+from .master_cell import make_master_cell
+from .runs import fill, sum_weighted
+from .servo import lock_overloaded
+from .travel import ABEAM, measure_excess, measure_offsets
 
-__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "assembled"]
+__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "build"]
 
 Floats = NDArray[np.float64]
 
 #: Share of the total force that the cell in the middle of the finger carries while shaping, at least: 0.23
 #: to 0.33 of it measured while the finger moves slowly.
 HEAVIEST = 0.25
-CODES = (Mode.EDGE, Mode.BLISTER, Mode.SPRING, Mode.FORCE_FOLLOW, Mode.FROZEN)
+CODES = tuple(int(mode) for mode in (Mode.EDGE, Mode.BLISTER, Mode.FROZEN))
 
 
-@dataclass(frozen=True)
-class VirtualMasterControl:
+@dataclass(frozen=True, eq=False)
+class VirtualMasterControl(MasterControl):
     """Controller of Method I for a bed.
 
     Attributes
     ----------
-    parameters : VirtualMaster
-    blister : Blister
-    actuator : Actuator
-        The cells' cylinders.
     lift : float
         Force the high reservoir can lift, N.
-    period : float
-        Control period, s.
-    model : MasterCell
-        The master's own cylinder and valve.
     floor : float
         Force from which on the reading of a cell is no noise, N.
     """
 
-    parameters: VirtualMaster
-    blister: Blister
-    actuator: Actuator
     lift: float
-    period: float
-    model: MasterCell
     floor: float = 0.0
 
     name = "virtual_master"
@@ -71,178 +60,130 @@ class VirtualMasterControl:
         """Return the memory before a session."""
         return Master()
 
-    def attend(
-        self, memory: Master, touched: Measurement
-    ) -> tuple[Master, tuple[float, float, float] | None]:
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Locate the finger and move the master; see `interfaces.Controller`."""
-        felt = touched._replace(force=above(touched.force, self.floor)) if self.floor else touched
-        pressed = felt.place.dot(felt.force).tolist()[:3]
-        master = self._locate(memory, felt, pressed)
-        if master.phase is Phase.IDLE:
-            return master, None
-        # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
-        given_up = self._given_up(master)
-        master = (
-            master._replace(height=master.felt)
-            if given_up
-            else self._lead(master, self._total(memory, touched, pressed[0]))
-        )
-        return master, (master.x, master.y, self.blister.edge_radius)
+        sums = self._sum_forces(memory, touched)
+        memory = self.decide(MasterControl.follow, memory, *sums)
+        held = self._sum_held(memory, touched, sums[0]) if self._noisy else sums[0]
+        memory = self.decide(MasterControl.lead, memory, held)
+        return memory, self.decide(MasterControl.find_disc, memory)
 
-    def _total(self, master: Master, touched: Measurement, felt: float) -> float:
+    def _sum_forces(self, memory: Any, touched: Measurement) -> tuple[Any, ...]:
+        """Return what `_follow` takes: sums over all cells, and over those near the master."""
+        place, force = touched.place, touched.force
+        if self._noisy:
+            force = suppress_noise(force, self.floor)
+        (none,) = fill((0.0,), force)
+        total, x, y, *_ = near = sum_weighted(place, force).tolist()
+        far = self._measure_excess(memory, place) > none
+        far &= force != none
+        if some(far):
+            near = sum_weighted(place, np.where(far, none, force)).tolist()
+        return total, x, y, *near[:3], sum_weighted(touched.height, force).tolist()
+
+    def _sum_held(self, memory: Any, touched: Measurement, felt: Any) -> Any:
         """Return the force that is controlled, N: of all touched cells, see docs/equations.md.
 
         Next to the master noise stays in, for what is below the floor adds up; farther off only what is no
         noise counts. `felt` is the sum of that everywhere, N.
         """
-        if not self.floor or master.phase is Phase.IDLE:
-            return felt
-        off = beyond(master.x, master.y, self.parameters.radius * (1.0 + ON_THE_SIDE), touched.place)
-        hidden = (off <= 0.0) & (touched.force < self.floor)
-        return felt + float(touched.force.dot(hidden))
+        hidden = self._measure_excess(memory, touched.place) <= 0.0
+        hidden &= touched.force < self.floor
+        noise = sum_weighted(touched.force, hidden.astype(float)).tolist()
+        return self.decide(VirtualMasterControl._add_noise, memory, felt, noise)
 
-    def _locate(self, master: Master, touched: Measurement, pressed: list[float]) -> Master:
-        """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
+    def _add_noise(self, master: Master, felt: float, noise: float) -> float:
+        """Return the force with what noise hides, N, once there is a master to be near to."""
+        return felt if master.phase is Phase.IDLE else felt + noise
 
-        `pressed` are the sum of all forces, N, and their moments with x and y, N m.
-        """
-        total, x, y = pressed
-        known, place, force = self.parameters, touched.place, touched.force
-        if total < known.felt_force:
-            return self._alone(master)
-        if master.phase is not Phase.IDLE:
-            none = constants(self.limits, force.shape)[0]
-            far = beyond(master.x, master.y, known.radius * (1.0 + ON_THE_SIDE), place) > none
-            far &= force != none
-            felt = total
-            if any_true(far):
-                felt, x, y = place.dot(np.where(far, none, force)).tolist()[:3]
-            if felt >= known.felt_force:
-                x, y = x / felt, y / felt
-                return master.at(x, y, turned(master.heading, x, y, known.travel))
-            # The finger has jumped out of reach: this is a new touch elsewhere.
-            master = master._replace(losses=master.losses + 1)
-            _, x, y = pressed
-        x, y = x / total, y / total
-        surface = float(force @ touched.height) / total
-        return Master(
-            Phase.SPRING,
-            x,
-            y,
-            surface,
-            0.0,
-            reference=surface,
-            edge=surface,
-            felt=surface,
-            heading=Heading(x, y),
-            losses=master.losses,
-        )
+    def _measure_excess(self, memory: Any, place: Floats) -> Floats:
+        """Return by how much cells are beyond the circle in which the finger is looked for, m²."""
+        x, y = self.gather(MasterControl.get_place, memory)
+        return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), place)
 
-    def _alone(self, master: Master) -> Master:
-        """Count the periods without a finger; give it up after the loss time."""
-        if master.phase is Phase.IDLE:
-            return master
-        if not self._given_up(master):
-            return master._replace(alone=master.alone + 1)
-        lost = master.phase is Phase.SHAPING
-        return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
-
-    def _given_up(self, master: Master) -> bool:
-        """Return whether the finger has been away for longer than the loss time."""
-        return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
-
-    def _lead(self, master: Master, force: float) -> Master:
-        """VM Control and VM Model: the effort, and the height a real cell would make of it."""
-        known, phase = self.parameters, master.phase
-        if force >= known.force_setpoint:
-            phase = Phase.SHAPING
-        if phase is Phase.SPRING:
-            effort = known.position_gain * (master.reference - force / known.spring_stiffness - master.height)
-        else:
-            effort = known.force_gain * (known.force_setpoint - force)
-        height, opening = self.model.after(master.height, master.opening, min(max(effort, -1.0), 1.0))
-        return master.led(phase, height, opening)
-
-    def command(self, memory: Master, seen: Measurement) -> tuple[Master, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Create the blister, freeze what is left behind, command every cell; see `interfaces.Controller`."""
-        target, mode = seen.target, self._left_alone(seen.target)
-        if memory.phase is not Phase.IDLE:
-            memory, target = self._created(memory, seen, mode)
-        command = locked_under_overload(
-            self.parameters.servo.command(target, seen.height), seen.force, self.lift
-        )
+        target, mode = seen.target, self._find_formed(seen.target)
+        if self.any_run(MasterControl.is_active, memory):
+            memory, target = self._create_blister(memory, seen, mode)
+        command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Orders(target, mode, command)
 
-    def _left_alone(self, target: Floats) -> NDArray[np.int8]:
+    def _find_formed(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        rest, band = constants(self.limits, target.shape)[-2:]
+        rest, band = fill(self._limits, target)[-2:]
         off = target - rest
         np.abs(off, off)
         # False and True are the codes of these two modes.
         mode: NDArray[np.int8] = (off > band).view(np.int8)
         return mode
 
-    def _created(self, master: Master, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Master, Floats]:
+    def _create_blister(self, memory: Any, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        blister, stroke = self.blister, self.actuator.stroke
-        limits = constants(self.limits, seen.target.shape)
-        _, abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = limits
-        edge, formed, spring, follow, froze = constants(CODES, seen.target.shape, np.int8)
-        distance, ahead = seen_from(master.heading, master.x, master.y, seen.place)
+        edge_mode, formed, froze = fill(CODES, seen.target, np.int8)
+        abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = fill(self._limits, seen.target)
+        x, y, toward_x, toward_y = self.gather(MasterControl.get_pose, memory)
+        distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.place)
         inside = distance <= radius
         ring = distance <= edge_radius
         ring ^= inside
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
         facing = ahead >= abeam
         facing &= ring
-        count = count_true(facing)
-        if count:
-            master = master.with_edge(float(facing.astype(np.float64).dot(seen.height)) / count)
+        level = sum_weighted(seen.height, facing.astype(float)).tolist()
+        memory = self.decide(MasterControl.set_edge, memory, level, how_many(facing))
+        edge, top, kind = self.gather(MasterControl.get_heights, memory)
+        profile = self.blister.interpolate(distance, edge, top)
         frozen = ahead < behind * distance
         frozen &= distance > flat_radius
         frozen |= seen.mode == froze
         frozen &= inside
         frozen &= seen.force < release
-        profile = blister.surface(distance, min(max(master.edge, 0.0), stroke), master.height)
-        if any_true(frozen):
+        if some(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
-            outgrown = np.maximum if master.height >= master.edge else np.minimum
-            np.putmask(profile, frozen, outgrown(profile, seen.target))
+            kept = seen.target > profile
+            kept ^= top < edge
+            kept &= frozen
+            np.putmask(profile, kept, seen.target)
         target = seen.target.copy()
         np.putmask(target, inside, profile)
         touched = seen.force > noise
         touched &= inside
         np.putmask(mode, inside, formed)
-        np.putmask(mode, touched, follow if master.phase is Phase.SHAPING else spring)
-        np.putmask(mode, ring, edge)
+        np.copyto(mode, kind, "unsafe", touched)
+        np.putmask(mode, ring, edge_mode)
         np.putmask(mode, frozen, froze)
-        return master, target
+        return memory, target
 
     @cached_property
-    def limits(self) -> tuple[float, ...]:
+    def _noisy(self) -> bool:
+        """Whether some reading may be noise."""
+        return bool(np.any(self.floor))
+
+    @cached_property
+    def _limits(self) -> tuple[Any, ...]:
         """Thresholds of the cells.
 
-        No force; how far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the
-        height of a pin at rest, and how far from it one counts as formed, m. Circles are widened
-        by a billionth, for the sake of cells exactly on them.
+        How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the height of a
+        pin at rest, and how far from it one counts as formed, m. Circles are widened by a billionth,
+        for the sake of cells exactly on them.
         """
-        blister = self.blister
+        blister, known = self.blister, self.parameters
         wider = (
             radius * (1.0 + ON_THE_SIDE)
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
-        known = self.parameters
-        rest = self.actuator.rest_height, known.dead_band
-        release = max(known.release_force, self.floor)
-        return (0.0, -ABEAM, *wider, known.behind, release, self.floor, *rest)
+        release = np.maximum(known.release_force, self.floor) if self._noisy else known.release_force
+        return (
+            -ABEAM, *wider, known.behind, release, self.floor, self.actuator.rest_height, known.dead_band
+        )  # fmt: skip
 
 
-def assembled(parameters: VirtualMaster, bench: Bench) -> VirtualMasterControl:
-    """Put Method I together for a device; the bench has a blister."""
-    assert bench.blister is not None
+def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:
+    """Put Method I together for a device; the device has a blister."""
+    assert device.blister is not None
     asked = parameters.force_setpoint
-    check_told(HEAVIEST * asked, "force_setpoint", asked, bench.force_floor)
-    model = master_cell(bench.cell, bench.period)
-    return VirtualMasterControl(
-        parameters, bench.blister, bench.cell.actuator, bench.lift, bench.period, model, bench.force_floor
-    )
+    check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)
+    model = make_master_cell(device.cell, device.period)
+    parts = parameters, device.blister, device.cell.actuator, model
+    return VirtualMasterControl(*parts, device.period, device.lift, device.force_floor)

@@ -17,14 +17,13 @@ from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import Grid
-from .bench import Bench
-from .drive import Drive, TouchParameters, check_damping, drive, feeling_above
-from .neighbours import Exchange, cells_at, exchange
-from .servo import locked_under_overload
+from .device_info import DeviceInfo
+from .drive import Drive, TouchParameters, check_damping, make_drive, raise_felt_force
 
-__all__ = ["Spot", "Viscous", "ViscousControl", "assembled"]
+__all__ = ["Exchange", "Spot", "Viscous", "ViscousControl", "build", "make_exchange"]
 
 Floats = NDArray[np.float64]
+Cells = NDArray[np.intp]
 
 #: Displacement below which the border of the displaced region is of no interest, in dead bands.
 BORDER = 0.1
@@ -68,6 +67,85 @@ class Viscous(TouchParameters):
     )
 
 
+@dataclass(frozen=True)
+class Exchange:
+    """How neighbours even out in one control period.
+
+    Attributes
+    ----------
+    columns : int
+        Cells in a row.
+    shifted : bool
+        Whether odd rows are shifted, so that a cell has six neighbours, not four.
+    along, across : float
+        Share of their difference that two neighbours exchange, in a row and between rows.
+    """
+
+    columns: int
+    shifted: bool
+    along: float
+    across: float
+
+    def find_pairs(self, cells: Cells) -> list[tuple[Cells, Cells, float]]:
+        """Return where in `cells` neighbours stand, each pair once, with the share they exchange."""
+        row, column = np.divmod(cells, self.columns)
+        last = self.columns - 1
+        steps = [(1, column < last, self.along), (self.columns, column <= last, self.across)]
+        if self.shifted:  # even rows reach left as well, odd ones right
+            odd = row % 2 == 1
+            steps.append((self.columns - 1, ~odd & (column > 0), self.across))
+            steps.append((self.columns + 1, odd & (column < last), self.across))
+        order = np.argsort(cells)
+        ascending = cells[order]
+        found = []
+        for step, exists, share in steps:
+            start = np.flatnonzero(exists)
+            goal = cells[start] + step
+            at = np.minimum(np.searchsorted(ascending, goal), cells.size - 1)
+            here = ascending[at] == goal
+            found.append((start[here], order[at[here]], share))
+        return found
+
+    def even_out(self, cells: Cells, values: Floats) -> Floats:
+        """Return values of some cells, shape (m,), after neighbours among them have exchanged.
+
+        What one gives the other gets, and nothing is exchanged with a cell that is not there: the
+        sum stays what it was.
+        """
+        change = np.zeros(cells.size)
+        for one, other, share in self.find_pairs(cells):
+            flow = share * (values[other] - values[one])
+            change += np.bincount(one, flow, cells.size) - np.bincount(other, flow, cells.size)
+        evened: Floats = values + change
+        return evened
+
+
+def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
+    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions.
+
+    The rates come from matching ``D`` along x and y; their sum is limited so that no period,
+    however long, makes neighbours overshoot one another.
+
+    Parameters
+    ----------
+    grid : Grid
+    diffusivity : float
+        m²/s.
+    period : float
+        Control period, s.
+    """
+    plan = grid.layout
+    if plan.arrangement == "aligned":
+        along, across = diffusivity / plan.pitch**2, diffusivity / plan.row_spacing**2
+        total = 2.0 * (along + across)
+    else:
+        across = diffusivity / (2.0 * plan.row_spacing**2)
+        along = diffusivity / plan.pitch**2 - across / 2.0
+        total = 2.0 * along + 4.0 * across
+    limited = -math.expm1(-2.0 * total * period) / (2.0 * total) if total else 0.0
+    return Exchange(plan.columns, plan.shift > 0.0, along * limited, across * limited)
+
+
 @dataclass(frozen=True, eq=False)
 class ViscousControl:
     """Controller of the viscous behaviour for a bed.
@@ -83,7 +161,6 @@ class ViscousControl:
     """
 
     parameters: Viscous
-    grid: Grid
     actuator: Actuator
     drive: Drive
     exchange: Exchange
@@ -97,7 +174,7 @@ class ViscousControl:
         """Return the memory before a session."""
         return Spot()
 
-    def attend(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
+    def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
         """Ask for all displaced cells and a margin around them; see `interfaces.Controller`."""
         spot = memory.around(touched.place[:, touched.force >= self.parameters.felt_force])
         return spot, spot.disc(self.margin)
@@ -105,9 +182,9 @@ class ViscousControl:
     def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Orders]:
         """Exchange, relax, and move every cell to its new height; see `interfaces.Controller`."""
         known, actuator = self.parameters, self.actuator
-        cells, rest = cells_at(self.grid, seen.place), actuator.rest_height
+        cells, rest = seen.cells, actuator.rest_height
         pressed = seen.force >= known.felt_force
-        shift = self.exchange.evened(cells, seen.target - rest)
+        shift = self.exchange.even_out(cells, seen.target - rest)
         decay = math.exp(-self.period / known.recovery_time)
         # Spring k = c / τ_r: the exact solution of c du/dt = -F - k u over the period.
         shift *= decay
@@ -121,17 +198,14 @@ class ViscousControl:
         target, formed = rest + shift, size > known.dead_band
         # The surface creeps by less than the dead band a period: its own speed is asked for as well.
         creep = np.where(formed, (target - seen.target) / self.period, 0.0)
-        command = self.drive.at_speed(creep + self.drive.approach(target - seen.height))
-        command = locked_under_overload(command, seen.force, self.drive.lift)
+        command = self.drive.command(creep + self.drive.approach(target - seen.height), seen.force)
         return memory, Orders(target, self._modes(cells, pressed, formed), command)
 
-    def _modes(
-        self, cells: NDArray[np.intp], pressed: NDArray[np.bool_], formed: NDArray[np.bool_]
-    ) -> NDArray[np.int8]:
+    def _modes(self, cells: Cells, pressed: NDArray[np.bool_], formed: NDArray[np.bool_]) -> NDArray[np.int8]:
         """Return the modes: pressed, drawn along by a pressed neighbour, recovering, at rest."""
         drawn = np.zeros(cells.size, np.bool_)
         if pressed.any():
-            for one, other, _ in self.exchange.pairs(cells):
+            for one, other, _ in self.exchange.find_pairs(cells):
                 drawn[one] |= pressed[other]
                 drawn[other] |= pressed[one]
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
@@ -140,15 +214,14 @@ class ViscousControl:
         return mode
 
 
-def assembled(parameters: Viscous, bench: Bench) -> ViscousControl:
+def build(parameters: Viscous, device: DeviceInfo) -> ViscousControl:
     """Put the viscous behaviour together for a device."""
-    check_damping(parameters.damping, bench.cell, bench.period)
+    check_damping(parameters.damping, device.cell, device.period)
     return ViscousControl(
-        feeling_above(bench.force_floor, parameters),
-        bench.grid,
-        bench.cell.actuator,
-        drive(parameters, bench.cell, bench.period),
-        exchange(bench.grid, parameters.diffusivity, bench.period),
-        bench.period,
-        2.0 * bench.grid.layout.pitch,
+        raise_felt_force(device.force_floor, parameters),
+        device.cell.actuator,
+        make_drive(parameters, device.cell, device.period),
+        make_exchange(device.grid, parameters.diffusivity, device.period),
+        device.period,
+        2.0 * device.grid.layout.pitch,
     )

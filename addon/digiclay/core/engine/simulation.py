@@ -77,7 +77,7 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
     finger : Approach or None
         From `approaches`.
     """
-    memory, control = _attend(system, state)
+    memory, control = _locate(system, state)
     state = taking_part(system, state, finger, control)
     held = state.gathered
     if not held.cells.size:
@@ -111,21 +111,23 @@ def _ready(system: System, held: Gathered) -> _Ready:
     known: _Ready | None = held.ready.get(system.plan)
     if known is None:
         touched, everything = (
-            Measurement(part.place, part.height, part.force, part.target, part.mode, part.controlled)
+            Measurement(
+                part.place, part.height, part.force, part.target, part.mode, part.controlled, part.cells
+            )
             for part in (held.touched, held.all)
         )
-        movement = system.stepper.prepare(system.plan, held.driven, held.near)
+        movement = system.stepper.bind(system.plan, held.driven, held.near)
         known = held.ready[system.plan] = _Ready(touched, everything, movement)
     return known
 
 
-def _attend(system: System, state: State) -> tuple[Any, tuple[float, float, float] | None]:
+def _locate(system: System, state: State) -> tuple[Any, tuple[float, float, float] | None]:
     """Let the controller take in the touched cells; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
     held = state.gathered
     seen = _measured(system, _ready(system, held).touched, held.touched, state.period)
-    return system.controller.attend(state.memory, seen)
+    return system.controller.locate(state.memory, seen)
 
 
 def _truth(part: Part, period: int) -> Truth:

@@ -31,8 +31,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 #: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
-#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
-#: the cells of b runs all arrays have one axis more, the last.
+#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N.
 Movement = Callable[[Floats], Floats]
 
 
@@ -80,9 +79,9 @@ class Pulp(Protocol):
 
     def rate(self, own: Floats, tension: Floats) -> Floats: ...
 
-    def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
+    def lost(self, step: float) -> tuple[Floats, float]: ...
 
-    def propagator(self, step: float) -> Floats: ...
+    def transition(self, step: float) -> Floats: ...
 
     def age(self, own: Floats, time: Floats) -> None: ...
 
@@ -146,14 +145,14 @@ class Stepper(Protocol):
         """Work out once what all periods share."""
         ...
 
-    def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
-        """Prepare to move a block of cells on, as often as its set of cells serves.
+    def bind(self, plan: Any, driven: Floats, near: int) -> Movement:
+        """Make ready to move a block of cells on, as often as its set of cells serves.
 
         Parameters
         ----------
         plan : object
-            From `plan`; with the numbers of all runs for cells of many.
-        rows : ndarray (r + q, n) or (r + q, n, b)
+            From `plan`.
+        driven : ndarray (r + q, n)
             State rows, see `physics.Cell`, then the commands of the queue, oldest first.
         near : int
             Number k of cells, the first, that the finger may touch.
@@ -192,6 +191,8 @@ class Measurement(NamedTuple):
     mode : ndarray (m,) of int8
     own : ndarray (rows, m)
         What the controller remembers of each cell; brought up to date in place.
+    cells : ndarray of int (m,)
+        Their numbers in the bed.
     """
 
     place: Floats
@@ -200,6 +201,7 @@ class Measurement(NamedTuple):
     target: Floats
     mode: NDArray[np.int8]
     own: Floats
+    cells: NDArray[np.intp]
 
 
 class Orders(NamedTuple):
@@ -225,7 +227,7 @@ class Controller(Protocol):
         """Return the memory before a session."""
         ...
 
-    def attend(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
         """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
         ...
 

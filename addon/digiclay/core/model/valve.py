@@ -84,6 +84,8 @@ class Orifice:
 
     def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
         """Return the opening's size to the power of the laminar branch."""
+        if out is None:
+            return opening * opening if self.power == 2 else abs(opening)
         return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:

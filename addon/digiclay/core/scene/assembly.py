@@ -119,20 +119,20 @@ def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
     """Return the control method, before it the display of a shape; or None: every valve stays shut."""
     if scene.control is None and scene.shape is None:
         return None
-    from ..control.bench import Bench
+    from ..control.device_info import DeviceInfo
 
     known = scene.sensors
     floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
-    bench = Bench(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
+    device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
     if scene.shape:
         from ..shapes.source_file import fitted_to
 
-        bench = replace(bench, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
+        device = replace(device, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
-        controller = part(METHODS[scene.method].module, "assembled")(scene.control, bench)
+        controller = part(METHODS[scene.method].module, "build")(scene.control, device)
     if scene.shape and not (controller and controller.name == "shape_display"):
         from ..control.handover import handover
 
-        controller = handover(scene.shape, bench, controller, recovers=METHODS[scene.method].recovers)
+        controller = handover(scene.shape, device, controller, recovers=METHODS[scene.method].recovers)
     return controller

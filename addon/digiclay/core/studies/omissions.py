@@ -116,14 +116,7 @@ class Fitted:
 
 
 def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
-    """Give what a scene could do without: parts, physics steps, and cells that creep to their height.
-
-    Parameters
-    ----------
-    scene : Scene
-    budget : float
-        Error of height, m.
-    """
+    """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
     simulation = scene.simulation
     steps = simulation.steps
     for fewer in range(1, steps):

@@ -1,0 +1,97 @@
+"""Data of the device that a controller may use, and the noise floor of its sensors.
+
+The noise floor is the force from which on one reading is no noise, five standard deviations of a cell's
+sensor (`sensors.Sensing.force_floor`); 0 with sensors without noise. Touch is told cell by cell: a sum of n
+readings would need five times √n, more than a finger at the rim of its contact presses with. A force that is
+controlled is the sum of the readings as they are, which has no bias.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import ParameterError
+from ..model.layout import Grid
+from ..model.physics import Cell
+from .blister import Blister
+
+__all__ = ["DeviceInfo", "check_floor", "suppress_noise"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceInfo:
+    """The device, as its maker would describe it to a controller.
+
+    Attributes
+    ----------
+    grid : Grid
+    cell : Cell
+        The cells' physics.
+    period : float
+        Control period, s.
+    blister : Blister or None
+        For the methods that form one.
+    heights : ndarray (n,) or None
+        The shape from outside that is to be displayed, m.
+    force_floor : float
+        Force from which on the reading of a cell is no noise, N; see `sensors.Sensing`.
+    height_floor : float
+        How far the reading of a height may be off, m.
+    """
+
+    grid: Grid
+    cell: Cell
+    period: float
+    blister: Blister | None = None
+    heights: Floats | None = None
+    force_floor: float = 0.0
+    height_floor: float = 0.0
+
+    @property
+    def lift(self) -> float:
+        """Force the high reservoir can lift, ``P_high A_a``, N."""
+        return self.cell.supply.high * self.cell.actuator.area
+
+
+def suppress_noise(force: Floats, floor: Any) -> Floats:
+    """Return forces, but 0 where they may be noise.
+
+    Parameters
+    ----------
+    force : ndarray (m,) or (m, b)
+        N.
+    floor : float or ndarray (b,)
+        N.
+    """
+    return np.where(force >= floor, force, 0.0)
+
+
+def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
+    """Refuse noise that hides what is asked for: the finger would never be felt where it should be held.
+
+    Parameters
+    ----------
+    carried : float
+        Force on a cell when all is as asked, N.
+    field : str
+        Of the control, for the message.
+    asked : float
+        Its value, N.
+    floor : float
+        N.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if floor >= carried:
+        rule = f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"
+        raise ParameterError(
+            "sensors", "force_noise", f"{rule} with control.{field} = {asked:.3g} N", f"{floor:.3g} N"
+        )
