@@ -12,7 +12,7 @@ from digiclay.commands.arguments import add_command
 from digiclay.commands.progress import Line
 from digiclay.commands.refusals import refuse_without
 from digiclay.commands.stop import Stop
-from digiclay.core.base.run_folder import may_be_written, written
+from digiclay.core.base.run_folder import check_folder, write_folder
 
 __all__ = ["add"]
 
@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Simulate, draw, write, and tell how the claims came out."""
-    may_be_written(arguments.out, overwrite=arguments.overwrite)
+    check_folder(arguments.out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay paper", "pip install digiclay[plots]")
     from .results import FULL, QUICK
     from .work import produce
@@ -47,7 +47,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with (
         Stop() as stop,
         Stages(sys.stderr, stop, quiet=arguments.quiet) as told,
-        written(arguments.out, overwrite=arguments.overwrite) as folder,
+        write_folder(arguments.out, overwrite=arguments.overwrite) as folder,
     ):
         verdicts = produce(folder, QUICK if arguments.quick else FULL, told)
     if not arguments.quiet:

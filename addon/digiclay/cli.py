@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from .commands.exit_codes import STOPPED, WRONG
-from .commands.stop import undisturbed
+from .commands.stop import defer_interrupt
 from .core.base.errors import DigiclayError, one_line
 
 __all__ = ["carry_out", "console", "main", "run_as_program"]
@@ -54,7 +54,7 @@ def carry_out(parse: Callable[[], Any]) -> int:
 
 def _parsed(argv: Sequence[str] | None) -> Any:
     """Read the arguments."""
-    with undisturbed():
+    with defer_interrupt():
         from .commands.parser import parser
 
         return parser().parse_args(argv)

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.commands.batch import JobProcess
-from digiclay.commands.batch_folder import opened
+from digiclay.commands.batch_folder import open_batch
 from digiclay.core.base.errors import OutputError
-from digiclay.core.studies.job_table import batch
+from digiclay.core.studies.job_table import read_jobs
 
 from tests.other_process import dead
 from tests.patience import HANGS, until
@@ -185,11 +185,11 @@ def test_a_job_can_be_done_elsewhere_from_its_files_alone(here: Path) -> None:
 
 def test_two_batches_cannot_work_in_one_folder() -> None:
     jobs(TWO)
-    made = batch(Path("two.toml"))
+    made = read_jobs(Path("two.toml"))
     with (
-        opened(Path("two"), made),
+        open_batch(Path("two"), made),
         pytest.raises(OutputError, match="being worked in by another digiclay"),
-        opened(Path("two"), made),
+        open_batch(Path("two"), made),
     ):
         pass
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.processes import host
-from digiclay.core.base.run_folder import claimed, claimed_files, inside, lock_beside, written
+from digiclay.core.base.processes import find_host
+from digiclay.core.base.run_folder import claim_files, claim_folder, find_lock, resolve_inside, write_folder
 from digiclay.core.base.unfinished import remove_abandoned
 
 from tests.other_process import dead
@@ -146,7 +146,7 @@ def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_ba
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors"])
-    shutil.move("o", f".o.{dead()}@{host()}.old")
+    shutil.move("o", f".o.{dead()}@{find_host()}.old")
     assert main(["run", "my.toml", "--out", "o", "--quiet"]) == 2
     assert "o is not empty" in capsys.readouterr().err
     assert names() == ["my.toml", "o"]
@@ -154,7 +154,7 @@ def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_ba
 
 def test_what_comes_in_between_is_not_replaced_at_the_end() -> None:
     def interfere() -> None:
-        with written(Path("o"), overwrite=False):
+        with write_folder(Path("o"), overwrite=False):
             Path("o").mkdir()
             Path("o/thesis.doc").touch()
 
@@ -164,15 +164,15 @@ def test_what_comes_in_between_is_not_replaced_at_the_end() -> None:
 
 
 def test_a_claim_ends_with_its_block_and_leaves_no_folder() -> None:
-    with claimed(Path("a/b/o"), overwrite=False):
-        with pytest.raises(OutputError, match="being written"), claimed(Path("a/b/o"), overwrite=False):
+    with claim_folder(Path("a/b/o"), overwrite=False):
+        with pytest.raises(OutputError, match="being written"), claim_folder(Path("a/b/o"), overwrite=False):
             pass
-        with claimed(Path("a/b/other"), overwrite=False):
+        with claim_folder(Path("a/b/other"), overwrite=False):
             pass
-    with claimed(Path("a/b/o"), overwrite=False) as claim, claim.written():
+    with claim_folder(Path("a/b/o"), overwrite=False) as claim, claim.write():
         pass
     assert names(Path("a/b")) == ["o"]
-    with pytest.raises(ZeroDivisionError), claimed(Path("c/d/o"), overwrite=False):
+    with pytest.raises(ZeroDivisionError), claim_folder(Path("c/d/o"), overwrite=False):
         raise ZeroDivisionError
     assert names() == ["a", "my.toml"]
 
@@ -181,9 +181,9 @@ def test_one_folder_by_two_names_is_one_claim() -> None:
     Path("real").mkdir()
     Path("link").symlink_to("real")
     with (
-        claimed(Path("real/o"), overwrite=False),
+        claim_folder(Path("real/o"), overwrite=False),
         pytest.raises(OutputError, match="being written"),
-        claimed(Path("link/../link/o"), overwrite=False),
+        claim_folder(Path("link/../link/o"), overwrite=False),
     ):
         pass
 
@@ -192,8 +192,8 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends() -> None:
     script = (
         "import sys, time\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.run_folder import claimed\n"
-        "with claimed(Path('o'), overwrite=False):\n"
+        "from digiclay.core.base.run_folder import claim_folder\n"
+        "with claim_folder(Path('o'), overwrite=False):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"
         "    time.sleep(0.3)\n"
@@ -205,26 +205,26 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends() -> None:
     assert other.stdout is not None
     assert other.stdout.readline() == "here\n"
     other.communicate("go\n", timeout=HANGS)
-    with claimed(Path("o"), overwrite=False, patience=HANGS):
-        assert lock_beside(Path("o")).exists()
+    with claim_folder(Path("o"), overwrite=False, patience=HANGS):
+        assert find_lock(Path("o")).exists()
     assert names() == ["my.toml"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no fork")
 def test_a_process_that_was_started_does_not_keep_the_claim() -> None:
-    with claimed(Path("o"), overwrite=False):
+    with claim_folder(Path("o"), overwrite=False):
         child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    with claimed(Path("o"), overwrite=False):
+    with claim_folder(Path("o"), overwrite=False):
         child.communicate(b"\n", timeout=HANGS)
     assert child.returncode == 0
 
 
 def test_two_exports_do_not_write_one_file_at_once() -> None:
     Path("o").mkdir()
-    with claimed_files([Path("o/a.stl"), Path("o/b.stl")]):
-        with claimed_files([Path("o/c.stl")]):
+    with claim_files([Path("o/a.stl"), Path("o/b.stl")]):
+        with claim_files([Path("o/c.stl")]):
             pass
-        with pytest.raises(OutputError, match=r"b\.stl is being written"), claimed_files([Path("o/b.stl")]):
+        with pytest.raises(OutputError, match=r"b\.stl is being written"), claim_files([Path("o/b.stl")]):
             pass
     assert names(Path("o")) == []
 
@@ -233,7 +233,7 @@ def test_a_path_that_leads_out_of_a_folder_is_refused(here: Path) -> None:
     (here / "o" / "runs").mkdir(parents=True)
     (here / "elsewhere").mkdir()
     (here / "o" / "link").symlink_to(here / "elsewhere")
-    assert inside(Path("o"), "runs", "a") == Path("o/runs/a")
+    assert resolve_inside(Path("o"), "runs", "a") == Path("o/runs/a")
     for parts in (("..",), ("runs", "..", ".."), ("",), ("link", "a"), (str(here / "elsewhere"),)):
         with pytest.raises(OutputError, match="leads out of o"):
-            inside(Path("o"), *parts)
+            resolve_inside(Path("o"), *parts)

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.file_lock import held, held_by_record
-from digiclay.core.base.processes import host, may_have_made, running_since
-from digiclay.core.base.unfinished import is_unfinished, remove_abandoned, unfinished
+from digiclay.core.base.file_lock import hold_lock, hold_record
+from digiclay.core.base.processes import find_host, find_start, may_have_made
+from digiclay.core.base.unfinished import is_unfinished, name_unfinished, remove_abandoned
 
 from tests.other_process import dead
 from tests.patience import HANGS, until
@@ -35,9 +35,9 @@ def names(folder: Path = Path()) -> list[str]:
 
 def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_away() -> None:
     gone = dead()
-    left = [f".o.{gone}.part", f".o.{gone}@{host()}.part"]
+    left = [f".o.{gone}.part", f".o.{gone}@{find_host()}.part"]
     kept = [
-        f".o.{os.getpid()}@{host()}.part",  # this one lives
+        f".o.{os.getpid()}@{find_host()}.part",  # this one lives
         f".o.{gone}@elsewhere.part",  # nobody knows
         f".p.{gone}.part",  # another one's
         ".o.part", "o.1.part", f".o.{gone}.doc",
@@ -51,7 +51,7 @@ def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_aw
 def test_a_number_that_another_process_has_got_since_counts_as_gone() -> None:
     path = Path(f".o.{os.getpid()}.part")
     path.mkdir()
-    since = running_since(os.getpid())
+    since = find_start(os.getpid())
     assert since is not None
     os.utime(path, (since - 3600.0, since - 3600.0))  # before this process was started
     remove_abandoned(Path(), "o")
@@ -62,7 +62,7 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
     before = time.time()
     process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1000)"])
     try:
-        since = running_since(process.pid)
+        since = find_start(process.pid)
         assert since is not None
         # The system counts in hundredths of a second from when it was booted, which it knows to a second.
         assert before - 2.0 <= since <= time.time() + 2.0
@@ -71,36 +71,36 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
     finally:
         process.kill()
         process.wait(HANGS)
-    assert running_since(process.pid) is None
+    assert find_start(process.pid) is None
     assert not may_have_made(process.pid, time.time())
 
 
 def test_a_process_that_nobody_has_asked_how_it_ended_is_gone() -> None:
     process = subprocess.Popen([sys.executable, "-c", ""])
-    until(lambda: running_since(process.pid) is None)
+    until(lambda: find_start(process.pid) is None)
     process.wait(HANGS)
 
 
 def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
     record = here / "record"
     with (
-        held_by_record(record, "It is held."),
+        hold_record(record, "It is held."),
         pytest.raises(OutputError, match=r"^It is held\.$"),
-        held_by_record(record, "It is held."),
+        hold_record(record, "It is held."),
     ):
         pass
     assert not record.exists()
-    record.write_text(f"{host()} {dead()}\n", encoding="utf-8")  # left by a crash
-    with held_by_record(record, "It is held."):
-        assert record.read_text(encoding="utf-8").split() == [host(), str(os.getpid())]
+    record.write_text(f"{find_host()} {dead()}\n", encoding="utf-8")  # left by a crash
+    with hold_record(record, "It is held."):
+        assert record.read_text(encoding="utf-8").split() == [find_host(), str(os.getpid())]
     record.write_text("", encoding="utf-8")  # the disk was full, long ago
     os.utime(record, (0.0, 0.0))
-    with held_by_record(record, "It is held."):
+    with hold_record(record, "It is held."):
         pass
     record.write_text("elsewhere 1\n", encoding="utf-8")
     with (
         pytest.raises(OutputError, match=r"begun on elsewhere; if nothing runs there, remove .*record"),
-        held_by_record(record, "It is held."),
+        hold_record(record, "It is held."),
     ):
         pass
 
@@ -110,9 +110,9 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
     script = (
         "import os\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.file_lock import held\n"
+        "from digiclay.core.base.file_lock import hold_lock\n"
         "for _ in range(60):\n"
-        "    with held(Path('d/lock'), 'no', 100.0):\n"
+        "    with hold_lock(Path('d/lock'), 'no', 100.0):\n"
         "        os.close(os.open('inside', os.O_CREAT | os.O_EXCL))\n"
         "        os.unlink('inside')\n"
     )
@@ -126,7 +126,7 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
 
 def test_what_is_unfinished_is_known_by_its_name() -> None:
     for kind in ("part", "old", "frames"):
-        assert is_unfinished(unfinished(Path("a/b c.stl"), kind))
+        assert is_unfinished(name_unfinished(Path("a/b c.stl"), kind))
     assert not is_unfinished(Path("a/.b.stl"))
 
 
@@ -135,8 +135,8 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from digiclay.core.base.file_lock import held\n"
-        "with held(Path('lock'), 'no'):\n"
+        "from digiclay.core.base.file_lock import hold_lock\n"
+        "with hold_lock(Path('lock'), 'no'):\n"
         "    print('here', flush=True)\n"
         "    sys.stdin.readline()\n"
     )
@@ -146,11 +146,11 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
     )  # fmt: skip
     assert other.stdout is not None
     assert other.stdout.readline() == "here\n"
-    with pytest.raises(OutputError, match="taken"), held(Path("lock"), "taken"):
+    with pytest.raises(OutputError, match="taken"), hold_lock(Path("lock"), "taken"):
         pass
     other.send_signal(signal.SIGKILL)
     other.communicate(timeout=HANGS)
     assert Path("lock").exists()
-    with held(Path("lock"), "taken"):
+    with hold_lock(Path("lock"), "taken"):
         pass
     assert not Path("lock").exists()

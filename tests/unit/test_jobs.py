@@ -13,8 +13,8 @@ from digiclay.core.scene.scene_source import SAMPLES, load
 from digiclay.core.scene.toml_table import text
 from digiclay.core.session.render_settings import Film, Still, Turntable
 from digiclay.core.shapes.source_file import fitted_to
-from digiclay.core.studies.job_outputs import Outputs, outputs
-from digiclay.core.studies.job_table import batch, job_outputs
+from digiclay.core.studies.job_outputs import Outputs, make_outputs
+from digiclay.core.studies.job_table import read_jobs, read_outputs
 
 
 def jobs_file(folder: Path, said: str) -> Path:
@@ -32,7 +32,7 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
     soft = { control.force_setpoint = "300 mN" }
     firm.control.force_setpoint = 0.6
     """
-    made = batch(jobs_file(tmp_path, said))
+    made = read_jobs(jobs_file(tmp_path, said))
     assert [job.name for job in made.jobs] == [
         f"{scene}-{method}-{label}"
         for scene in ("tap", "slow_press")
@@ -46,7 +46,7 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
 
 
 def test_a_file_that_names_only_scenes_runs_each_as_it_is(tmp_path: Path) -> None:
-    made = batch(jobs_file(tmp_path, 'scenes = ["tap"]'))
+    made = read_jobs(jobs_file(tmp_path, 'scenes = ["tap"]'))
     assert [(job.name, job.scene) for job in made.jobs] == [("tap", load(SAMPLES / "tap.toml"))]
     assert made.outputs == Outputs()
 
@@ -57,7 +57,7 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(
     (tmp_path / "Übung 1.toml").write_text("simulation.duration = 0.25", encoding="utf-8")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    (job,) = batch(jobs_file(tmp_path, 'scenes = ["Übung 1.toml"]')).jobs
+    (job,) = read_jobs(jobs_file(tmp_path, 'scenes = ["Übung 1.toml"]')).jobs
     assert job.name == "Übung_1"
     assert job.scene is not None
     assert job.scene.simulation.duration == 0.25
@@ -65,7 +65,7 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(
 
 def test_values_that_do_not_go_together_make_one_job_with_an_error(tmp_path: Path) -> None:
     said = 'scenes = ["tap"]\nsettings.narrow = { layout.pitch = "1 mm" }\nsettings.wide.layout.pitch = 0.004'
-    narrow, wide = batch(jobs_file(tmp_path, said)).jobs
+    narrow, wide = read_jobs(jobs_file(tmp_path, said)).jobs
     assert (narrow.scene, wide.error) == (None, "")
     assert "settings.narrow: layout.pitch must be at least actuator.bore" in narrow.error
 
@@ -101,14 +101,14 @@ def test_values_that_do_not_go_together_make_one_job_with_an_error(tmp_path: Pat
 )
 def test_a_mistake_is_told_in_one_line(said: str, told: str, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=told) as caught:
-        batch(jobs_file(tmp_path, said))
+        read_jobs(jobs_file(tmp_path, said))
     assert "\n" not in str(caught.value)
 
 
 def test_a_batch_of_more_jobs_than_anyone_wants_is_refused(tmp_path: Path) -> None:
     labels = "\n".join(f"n{i} = {{}}" for i in range(10_001))
     with pytest.raises(SceneError, match=r"10000 jobs at most \(got 10001 jobs\)"):
-        batch(jobs_file(tmp_path, f'scenes = ["tap"]\n[settings]\n{labels}'))
+        read_jobs(jobs_file(tmp_path, f'scenes = ["tap"]\n[settings]\n{labels}'))
 
 
 def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
@@ -118,9 +118,9 @@ def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
     )  # fmt: skip
     path = tmp_path / "job.toml"
     path.write_text(made.text(), encoding="utf-8")
-    assert job_outputs(path) == made
+    assert read_outputs(path) == made
     path.write_text(Outputs().text(), encoding="utf-8")
-    assert job_outputs(path) == Outputs()
+    assert read_outputs(path) == Outputs()
 
 
 def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
     said = 'control = "absent"\nlayout = { rows = 5, columns = 5 }\nshape.file = "own.npy"\n'
     (tmp_path / "shaped.toml").write_text(said, encoding="utf-8")
     path = jobs_file(tmp_path, 'scenes = ["shaped.toml"]')
-    (job,) = batch(path).jobs
+    (job,) = read_jobs(path).jobs
     assert job.scene is not None
     assert job.scene.shape is not None
     (tmp_path / "far").mkdir()
@@ -142,16 +142,16 @@ def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
 
 
 def test_the_sample_batch_makes_eight_sound_jobs() -> None:
-    made = batch(SAMPLES.parent / "batches" / "first.toml")
+    made = read_jobs(SAMPLES.parent / "batches" / "first.toml")
     assert len(made.jobs) == 8
     assert [job.error for job in made.jobs] == [""] * 8
 
 
 def test_what_is_exported_is_read_and_written_with_the_job() -> None:
-    made = outputs({"export": ["stl"], "mesh": {"kind": "features", "skin": "smooth"}})
+    made = make_outputs({"export": ["stl"], "mesh": {"kind": "features", "skin": "smooth"}})
     assert (made.mesh.kind, made.mesh.skin) == ("features", "smooth")
-    assert outputs(tomllib.loads(made.text())) == made
+    assert make_outputs(tomllib.loads(made.text())) == made
 
 
 def test_a_job_without_the_section_exports_the_solid() -> None:
-    assert outputs({"export": ["stl"]}).mesh.kind == "solid"
+    assert make_outputs({"export": ["stl"]}).mesh.kind == "solid"

@@ -14,7 +14,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
-from digiclay.commands.extras import as_typed
+from digiclay.commands.extras import format_command
 from digiclay.core.mesh_io import mesh_reader
 
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
@@ -162,24 +162,26 @@ def test_what_cannot_be_plotted_is_told_in_a_line(
 
 
 def test_a_command_is_written_as_a_shell_takes_it() -> None:
-    assert as_typed(["export", "it's mine", "--format", "stl,obj"]) == (
+    assert format_command(["export", "it's mine", "--format", "stl,obj"]) == (
         "digiclay export 'it'\"'\"'s mine' --format stl,obj"
     )
 
 
 def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) -> None:
-    from digiclay.commands.extras import meshes
+    from digiclay.commands.extras import plan_meshes
     from digiclay.core.scene.scene_source import load
-    from digiclay.core.session.finished_run import row_at
+    from digiclay.core.session.finished_run import find_row
 
     times = np.arange(2000) * 0.005
     for row in (1, 777, 1999):
-        later = meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed").later(Path("o"))
-        assert row_at({"time": times}, float(later[later.index("--time") + 1]), "--time") == row
+        later = plan_meshes(load(Path("my.toml")), {"time": times}, ["stl"], row, "displayed").later(
+            Path("o")
+        )
+        assert find_row({"time": times}, float(later[later.index("--time") + 1]), "--time") == row
 
 
 def test_libraries_that_read_are_imported_where_a_stop_does_no_harm() -> None:
-    # trimesh reads three formats, which are imported within `undisturbed`; all others need no library.
+    # trimesh reads three formats, which are imported within `defer_interrupt`; all others need no library.
     assert {
         kind: mesh_reader.reader(kind) for kind in mesh_reader.MESHES if mesh_reader.reader(kind)
     } == dict.fromkeys((".stl", ".ply", ".off"), "trimesh")

@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable
 
 import pytest
-from digiclay.commands.progress import PAUSE, Bar, Counted, Line, Steps, duration
+from digiclay.commands.progress import PAUSE, Bar, Counted, Line, Steps, format_duration
 
 #: Each kind of progress, and one step of it of three.
 KINDS: dict[str, Callable[[io.StringIO], Line]] = {
@@ -104,4 +104,4 @@ def test_things_done_beforehand_do_not_count_for_the_time_left(clock: list[float
     ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
 )
 def test_times_are_written_as_people_say_them(seconds: float, said: str) -> None:
-    assert duration(seconds) == said
+    assert format_duration(seconds) == said

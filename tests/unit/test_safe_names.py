@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 from digiclay.cli import main
-from digiclay.commands.batch_folder import opened
+from digiclay.commands.batch_folder import open_batch
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.safe_names import LONGEST, alike, name_of, safe_name, unique_names
+from digiclay.core.base.safe_names import LONGEST, find_name, fold_name, make_safe_name, make_unique_names
 from digiclay.core.session.finished_run import is_whole
-from digiclay.core.studies.job_table import batch
+from digiclay.core.studies.job_table import read_jobs
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -41,22 +41,22 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @example("ü" * 200)
 @example("\ud800")
 def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
-    name = safe_name(text)
+    name = make_safe_name(text)
     assert 0 < len(name.encode()) <= LONGEST + 1  # a device's name gets one letter more
     assert not set(name) & set('/\\:*?"<>|\0 ')
     assert name[0] not in ".-"
     assert name[-1] != "."
     assert name.partition(".")[0].lower() not in ("con", "nul", "lpt²")
-    assert safe_name(name) == name
+    assert make_safe_name(name) == name
 
 
 @given(st.lists(st.sampled_from(["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a."])))
 def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) -> None:
-    names = unique_names(texts)
-    assert len({alike(name) for name in names}) == len(texts)
-    safe = [safe_name(text) for text in texts]
+    names = make_unique_names(texts)
+    assert len({fold_name(name) for name in names}) == len(texts)
+    safe = [make_safe_name(text) for text in texts]
     for place, name in enumerate(names):
-        first = [alike(one) for one in safe].index(alike(safe[place]))
+        first = [fold_name(one) for one in safe].index(fold_name(safe[place]))
         assert (name == safe[place]) == (first == place)
 
 
@@ -78,11 +78,11 @@ def test_a_scene_has_the_name_of_its_file_or_of_its_real_folder(
     folder = tmp_path / "above" / "here"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    assert name_of(Path(path)) == name
+    assert find_name(Path(path)) == name
 
 
 def test_very_long_names_that_differ_at_their_ends_stay_apart() -> None:
-    names = unique_names(["x" * 300 + end for end in ("a", "b", "b")])
+    names = make_unique_names(["x" * 300 + end for end in ("a", "b", "b")])
     assert len(set(names)) == 3
     assert max(map(len, names)) <= LONGEST
 
@@ -99,13 +99,13 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(
     for said, name in (
         *zip(
             ODD,
-            [safe_name(here.parent.name)] * 2 + ["work"] * 2 + ["my", "ü_b_", "_con", "x", "MY"],
+            [make_safe_name(here.parent.name)] * 2 + ["work"] * 2 + ["my", "ü_b_", "_con", "x", "MY"],
             strict=True,
         ),
-        (absolute, safe_name(here.parent.name)),
-        ("x" * 200 + ".toml", safe_name("x" * 200)),
+        (absolute, make_safe_name(here.parent.name)),
+        ("x" * 200 + ".toml", make_safe_name("x" * 200)),
     ):
-        (job,) = batch(jobs_file(f"scenes = [{said!r}]")).jobs
+        (job,) = read_jobs(jobs_file(f"scenes = [{said!r}]")).jobs
         assert job.name == name, said
     jobs = jobs_file(f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}')
     assert main(["batch", str(jobs), "--out", "o", "--quiet"]) == 2
@@ -115,7 +115,7 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(
     assert main(["batch", str(jobs), "--out", "o", "--jobs", "2"]) == 0
     assert "4 of 4 jobs done" in capsys.readouterr().out
     names = sorted(path.name for path in Path("o/runs").iterdir())
-    assert names == sorted([safe_name(here.parent.name), "work", "MY", "my-2"])
+    assert names == sorted([make_safe_name(here.parent.name), "work", "MY", "my-2"])
     for name in names:
         assert (Path("o/runs", name, "surface.stl")).stat().st_size > 84
     new = {path.relative_to(here) for path in here.parent.rglob("*") if path not in before}
@@ -165,11 +165,11 @@ def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(
     "harm", ["surface.stl", "history.npz", "metrics.json", "thumbnail.png", "timing.json"]
 )
 def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done(harm: str) -> None:
-    made = batch(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
+    made = read_jobs(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
     (job,) = made.jobs
     assert main(["batch", "jobs.toml", "--out", "o", "--prepare", "--quiet"]) == 0
     assert main(["job", "o/jobs/my", "--quiet"]) == 0
-    with opened(Path("o"), made) as folder:
+    with open_batch(Path("o"), made) as folder:
         assert folder.is_done(job)
         path = Path("o/runs/my", harm)
         content = path.read_bytes()
@@ -184,8 +184,8 @@ def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done(harm: str) -
 
 
 def test_a_job_of_which_the_folder_is_no_folder_is_refused(here: Path) -> None:
-    made = batch(jobs_file('scenes = ["my.toml"]'))
-    with opened(Path("o"), made) as folder:
+    made = read_jobs(jobs_file('scenes = ["my.toml"]'))
+    with open_batch(Path("o"), made) as folder:
         Path("o/jobs/my").write_text("a file", encoding="utf-8")
         with pytest.raises(OutputError, match="cannot be made"):
             folder.describe(made.jobs[0])

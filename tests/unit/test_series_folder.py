@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.processes import host
+from digiclay.core.base.processes import find_host
 from digiclay.core.base.whole_files import read_json
 from digiclay.core.studies.series import Kind, open_series
 
@@ -68,7 +68,7 @@ def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
     for folder in ("points",) if name == "sweep" else ("jobs", "runs", "logs"):
         (here / "o" / folder).mkdir(parents=True)
     (here / "o" / ".lock").touch()
-    (here / "o" / f".{name}.json.{dead()}@{host()}.part").write_text("{", encoding="utf-8")
+    (here / "o" / f".{name}.json.{dead()}@{find_host()}.part").write_text("{", encoding="utf-8")
     if content is not None:
         (here / "o" / f"{name}.json").write_text(content, encoding="utf-8")
     assert main(COMMANDS[name]) == 0
@@ -123,7 +123,7 @@ def test_what_a_killed_process_left_in_a_series_is_taken_away(here: Path) -> Non
     gone = dead()
     leftovers = [
         folder / f".series.json.{gone}.part",
-        folder / "parts" / f".000001.json.{gone}@{host()}.part",
+        folder / "parts" / f".000001.json.{gone}@{find_host()}.part",
     ]
     foreign = folder / "parts" / f".000002.json.{gone}@elsewhere.part"
     for path in (*leftovers, foreign):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.base.run_folder import MARK, may_be_written, written
+from digiclay.core.base.run_folder import MARK, check_folder, write_folder
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run, save
@@ -175,19 +175,19 @@ def fill(folder: Path, word: str) -> None:
 
 
 def test_a_folder_appears_with_all_that_was_written(tmp_path: Path) -> None:
-    with written(tmp_path / "a" / "b", overwrite=False) as staged:
+    with write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
         (staged / "x").touch()
     assert [path.name for path in (tmp_path / "a" / "b").iterdir()] == ["x"]
 
 
 def test_a_folder_does_not_appear_before_all_is_written(tmp_path: Path) -> None:
-    with written(tmp_path / "run", overwrite=False):
+    with write_folder(tmp_path / "run", overwrite=False):
         assert not (tmp_path / "run").exists()
 
 
 def test_a_failure_leaves_nothing_behind(tmp_path: Path) -> None:
     def fail() -> None:
-        with written(tmp_path / "a" / "b", overwrite=False) as staged:
+        with write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
             (staged / "x").touch()
             raise ZeroDivisionError
 
@@ -198,7 +198,7 @@ def test_a_failure_leaves_nothing_behind(tmp_path: Path) -> None:
 
 def test_an_empty_folder_may_be_written_to(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
-    with written(tmp_path / "run", overwrite=False) as staged:
+    with write_folder(tmp_path / "run", overwrite=False) as staged:
         (staged / "x").touch()
     assert [path.name for path in tmp_path.rglob("*")] == ["run", "x"]
 
@@ -206,19 +206,19 @@ def test_an_empty_folder_may_be_written_to(tmp_path: Path) -> None:
 def test_an_older_run_is_refused(tmp_path: Path) -> None:
     fill(tmp_path / "run", "old")
     with pytest.raises(OutputError, match=r"is not empty: .* --overwrite"):
-        may_be_written(tmp_path / "run", overwrite=False)
+        check_folder(tmp_path / "run", overwrite=False)
 
 
 def test_an_older_run_is_replaced_when_asked(tmp_path: Path) -> None:
     fill(tmp_path / "run", "old")
-    with written(tmp_path / "run", overwrite=True) as staged:
+    with write_folder(tmp_path / "run", overwrite=True) as staged:
         fill(staged, "new")
     assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")] == [(MARK, "new")]
 
 
 def test_an_older_run_stays_when_the_new_one_fails(tmp_path: Path) -> None:
     fill(tmp_path / "run", "old")
-    with pytest.raises(ZeroDivisionError), written(tmp_path / "run", overwrite=True):
+    with pytest.raises(ZeroDivisionError), write_folder(tmp_path / "run", overwrite=True):
         raise ZeroDivisionError
     assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")] == [(MARK, "old")]
 
@@ -226,19 +226,19 @@ def test_an_older_run_stays_when_the_new_one_fails(tmp_path: Path) -> None:
 def test_a_folder_that_is_no_runs_is_never_replaced(tmp_path: Path) -> None:
     (tmp_path / "thesis.doc").touch()
     with pytest.raises(OutputError, match="holds other things than a run"):
-        may_be_written(tmp_path, overwrite=True)
+        check_folder(tmp_path, overwrite=True)
 
 
 def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
     (tmp_path / "run").touch()
     with pytest.raises(OutputError, match="is a file"):
-        may_be_written(tmp_path / "run", overwrite=True)
+        check_folder(tmp_path / "run", overwrite=True)
 
 
 def test_a_file_in_the_way_is_told_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be made"):
-        may_be_written(tmp_path / "file" / "run", overwrite=False)
+        check_folder(tmp_path / "file" / "run", overwrite=False)
 
 
 @pytest.fixture
@@ -259,4 +259,4 @@ def locked() -> Iterator[Path]:
 
 def test_a_folder_without_leave_to_write_is_told_before_any_work(locked: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written to"):
-        may_be_written(locked / "run", overwrite=False)
+        check_folder(locked / "run", overwrite=False)

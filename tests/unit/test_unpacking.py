@@ -20,7 +20,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import available_memory
 from digiclay.core.scene.scene_source import Setting, find, load, read_table
 from digiclay.core.scene.toml_table import resolve, text
-from digiclay.core.session.finished_run import read
+from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.snapshot import packed
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 from digiclay.core.shapes.heightmap import height_map
@@ -121,7 +121,7 @@ SMALL = {"radius": 2e-3, "edge_radius": 2.5e-3, "flat_radius": 1e-3}
 
 
 def test_a_history_as_its_scene_leaves_it_is_read(tmp_path: Path) -> None:
-    run = read(history(tmp_path), "height", "force")
+    run = read_run(history(tmp_path), "height", "force")
     assert {name: array.shape for name, array in run.history.items()} == {
         "time": (11,), "height": (11, 4), "force": (11, 4),
     }  # fmt: skip
@@ -143,7 +143,7 @@ def test_a_history_that_is_not_its_scenes_is_not_unpacked(
 ) -> None:
     folder = history(tmp_path, **arrays)
     assert (folder / "history.npz").stat().st_size < 200_000
-    assert said in refused(lambda: read(folder, "height"))
+    assert said in refused(lambda: read_run(folder, "height"))
 
 
 def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path: Path)
         archive.writestr("height.npy", head((10_001, 4472 * 4472)))
     # The directory of a zip can say anything; ours says what the head does.
     grown(tmp_path / "history.npz", "height.npy", 10_001 * 4472 * 4472 * 8)
-    said = refused(lambda: read(tmp_path, "height"))
+    said = refused(lambda: read_run(tmp_path, "height"))
     assert "of free memory (got 1.6e+03 GB of time, height)" in said
     assert available_memory() < 1.6e12
 
@@ -198,7 +198,7 @@ def test_a_damaged_history_is_refused(tmp_path: Path, spoil: Callable[[bytes], b
     with np.load(folder / "history.npz") as arrays:
         np.savez(folder / "plain.npz", **arrays)
     (folder / "history.npz").write_bytes(spoil((folder / "plain.npz").read_bytes()))
-    assert "cannot be read as a run's history" in refused(lambda: read(folder, "height"))
+    assert "cannot be read as a run's history" in refused(lambda: read_run(folder, "height"))
 
 
 # Takes

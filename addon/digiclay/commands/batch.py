@@ -13,15 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import DigiclayError, one_line
-from ..core.studies.job_table import Job, batch, find_jobs
+from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..core.studies.series import finish
 from .arguments import add_command
-from .batch_folder import Folder, opened
+from .batch_folder import Folder, open_batch
 from .exit_codes import FAILED, STOPPED
 from .job import ERROR, PROGRESS, check_outputs
-from .progress import Counted, duration
+from .progress import Counted, format_duration
 from .stop import Stop
-from .sweep import workers
+from .sweep import read_count
 from .worker import Process, Processes, count_cores
 
 __all__ = ["JobProcess", "add"]
@@ -91,7 +91,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="folder; default: the file's name in the working folder"
     )
-    parser.add_argument("--jobs", metavar="N", type=workers, help="number of processes; default: one a core")
+    parser.add_argument(
+        "--jobs", metavar="N", type=read_count, help="number of processes; default: one a core"
+    )
     parser.add_argument("--prepare", action="store_true", help="write the files of the jobs, run none")
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
@@ -99,12 +101,12 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
-    made = batch(find_jobs(arguments.file))
+    made = read_jobs(find_jobs_file(arguments.file))
     sound = next((job.scene for job in made.jobs if job.scene is not None), None)
     if sound is not None:  # outputs that cannot be had here at all are refused before any work
         check_outputs(sound, made.outputs)
     out: Path = arguments.out or Path(made.name)
-    with opened(out, made) as folder:
+    with open_batch(out, made) as folder:
         for job in made.jobs:
             folder.describe(job)
         if arguments.prepare:
@@ -153,7 +155,7 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
     took = time.monotonic() - started
     if todo:
         at_a_time = "1 process" if count == 1 else f"{count} processes"
-        said += f"; {now} of them now, in {duration(took)} on {at_a_time}"
+        said += f"; {now} of them now, in {format_duration(took)} on {at_a_time}"
     ready = folder.start_up()
     if ready is not None:
         said += f"; a job's process takes {ready:.1f} s to start"

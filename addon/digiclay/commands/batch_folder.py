@@ -11,20 +11,20 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError
-from ..core.base.run_folder import inside
+from ..core.base.run_folder import resolve_inside
 from ..core.base.unfinished import remove_abandoned
 from ..core.base.whole_files import read_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import text
 from ..core.session.finished_run import is_whole
-from ..core.studies.job_table import JOB, SCENE, Batch, Job, job_outputs
+from ..core.studies.job_table import JOB, SCENE, Batch, Job, read_outputs
 from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
 from .job import FILES, RUNS, TIMING
-from .progress import duration
+from .progress import format_duration
 from .thumbnail import NAMES
 
-__all__ = ["JOBS", "MARK", "Folder", "opened"]
+__all__ = ["JOBS", "MARK", "Folder", "open_batch"]
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
@@ -51,15 +51,15 @@ class Folder:
 
     def job(self, job: Job) -> Path:
         """Return the folder of a job's files."""
-        return inside(self.path, JOBS, job.name)
+        return resolve_inside(self.path, JOBS, job.name)
 
     def run(self, job: Job) -> Path:
         """Return the folder of a job's run."""
-        return inside(self.path, RUNS, job.name)
+        return resolve_inside(self.path, RUNS, job.name)
 
     def log(self, job: Job) -> Path:
         """Return the file of what a job's process said."""
-        return inside(self.path, LOGS, f"{job.name}.log")
+        return resolve_inside(self.path, LOGS, f"{job.name}.log")
 
     def is_done(self, job: Job) -> bool:
         """Return whether there is a whole run of just this job, and not of one it once was."""
@@ -67,7 +67,7 @@ class Folder:
             return False
         run = self.run(job)
         try:
-            same = load(run / SCENE) == job.scene and job_outputs(run / JOB) == self.batch.outputs
+            same = load(run / SCENE) == job.scene and read_outputs(run / JOB) == self.batch.outputs
         except DigiclayError:
             return False
         timing = read_json(run / TIMING)
@@ -92,7 +92,15 @@ class Folder:
         return median(known) if known else None
 
     def write_index(self, failed: Mapping[str, str], said: str) -> Path:
-        """Write the page about all jobs; `failed` has the reasons by name."""
+        """Write the page about all jobs; `failed` has the reasons by name.
+
+        Parameters
+        ----------
+        failed : mapping of str to str
+            Why jobs have failed, by their names.
+        said : str
+            What is said of all.
+        """
         cards = []
         for job in self.batch.jobs:
             error = failed.get(job.name, "") or job.error
@@ -119,7 +127,7 @@ class Folder:
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts += [
             ("start of its process", _value(timing.get("start_up"), 1.0, "s")),
-            ("whole job", duration(took)),
+            ("whole job", format_duration(took)),
         ]
         hidden = {*NAMES, TIMING, JOB}
         links = [
@@ -132,8 +140,13 @@ class Folder:
 
 
 @contextmanager
-def opened(path: Path, batch: Batch) -> Iterator[Folder]:
+def open_batch(path: Path, batch: Batch) -> Iterator[Folder]:
     """Make a batch's folder, or go on with one; nobody else may work in it meanwhile.
+
+    Parameters
+    ----------
+    path : Path
+    batch : Batch
 
     Raises
     ------

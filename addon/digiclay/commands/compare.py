@@ -11,8 +11,8 @@ from typing import Any
 
 from ..core.base.errors import ParameterError, SceneError
 from ..core.base.quantity import nearest
-from ..core.base.run_folder import may_be_written, written
-from ..core.base.safe_names import name_of
+from ..core.base.run_folder import check_folder, write_folder
+from ..core.base.safe_names import find_name
 from ..core.control.methods import METHODS
 from ..core.metrics.finger_path import sum_cells
 from ..core.model.finger_range import beyond_words, largest_indentation
@@ -25,7 +25,7 @@ from ..core.studies.trials import TRIAL_METRICS, Trial, trial
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
-from .stop import interruptible
+from .stop import allow_interrupt
 from .tables import table as aligned
 
 __all__ = ["READ", "add", "table"]
@@ -83,8 +83,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if arguments.method is not None:
         raise SceneError("--method names one method: compare takes --methods.")
     path = find(arguments.scene)
-    out: Path = arguments.out or Path(f"{name_of(path)}_compare")
-    may_be_written(out, overwrite=arguments.overwrite)
+    out: Path = arguments.out or Path(f"{find_name(path)}_compare")
+    check_folder(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
     from ..plots.comparison import comparison
     from ..plots.figure import save
@@ -93,7 +93,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     found: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
-    with interruptible(), written(out, overwrite=arguments.overwrite) as folder:
+    with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             done = _run(scene, method, quiet=arguments.quiet)
             found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})

@@ -10,11 +10,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import claimed_files
+from ..core.base.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, known_format, suffix, write
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import read
+from ..core.session.finished_run import read_run
 from ..core.surface.body import Body
 from ..core.surface.features import Finding
 from ..core.surface.formed import of_history
@@ -91,7 +91,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Export."""
     if arguments.separate and arguments.kind != "features":
         raise OutputError("--separate needs --kind features.")
-    run = read(arguments.run, "height", "position", "force", "mode")
+    run = read_run(arguments.run, "height", "position", "force", "mode")
     refuse_what_has_no_surface(run.scene, "export")
     model, finding = model_of(arguments, run.scene, arguments.kind), finding_of(arguments)
     formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
@@ -103,7 +103,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     targets = [
         (some, kind, folder / f"{stem}{suffix(kind)}") for stem, some in files for kind in arguments.format
     ]
-    with claimed_files([path for _, _, path in targets]):
+    with claim_files([path for _, _, path in targets]):
         for some, kind, path in targets:
             write(some, path, arguments.unit, kind)
             if not arguments.quiet:

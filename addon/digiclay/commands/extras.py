@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import last_touch
+from ..core.session.finished_run import find_last_touch
 from .export import exported, file_names
 from .plot import PLOTS, plotted
 from .render import PICTURE, picture
 
 __all__ = [
     "Extra",
-    "as_typed",
-    "drawn",
+    "format_command",
     "make_extras",
-    "meshes",
-    "pictured",
+    "plan_meshes",
+    "plan_picture",
+    "plan_plots",
     "tell_left_out",
     "tell_stopped_before",
 ]
@@ -53,8 +53,23 @@ class Extra:
     later: Callable[[Path], list[str]]
 
 
-def meshes(scene: Scene, history: History, kinds: Sequence[str], row: int = -1, within: str = "") -> Extra:
-    """Return the surface of one row as mesh files, in the run's folder or in one within it."""
+def plan_meshes(
+    scene: Scene, history: History, kinds: Sequence[str], row: int = -1, within: str = ""
+) -> Extra:
+    """Return the surface of one row as mesh files, in the run's folder or in one within it.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping
+        Of the run.
+    kinds : sequence of str
+        Formats.
+    row : int, optional
+        Of the history; by default the last one.
+    within : str, optional
+        The name of the folder in the run's.
+    """
 
     def make(folder: Path) -> None:
         (folder / within).mkdir(exist_ok=True)
@@ -68,16 +83,28 @@ def meshes(scene: Scene, history: History, kinds: Sequence[str], row: int = -1, 
     return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
 
 
-def drawn(scene: Scene, history: History) -> Extra:
-    """Return the plots of a session."""
+def plan_plots(scene: Scene, history: History) -> Extra:
+    """Return the plots of a session.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping
+    """
     return Extra(PLOTS, lambda folder: plotted(scene, history, folder), lambda run: ["plot", str(run)])
 
 
-def pictured(scene: Scene, history: History) -> Extra:
-    """Return the picture of the last touch."""
+def plan_picture(scene: Scene, history: History) -> Extra:
+    """Return the picture of the last touch.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping
+    """
     return Extra(
         [PICTURE],
-        lambda folder: picture(scene, history, last_touch(history), folder / PICTURE),
+        lambda folder: picture(scene, history, find_last_touch(history), folder / PICTURE),
         lambda run: ["render", str(run)],
     )
 
@@ -85,7 +112,16 @@ def pictured(scene: Scene, history: History) -> Extra:
 def make_extras(
     extras: Iterable[Extra], folder: Path, stopped: Callable[[], bool]
 ) -> tuple[list[Extra], list[DigiclayError]]:
-    """Make one after the other; return those prevented by a stop, and the errors."""
+    """Make one after the other; return those prevented by a stop, and the errors.
+
+    Parameters
+    ----------
+    extras : iterable of Extra
+    folder : Path
+        Where the run is being written.
+    stopped : callable
+        Asked before each.
+    """
     left_out: list[Extra] = []
     wrong: list[DigiclayError] = []
     for extra in extras:
@@ -100,17 +136,31 @@ def make_extras(
 
 
 def tell_left_out(left_out: Iterable[Extra], run: Path) -> None:
-    """Print the files that a stop prevented, and the command that makes them."""
+    """Print the files that a stop prevented, and the command that makes them.
+
+    Parameters
+    ----------
+    left_out : iterable of Extra
+    run : Path
+        The finished run's folder.
+    """
     for extra in left_out:
         tell_stopped_before(", ".join(extra.files), extra.later(run))
 
 
 def tell_stopped_before(what: str, later: Sequence[str]) -> None:
-    """Print the output that a stop prevented, and the command that makes it."""
-    print(f"Stopped before {what}; to have it: {as_typed(later)}", file=sys.stderr)
+    """Print the output that a stop prevented, and the command that makes it.
+
+    Parameters
+    ----------
+    what : str
+    later : sequence of str
+        Arguments of the command.
+    """
+    print(f"Stopped before {what}; to have it: {format_command(later)}", file=sys.stderr)
 
 
-def as_typed(arguments: Sequence[str]) -> str:
+def format_command(arguments: Sequence[str]) -> str:
     """Return a command of this program as it is typed into a terminal."""
     words = ["digiclay", *arguments]
     return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from ..core.mesh_io.export_model import features
-from ..core.session.finished_run import read
+from ..core.session.finished_run import read_run
 from ..core.surface.features import summary, table
 from ..core.surface.formed import of_history
 from .arguments import add_run, seconds
@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """List the features."""
-    run = read(arguments.run, "height", "position", "force", "mode")
+    run = read_run(arguments.run, "height", "position", "force", "mode")
     refuse_what_has_no_surface(run.scene, "features")
     formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
     found = features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))

@@ -14,8 +14,8 @@ import numpy as np
 
 from .. import __version__
 from ..core.base.errors import OutputError
-from ..core.base.run_folder import claimed, may_be_written
-from ..core.base.safe_names import name_of
+from ..core.base.run_folder import check_folder, claim_folder
+from ..core.base.safe_names import find_name
 from ..core.model.layout import grid
 from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, shaped
@@ -27,10 +27,10 @@ from ..core.shapes.source_file import Fitted, find_shape, fitted_to, import_read
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
 from .export import formats
-from .extras import Extra, make_extras, meshes, tell_left_out
+from .extras import Extra, make_extras, plan_meshes, tell_left_out
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface
-from .stop import Stop, interruptible, undisturbed
+from .stop import Stop, allow_interrupt, defer_interrupt
 
 __all__ = ["add"]
 
@@ -77,25 +77,25 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and print a summary."""
     file = find_shape(arguments.shape)
-    out: Path = arguments.out or Path(name_of(file))
-    may_be_written(out, overwrite=arguments.overwrite)
+    out: Path = arguments.out or Path(find_name(file))
+    check_folder(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]
-    with undisturbed():
+    with defer_interrupt():
         import_reader(file)
-    with interruptible():  # a mesh of millions of triangles takes a while
+    with allow_interrupt():  # a mesh of millions of triangles takes a while
         scene, laid = _laid(scene_of(arguments)[0])
         if not arguments.quiet:
             print(laid.told())
         if arguments.finger != "scene":
             scene = shaped(scene, assemble(scene), arguments.finger)
-    with claimed(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
+    with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
             versions = {"digiclay": __version__}
             progress = None if arguments.quiet else bar
             result = run(scene, progress=progress, stopped=stop, versions=versions)
         result, lines = _judged(result, laid)
-        with claim.written() as folder:
+        with claim.write() as folder:
             save(result, folder)
             left_out, wrong = make_extras(_exports(result, arguments.export), folder, stop)
     if not arguments.quiet:
@@ -161,6 +161,6 @@ def _exports(result: Result, kinds: list[str]) -> list[Extra]:
     assert result.history is not None
     row = max(before_the_finger(result), 0)
     return [
-        meshes(result.scene, result.history, kinds),
-        meshes(result.scene, result.history, kinds, row, "displayed"),
+        plan_meshes(result.scene, result.history, kinds),
+        plan_meshes(result.scene, result.history, kinds, row, "displayed"),
     ]

@@ -15,14 +15,14 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, one_line
-from ..core.base.run_folder import written
+from ..core.base.run_folder import write_folder
 from ..core.base.whole_files import as_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
 from ..core.studies.job_outputs import Outputs
-from ..core.studies.job_table import JOB, SCENE, job_outputs
+from ..core.studies.job_table import JOB, SCENE, read_outputs
 from .arguments import add_command
 from .exit_codes import STOPPED, WRONG
 from .export import exported, formats
@@ -108,7 +108,13 @@ def watch_input() -> threading.Event:
 
 
 def check_outputs(scene: Scene, outputs: Outputs) -> None:
-    """Refuse, before any work, what is bound to fail after it."""
+    """Refuse, before any work, what is bound to fail after it.
+
+    Parameters
+    ----------
+    scene : Scene
+    outputs : Outputs
+    """
     if outputs.export:
         try:
             formats(",".join(outputs.export))
@@ -126,14 +132,14 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
     folder: Path = arguments.job
     if not os.path.isfile(folder / JOB):
         raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
-    scene, outputs = load(folder / SCENE), job_outputs(folder / JOB)
+    scene, outputs = load(folder / SCENE), read_outputs(folder / JOB)
     name = folder.resolve().name
     out: Path = arguments.out or folder.resolve().parent.parent / RUNS / name
     check_outputs(scene, outputs)
     started = time.time()
     timing: dict[str, Any] = {"start_up": started - arguments.since if arguments.since else None}
     patience = GRACE if arguments.follow else 0.0
-    with written(out, overwrite=arguments.overwrite, patience=patience) as staged:
+    with write_folder(out, overwrite=arguments.overwrite, patience=patience) as staged:
         for step, work in _steps(scene, outputs, staged, stopped, tell):
             began = time.perf_counter()
             if stopped() or not work():

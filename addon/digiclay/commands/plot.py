@@ -9,9 +9,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..core.base.run_folder import claimed_files
+from ..core.base.run_folder import claim_files
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import SHAPES, read
+from ..core.session.finished_run import SHAPES, read_run
 from .arguments import add_run
 from .refusals import refuse_unwritable, refuse_what_has_no_surface, refuse_without
 
@@ -46,10 +46,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run
     refuse_without("matplotlib", "digiclay plot", "pip install digiclay[plots]")
-    run = read(arguments.run, *(name for name in SHAPES if name != "time"))
+    run = read_run(arguments.run, *(name for name in SHAPES if name != "time"))
     refuse_what_has_no_surface(run.scene, "plot")
     refuse_unwritable(folder)
-    with claimed_files([folder / name for name in PLOTS]):
+    with claim_files([folder / name for name in PLOTS]):
         for path in plotted(run.scene, run.history, folder):
             if not arguments.quiet:
                 print(path)

@@ -6,7 +6,7 @@ import shutil
 import time
 from typing import Self, TextIO
 
-__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "Steps", "duration"]
+__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "Steps", "format_duration"]
 
 #: Cells of a bar, and seconds between two drawings of it.
 WIDTH, PAUSE = 28, 0.1
@@ -46,7 +46,7 @@ class Line:
         """Write how long the rest takes when a share from 0 to 1 was done in the time since the beginning."""
         if share <= 0.0:
             return ""
-        return f", {duration((time.monotonic() - self._started) * (1.0 - share) / share)} left"
+        return f", {format_duration((time.monotonic() - self._started) * (1.0 - share) / share)} left"
 
     def __exit__(self, *raised: object) -> None:
         if self._shown:
@@ -74,7 +74,7 @@ class Bar(Line):
         if self.due():
             times = f"{done * self._period:.1f} of {total * self._period:.1f} s simulated"
             said = f"{100 * done // total:3d} %{self.left(done / total)}  {times}"
-            self.draw(f"{self._label} {cells(done / total)} {said}")
+            self.draw(f"{self._label} {draw_share(done / total)} {said}")
 
 
 class Counted(Line):
@@ -98,7 +98,7 @@ class Counted(Line):
         if self.due():
             here = (done - self._before) / max(total - self._before, 1)
             said = f"{int(done)} of {total} {self._unit}{self.left(here)}{note}"
-            self.draw(f"{self._label} {cells(done / total)} {said}")
+            self.draw(f"{self._label} {draw_share(done / total)} {said}")
 
 
 class Steps(Line):
@@ -122,16 +122,16 @@ class Steps(Line):
         if self.due():
             share = self._done / self._total
             said = f"{self._done} of {self._total}{self.left(share)}  {doing}"
-            self.draw(f"{self._label} {cells(share)} {said}")
+            self.draw(f"{self._label} {draw_share(share)} {said}")
 
 
-def cells(share: float) -> str:
+def draw_share(share: float) -> str:
     """Draw a share from 0 to 1."""
     filled = int(WIDTH * share)
     return f"[{'#' * filled}{'.' * (WIDTH - filled)}]"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Write a time left or taken: 8 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:

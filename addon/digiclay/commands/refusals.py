@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..core.base.errors import OutputError
 from ..core.scene.schema import Scene
-from .stop import undisturbed
+from .stop import defer_interrupt
 
 __all__ = [
     "refuse_file", "refuse_unwritable", "refuse_what_has_no_surface", "refuse_without",
@@ -33,7 +33,7 @@ def refuse_without(module: str, option: str, remedy: str) -> None:
 
 def refuse_without_blender() -> None:
     """Refuse without Blender's module, with the command that installs it."""
-    with undisturbed():
+    with defer_interrupt():
         importlib.import_module("..compat", __package__)
 
 

@@ -11,10 +11,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..core.base.errors import DigiclayError
-from ..core.base.run_folder import claimed_files
+from ..core.base.run_folder import claim_files
 from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import last_touch, read, row_at
+from ..core.session.finished_run import find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLOURS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
 from .exit_codes import STOPPED
@@ -90,10 +90,10 @@ def _drawn(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> in
     out: Path = arguments.out or arguments.run / f"{name}{ending}"
     refuse_file(out, ending)
     refuse_without_blender()
-    run = read(arguments.run, *ARRAYS)
-    row = None if arguments.time is None else row_at(run.history, arguments.time, "--time")
+    run = read_run(arguments.run, *ARRAYS)
+    row = None if arguments.time is None else find_row(run.history, arguments.time, "--time")
     path: Path | None
-    with claimed_files([out]), Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
+    with claim_files([out]), Stop() as stop, Counted(sys.stderr, name, "frames") as bar:
         told = None if arguments.quiet else bar
         if isinstance(looks, Film):
             path = draw_film(run.scene, run.history, looks, out, told, stop)
@@ -202,4 +202,4 @@ def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int
     """Return the row asked for, or that of an instant by its name."""
     if row is not None:
         return row
-    return last_touch(history) if when == "last touch" else len(history["time"]) - 1
+    return find_last_touch(history) if when == "last touch" else len(history["time"]) - 1

@@ -10,8 +10,8 @@ from typing import Any
 
 from .. import __version__
 from ..core.base.errors import OutputError, ParameterError, SceneError
-from ..core.base.run_folder import claimed
-from ..core.base.safe_names import name_of
+from ..core.base.run_folder import claim_folder
+from ..core.base.safe_names import find_name
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
@@ -19,7 +19,15 @@ from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
 from .exit_codes import STOPPED
 from .export import formats
-from .extras import Extra, drawn, make_extras, meshes, pictured, tell_left_out, tell_stopped_before
+from .extras import (
+    Extra,
+    make_extras,
+    plan_meshes,
+    plan_picture,
+    plan_plots,
+    tell_left_out,
+    tell_stopped_before,
+)
 from .progress import Bar
 from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
 from .stop import Stop
@@ -70,9 +78,9 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run, write, and print a summary line."""
     scene, path = scene_of(arguments)
-    out: Path = arguments.out or Path(name_of(path))
+    out: Path = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
-    with claimed(out, overwrite=arguments.overwrite) as claim:
+    with claim_folder(out, overwrite=arguments.overwrite) as claim:
         found = None
         if arguments.budget is not None:
             found = within(scene, arguments.budget, quiet=arguments.quiet)
@@ -84,7 +92,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 result, unjudged = _judged(result, stop, quiet=arguments.quiet)
             if found:
                 result = replace(result, metrics={**result.metrics, "budget": noted(found)})
-            with claim.written() as folder:
+            with claim.write() as folder:
                 save(result, folder)
                 left_out, wrong = make_extras(_extras(arguments, result), folder, stop)
     if not arguments.quiet:
@@ -145,6 +153,6 @@ def _extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
     scene, history = result.scene, result.history
     if history is None:
         return []
-    wanted = [meshes(scene, history, arguments.export)] if arguments.export else []
-    wanted += [drawn(scene, history)] if arguments.plots else []
-    return wanted + ([pictured(scene, history)] if arguments.render else [])
+    wanted = [plan_meshes(scene, history, arguments.export)] if arguments.export else []
+    wanted += [plan_plots(scene, history)] if arguments.plots else []
+    return wanted + ([plan_picture(scene, history)] if arguments.render else [])

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["Stop", "interruptible", "undisturbed"]
+__all__ = ["Stop", "allow_interrupt", "defer_interrupt"]
 
 
 class Stop:
@@ -42,7 +42,7 @@ class Stop:
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
+def allow_interrupt() -> Iterator[None]:
     """Let a first signal interrupt at once, SIGTERM as Ctrl-C does: where there is nothing to be kept."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -60,7 +60,7 @@ def interruptible() -> Iterator[None]:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def defer_interrupt() -> Iterator[None]:
     """Let Ctrl-C wait for the end of the block: libraries take an interrupted import for a broken one.
 
     Raises

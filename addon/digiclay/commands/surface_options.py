@@ -8,7 +8,7 @@ from typing import Any
 from ..core.base.errors import OutputError
 from ..core.mesh_io.export_model import Model
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import Run, row_at
+from ..core.session.finished_run import Run, find_row
 from ..core.surface.features import Finding
 from ..core.surface.skins import SKINS
 from .arguments import millimetres, seconds, told_as_options
@@ -67,7 +67,7 @@ def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
 
 def row_of(run: Run, time: float | None) -> int:
     """Return the row of an instant, s; the last one where none is given."""
-    return -1 if time is None else row_at(run.history, time, "--time")
+    return -1 if time is None else find_row(run.history, time, "--time")
 
 
 def former_of(run: Run, text: str) -> int | float:
@@ -78,4 +78,4 @@ def former_of(run: Run, text: str) -> int | float:
         time = seconds(text)
     except argparse.ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
-    return row_at(run.history, time, "--former")
+    return find_row(run.history, time, "--former")

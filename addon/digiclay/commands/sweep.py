@@ -33,7 +33,7 @@ from .progress import Counted
 from .stop import Stop
 from .worker import Processes, count_cores, in_blender
 
-__all__ = ["add", "workers"]
+__all__ = ["add", "read_count"]
 
 #: The most processes of a command: Windows can wait for no more.
 MOST = 61
@@ -69,13 +69,13 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
     parser.add_argument(
-        "--workers", metavar="N", type=workers, help="number of processes; default: one a core"
+        "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
     )
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 
-def workers(text: str) -> int:
+def read_count(text: str) -> int:
     """Read a number of processes."""
     if not text.isdecimal() or not 1 <= int(text) <= MOST:
         raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST} (got {text!r})")

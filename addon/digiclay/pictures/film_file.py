@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..compat import bpy, quiet, strips, to_video
 from ..core.base.errors import OutputError
-from ..core.base.unfinished import unfinished
+from ..core.base.unfinished import name_unfinished
 from ..core.session.render_settings import Moving
 from .still import why_not
 
@@ -21,7 +21,7 @@ __all__ = ["encoded", "frames_beside", "whole_film"]
 @contextmanager
 def frames_beside(out: Path) -> Iterator[Path]:
     """Give a folder for the frames beside the film, and take it away again."""
-    folder = unfinished(out, "frames")
+    folder = name_unfinished(out, "frames")
     try:
         folder.mkdir(parents=True)
         yield folder

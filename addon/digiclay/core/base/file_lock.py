@@ -6,15 +6,15 @@ import errno
 import importlib
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .errors import OutputError
-from .processes import host, may_have_made
+from .processes import find_host, may_have_made
 
-__all__ = ["held", "held_by_record"]
+__all__ = ["hold_lock", "hold_record"]
 
 #: Seconds between two attempts.
 PAUSE = 0.05
@@ -26,12 +26,15 @@ NO_LOCKS = {
 } - {None}
 
 
+Taken = TypeVar("Taken")
+
+
 class NoLocksHere(Exception):
     """Drive without locks."""
 
 
 @contextmanager
-def held(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
+def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
     """Hold a lock file, which is made with its folder and taken away again.
 
     The system's own lock is taken, which no crash leaves behind; where a drive has none, a record of
@@ -52,19 +55,14 @@ def held(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
     OSError
         When the file cannot be made.
     """
-    deadline = time.monotonic() + patience
-    while True:
-        try:
-            taken = _taken(path)
-        except NoLocksHere:
-            with held_by_record(path.with_name(f"{path.name}.owner"), refusal, patience):
-                yield
-            return
-        if taken is not None:
-            break
-        if time.monotonic() >= deadline:
-            raise OutputError(refusal)
-        time.sleep(PAUSE)
+    try:
+        taken = _wait_for(lambda: _take(path), patience)
+    except NoLocksHere:
+        with hold_record(path.with_name(f"{path.name}.owner"), refusal, patience):
+            yield
+        return
+    if taken is None:
+        raise OutputError(refusal)
     try:
         yield
     finally:
@@ -76,7 +74,15 @@ def held(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
             os.close(taken)
 
 
-def _taken(path: Path) -> int | None:
+def _wait_for(attempt: Callable[[], Taken | None], patience: float) -> Taken | None:
+    """Attempt something again and again, for so many seconds; return what came of it."""
+    deadline = time.monotonic() + patience
+    while (taken := attempt()) is None and time.monotonic() < deadline:
+        time.sleep(PAUSE)
+    return taken
+
+
+def _take(path: Path) -> int | None:
     """Open and lock a file; None when another process holds it."""
     while True:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
@@ -86,7 +92,7 @@ def _taken(path: Path) -> int | None:
             path.parent.mkdir(parents=True, exist_ok=True)
             continue
         try:
-            if not _locked(file):
+            if not _lock(file):
                 os.close(file)
                 return None
             if _is_at(file, path):
@@ -97,7 +103,7 @@ def _taken(path: Path) -> int | None:
         os.close(file)  # it was taken away between opening and locking: the next one is another file
 
 
-def _locked(file: int) -> bool:
+def _lock(file: int) -> bool:
     """Take the system's lock on an open file; return whether it was to be had."""
     if os.name == "nt":
         windows: Any = importlib.import_module("msvcrt")
@@ -127,20 +133,22 @@ def _is_at(file: int, path: Path) -> bool:
 
 
 @contextmanager
-def held_by_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
+def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
     """Hold a file that names this process and machine; one whose process is gone does not count.
 
     What another machine holds has to be removed by hand when that one has crashed: the refusal says so.
-    The parameters are those of `held`.
+
+    Parameters
+    ----------
+    path : Path
+    refusal, patience
+        As `hold_lock` has them.
     """
-    deadline = time.monotonic() + patience
-    while not _recorded(path):
-        if time.monotonic() >= deadline:
-            owner = _owner(path)
-            away = owner is not None and owner[0] != host()
-            hint = f" It was begun on {owner[0]}; if nothing runs there, remove {path}." if owner else ""
-            raise OutputError(refusal + (hint if away else ""))
-        time.sleep(PAUSE)
+    if _wait_for(lambda: _record(path), patience) is None:
+        owner = _read_owner(path)
+        if owner is not None and owner[0] != find_host():
+            refusal += f" It was begun on {owner[0]}; if nothing runs there, remove {path}."
+        raise OutputError(refusal)
     try:
         yield
     finally:
@@ -148,25 +156,25 @@ def held_by_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[
             path.unlink()
 
 
-def _recorded(path: Path) -> bool:
-    """Make the record; return whether there was none before of a process that may still run."""
+def _record(path: Path) -> bool | None:
+    """Make the record; None when there is one of a process that may still run."""
     try:
-        changed, owner = path.stat().st_mtime, _owner(path)
+        changed, owner = path.stat().st_mtime, _read_owner(path)
         if owner is None:
             gone = time.time() - changed > BEING_WRITTEN
         else:
-            gone = owner[0] == host() and not may_have_made(owner[1], changed)
+            gone = owner[0] == find_host() and not may_have_made(owner[1], changed)
         if not gone:
-            return False
+            return None
         path.unlink()
     except FileNotFoundError:
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileExistsError:
-        return False
+        return None
     try:
-        os.write(file, f"{host()} {os.getpid()}\n".encode())
+        os.write(file, f"{find_host()} {os.getpid()}\n".encode())
     except BaseException:
         with suppress(OSError):
             path.unlink()
@@ -176,7 +184,7 @@ def _recorded(path: Path) -> bool:
     return True
 
 
-def _owner(path: Path) -> tuple[str, int] | None:
+def _read_owner(path: Path) -> tuple[str, int] | None:
     """Return the machine and the process a record names; None where it names none."""
     try:
         machine, pid = path.read_text(encoding="utf-8").split()

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-__all__ = ["host", "may_have_made", "running_since"]
+__all__ = ["find_host", "find_start", "may_have_made"]
 
 #: Clocks of a machine and of the drive it writes to differ by less than this, s.
 CLOCKS_DIFFER = 60.0
@@ -20,7 +20,7 @@ CLOCKS_DIFFER = 60.0
 WINDOWS_EPOCH = 11_644_473_600.0
 
 
-def host() -> str:
+def find_host() -> str:
     """Return the name of this machine, as it may stand in the name of a file."""
     return re.sub(r"[^A-Za-z0-9_-]", "-", platform.node())[:32] or "unknown"
 
@@ -37,11 +37,11 @@ def may_have_made(pid: int, changed: float) -> bool:
     changed : float
         When it was changed last, s since 1970.
     """
-    since = running_since(pid)
+    since = find_start(pid)
     return since is not None and since <= changed + CLOCKS_DIFFER
 
 
-def running_since(pid: int) -> float | None:
+def find_start(pid: int) -> float | None:
     """Return when a process was started, s since 1970; None when none of this number runs.
 
     Where the system does not tell when, it is 0.
@@ -49,19 +49,19 @@ def running_since(pid: int) -> float | None:
     if pid <= 0:
         return None
     if os.name == "nt":
-        return _in_windows(pid)
+        return _find_start_in_windows(pid)
     if Path("/proc/self/stat").exists():
-        return _in_linux(pid)
+        return _find_start_in_linux(pid)
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return None
     except (OSError, OverflowError):  # it runs, and belongs to somebody else
         pass
-    return _told_by_ps(pid)
+    return _ask_ps(pid)
 
 
-def _in_linux(pid: int) -> float | None:
+def _find_start_in_linux(pid: int) -> float | None:
     """Return when a process was started, from /proc."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
@@ -74,7 +74,7 @@ def _in_linux(pid: int) -> float | None:
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
 
 
-def _told_by_ps(pid: int) -> float | None:
+def _ask_ps(pid: int) -> float | None:
     """Return when a process was started, from ps; macOS has no /proc."""
     with suppress(OSError, ValueError, subprocess.SubprocessError):
         told = subprocess.run(
@@ -85,7 +85,7 @@ def _told_by_ps(pid: int) -> float | None:
     return 0.0
 
 
-def _in_windows(pid: int) -> float | None:
+def _find_start_in_windows(pid: int) -> float | None:
     """Return when a process was started; ``os.kill`` would end it there."""
     system: Any = ctypes
     kernel = system.WinDLL("kernel32", use_last_error=True)

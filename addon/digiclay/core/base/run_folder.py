@@ -5,23 +5,24 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import OutputError
-from .file_lock import held
-from .unfinished import remove_abandoned, unfinished
+from .file_lock import hold_lock
+from .unfinished import name_unfinished, remove_abandoned
 
 __all__ = [
-    "MARK", "Claim", "busy", "claimed", "claimed_files", "inside", "lock_beside", "may_be_written", "written",
+    "MARK", "Claim", "check_folder", "claim_files", "claim_folder", "describe_claim", "find_lock",
+    "lock_name", "resolve_inside", "write_folder",
 ]  # fmt: skip
 
 #: The file by which a folder is known as a run's.
 MARK = "metrics.json"
 
 
-def may_be_written(out: Path, *, overwrite: bool) -> None:
+def check_folder(out: Path, *, overwrite: bool) -> None:
     """Refuse, before any work is done, an output folder that could not be used in the end.
 
     Parameters
@@ -55,8 +56,14 @@ def may_be_written(out: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{out} cannot be made: {above} cannot be written to.")
 
 
-def inside(folder: Path, *parts: str) -> Path:
+def resolve_inside(folder: Path, *parts: str) -> Path:
     """Return a path in a folder, and refuse one that leads out of it, by its name or by a link.
+
+    Parameters
+    ----------
+    folder : Path
+    parts : str
+        Names on the way from there.
 
     Raises
     ------
@@ -69,31 +76,55 @@ def inside(folder: Path, *parts: str) -> Path:
     return path
 
 
-def lock_beside(folder: Path) -> Path:
-    """Return the lock of whoever makes a folder of this name."""
-    target = folder.resolve()
+def find_lock(path: Path) -> Path:
+    """Return the lock of whoever makes a file or folder of this name."""
+    target = path.resolve()
     return target.with_name(f".{target.name}.lock")
+
+
+def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]:
+    """Hold the lock of whoever makes a file or folder of this name.
+
+    Parameters
+    ----------
+    path : Path
+    patience : float, optional
+        Time to wait for another process that is about to end, s.
+    """
+    return hold_lock(find_lock(path), describe_claim(path, "being written"), patience)
+
+
+def describe_claim(path: Path, how: str) -> str:
+    """Return the error for a path that another process has locked.
+
+    Parameters
+    ----------
+    path : Path
+    how : str
+        What the other process does, *being written*.
+    """
+    return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Lock of a folder for writing, for the block of `claimed`."""
+    """Lock of a folder for writing, for the block of `claim_folder`."""
 
     out: Path
     overwrite: bool
 
     @contextmanager
-    def written(self) -> Iterator[Path]:
+    def write(self) -> Iterator[Path]:
         """Give a folder under a temporary name to write into; on leaving it well, it becomes `out`.
 
         An older run is replaced only then. When something is raised, all is as it was before.
         """
         target = self.out.resolve()
-        staged, former = unfinished(target), unfinished(target, "old")
+        staged, former = name_unfinished(target), name_unfinished(target, "old")
         try:
             staged.mkdir(parents=True)
             yield staged
-            may_be_written(self.out, overwrite=self.overwrite)
+            check_folder(self.out, overwrite=self.overwrite)
             if target.exists():
                 target.rename(former)
             staged.rename(target)
@@ -107,7 +138,7 @@ class Claim:
 
 
 @contextmanager
-def claimed(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Claim]:
+def claim_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Claim]:
     """Claim a folder before any work is done: nobody else may write it until the block ends.
 
     What runs of this name have left that were killed is taken away.
@@ -116,7 +147,7 @@ def claimed(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Cl
     ----------
     out : Path
     overwrite : bool
-        See `may_be_written`.
+        See `check_folder`.
     patience : float, optional
         Seconds to wait for somebody else who is about to end.
 
@@ -125,26 +156,21 @@ def claimed(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Cl
     OutputError
         When it is claimed already, or could not be used in the end.
     """
-    may_be_written(out, overwrite=overwrite)
+    check_folder(out, overwrite=overwrite)
     target = out.resolve()
     with ExitStack() as until_the_end:
-        until_the_end.enter_context(_folders_kept_if_filled(target))
+        until_the_end.enter_context(_remove_if_empty(target))
         try:
-            until_the_end.enter_context(held(lock_beside(out), busy(out, "being written"), patience))
+            until_the_end.enter_context(lock_name(out, patience))
         except OSError as error:
             raise OutputError(f"{out} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(target.parent, target.name)
-        may_be_written(out, overwrite=overwrite)  # somebody else may just have ended
+        check_folder(out, overwrite=overwrite)  # somebody else may just have ended
         yield Claim(out, overwrite)
 
 
-def busy(path: Path, how: str) -> str:
-    """Return the error for a path that another process has locked."""
-    return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
-
-
 @contextmanager
-def _folders_kept_if_filled(target: Path) -> Iterator[None]:
+def _remove_if_empty(target: Path) -> Iterator[None]:
     """Take away in the end those folders above a path that were not there, unless there is something in."""
     made = [folder for folder in target.parents if not folder.exists()]
     try:
@@ -156,7 +182,7 @@ def _folders_kept_if_filled(target: Path) -> Iterator[None]:
 
 
 @contextmanager
-def claimed_files(files: Sequence[Path]) -> Iterator[None]:
+def claim_files(files: Sequence[Path]) -> Iterator[None]:
     """Claim files in folders that are there already, such as a run's: nobody else writes them meanwhile.
 
     What killed processes have left unfinished of them is taken away.
@@ -170,11 +196,11 @@ def claimed_files(files: Sequence[Path]) -> Iterator[None]:
         try:
             for folder in dict.fromkeys(file.parent for file in files):
                 if folder.exists() and os.access(folder.resolve().parent, os.W_OK):
-                    with held(lock_beside(folder), busy(folder, "being written")):
+                    with lock_name(folder):
                         pass
-                until_the_end.enter_context(_folders_kept_if_filled(folder.resolve() / "file"))
+                until_the_end.enter_context(_remove_if_empty(folder.resolve() / "file"))
             for file in files:
-                until_the_end.enter_context(held(lock_beside(file), busy(file, "being written")))
+                until_the_end.enter_context(lock_name(file))
                 remove_abandoned(file.parent, file.name)
         except OSError as error:
             folder = files[0].parent
@@ -183,7 +209,13 @@ def claimed_files(files: Sequence[Path]) -> Iterator[None]:
 
 
 @contextmanager
-def written(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
-    """Claim a folder and give one to write into, which becomes it: see `claimed` and `Claim.written`."""
-    with claimed(out, overwrite=overwrite, patience=patience) as claim, claim.written() as folder:
+def write_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Path]:
+    """Claim a folder and give one to write into, which becomes it: see `Claim.write`.
+
+    Parameters
+    ----------
+    out, overwrite, patience
+        As `claim_folder` has them.
+    """
+    with claim_folder(out, overwrite=overwrite, patience=patience) as claim, claim.write() as folder:
         yield folder

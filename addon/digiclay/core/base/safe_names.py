@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["alike", "name_of", "safe_name", "unique_names"]
+__all__ = ["find_name", "fold_name", "make_safe_name", "make_unique_names"]
 
 #: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
 LONGEST = 120
@@ -17,7 +17,7 @@ LONGEST = 120
 DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)", re.IGNORECASE)
 
 
-def safe_name(text: str) -> str:
+def make_safe_name(text: str) -> str:
     """Return a text as the name of a folder: a word of letters, digits and ``. _ + -``.
 
     It does not begin or end with a full stop, is no device in Windows, and is short enough.
@@ -33,7 +33,7 @@ def safe_name(text: str) -> str:
     return f"{kept}-{digest}"
 
 
-def name_of(path: Path, general: str = "scene.toml") -> str:
+def find_name(path: Path, general: str = "scene.toml") -> str:
     """Return what a file describes by name: the file's stem, or its folder's name where that says nothing.
 
     Parameters
@@ -48,21 +48,21 @@ def name_of(path: Path, general: str = "scene.toml") -> str:
     return name if name.strip(". ") else "scene"
 
 
-def alike(name: str) -> str:
+def fold_name(name: str) -> str:
     """Return what names have in common that some file systems take for one: ``a`` and ``A``."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
-def unique_names(texts: Sequence[str]) -> list[str]:
+def make_unique_names(texts: Sequence[str]) -> list[str]:
     """Return safe names of texts, in their order; where several would be alike, the later get numbers."""
-    names = [safe_name(text) for text in texts]
-    taken = {alike(name) for name in names}
+    names = [make_safe_name(text) for text in texts]
+    taken = {fold_name(name) for name in names}
     given: set[str] = set()
     for place, name in enumerate(names):
         number, chosen = 1, name
-        while alike(chosen) in given or (number > 1 and alike(chosen) in taken):
+        while fold_name(chosen) in given or (number > 1 and fold_name(chosen) in taken):
             number += 1
-            chosen = safe_name(f"{name[:LONGEST]}-{number}")
+            chosen = make_safe_name(f"{name[:LONGEST]}-{number}")
         names[place] = chosen
-        given.add(alike(chosen))
+        given.add(fold_name(chosen))
     return names

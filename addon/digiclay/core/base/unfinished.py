@@ -8,15 +8,15 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from .processes import host, may_have_made
+from .processes import find_host, may_have_made
 
-__all__ = ["is_unfinished", "remove_abandoned", "unfinished"]
+__all__ = ["is_unfinished", "name_unfinished", "remove_abandoned"]
 
 #: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
 UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)")
 
 
-def unfinished(target: Path, kind: str = "part") -> Path:
+def name_unfinished(target: Path, kind: str = "part") -> Path:
     """Return the name under which this process prepares a file or folder, beside it.
 
     Parameters
@@ -25,7 +25,7 @@ def unfinished(target: Path, kind: str = "part") -> Path:
     kind : {"part", "old", "frames"}
         What becomes the target; what the target was; the frames of a film.
     """
-    return target.with_name(f".{target.name}.{os.getpid()}@{host()}.{kind}")
+    return target.with_name(f".{target.name}.{os.getpid()}@{find_host()}.{kind}")
 
 
 def is_unfinished(path: Path) -> bool:
@@ -52,7 +52,7 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
         return
     for path in found:
         known = UNFINISHED.fullmatch(path.name)
-        if known is None or (name and known["name"] != name) or known["host"] not in (None, host()):
+        if known is None or (name and known["name"] != name) or known["host"] not in (None, find_host()):
             continue
         with suppress(OSError):
             if may_have_made(int(known["pid"]), path.lstat().st_mtime):

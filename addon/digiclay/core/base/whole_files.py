@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from .errors import OutputError
-from .unfinished import unfinished
+from .unfinished import name_unfinished
 
 __all__ = ["as_json", "open_whole", "read_json", "write_whole"]
 
@@ -40,7 +40,7 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
     OutputError
         When the file cannot be written.
     """
-    part = unfinished(path)
+    part = name_unfinished(path)
     try:
         with part.open("wb") as file:
             yield file

@@ -19,7 +19,7 @@ from ..scene.recorder import Recorder, available_memory
 from ..scene.scene_source import load
 from ..scene.schema import Scene
 
-__all__ = ["SHAPES", "Run", "is_whole", "last_touch", "read", "row_at"]
+__all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "is_whole", "read_run"]
 
 #: The file of the arrays.
 HISTORY = "history.npz"
@@ -38,8 +38,14 @@ class Run:
     history: dict[str, NDArray[Any]]
 
 
-def read(folder: Path, *names: str) -> Run:
+def read_run(folder: Path, *names: str) -> Run:
     """Read a run, and of its history the arrays named.
+
+    Parameters
+    ----------
+    folder : Path
+    names : str
+        Keys of `SHAPES`.
 
     Raises
     ------
@@ -102,8 +108,17 @@ def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
-def row_at(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
-    """Return the row nearest to a time, s, within the session; a message calls the time by a name."""
+def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
+    """Return the row nearest to a time within the session.
+
+    Parameters
+    ----------
+    history : mapping
+    time : float
+        s.
+    called : str
+        What a message calls the time.
+    """
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
         raise OutputError(
@@ -112,7 +127,7 @@ def row_at(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int
     return int(np.argmin(np.abs(moments - time)))
 
 
-def last_touch(history: Mapping[str, NDArray[Any]]) -> int:
+def find_last_touch(history: Mapping[str, NDArray[Any]]) -> int:
     """Return the last row in which the finger touches, or the last one: there is most to be seen."""
     touching = np.flatnonzero(history["total_force"] > 0.0)
     return int(touching[-1]) if touching.size else len(history["time"]) - 1

@@ -13,7 +13,7 @@ from ..base.quantity import Parameters, quantities
 from ..mesh_io.export_model import Model
 from ..session.render_settings import Film, Still, Turntable
 
-__all__ = ["KEYS", "Outputs", "outputs", "word"]
+__all__ = ["KEYS", "Outputs", "make_outputs", "write_value"]
 
 #: Pictures a job can leave, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
@@ -54,7 +54,7 @@ class Outputs:
     def text(self) -> str:
         """Return a job.toml that reads back as an equal value."""
         lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
-        lines += [f"export = {word(list(self.export))}", f"errors = {word(self.errors)}"]
+        lines += [f"export = {write_value(list(self.export))}", f"errors = {write_value(self.errors)}"]
         for section in SECTIONS:
             part = getattr(self, section)
             if part is None:
@@ -62,11 +62,11 @@ class Outputs:
             lines.append(f"\n[{section}]")
             for key, known in quantities(part).items():
                 note = f"{known.unit}: {known.doc}" if known.unit else known.doc
-                lines.append(f"{key} = {word(getattr(part, key))}  # {note}")
+                lines.append(f"{key} = {write_value(getattr(part, key))}  # {note}")
         return "\n".join(lines) + "\n"
 
 
-def outputs(table: Mapping[str, Any]) -> Outputs:
+def make_outputs(table: Mapping[str, Any]) -> Outputs:
     """Read what is made of each run from a table of `KEYS`.
 
     Raises
@@ -94,10 +94,10 @@ def outputs(table: Mapping[str, Any]) -> Outputs:
     return Outputs(tuple(export), errors, **parts)
 
 
-def word(value: Any) -> str:
+def write_value(value: Any) -> str:
     """Write a value as TOML: a text, number, truth value, or a list of them."""
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(word, value))}]"
+        return f"[{', '.join(map(write_value, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

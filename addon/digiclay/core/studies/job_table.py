@@ -16,7 +16,7 @@ from typing import Any
 
 from ..base.errors import ParameterError, SceneError, one_line
 from ..base.part_table import refuse_unknown, shown
-from ..base.safe_names import name_of, unique_names
+from ..base.safe_names import find_name, make_unique_names
 from ..base.sample_file import found, named
 from ..control.methods import METHODS
 from ..model.layout import grid
@@ -24,9 +24,9 @@ from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
 from ..scene.schema import Scene
 from ..shapes.height_text import packed
 from ..shapes.source_file import fitted_to
-from .job_outputs import KEYS, Outputs, outputs, word
+from .job_outputs import KEYS, Outputs, make_outputs, write_value
 
-__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "batch", "find_jobs", "job_outputs"]
+__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "find_jobs_file", "read_jobs", "read_outputs"]
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
@@ -64,7 +64,7 @@ class Batch:
     outputs: Outputs
 
 
-def batch(path: Path) -> Batch:
+def read_jobs(path: Path) -> Batch:
     """Read a JOBS file.
 
     Every scene is combined with every method and every setting. A combination whose values do
@@ -78,7 +78,7 @@ def batch(path: Path) -> Batch:
     table = read_table(path)
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
-        made = outputs({key: table[key] for key in table if key not in WHICH})
+        made = make_outputs({key: table[key] for key in table if key not in WHICH})
         words, methods, changes = _scenes(table), _methods(table), _settings(table)
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
@@ -89,14 +89,14 @@ def batch(path: Path) -> Batch:
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
         _refuse_twice("methods", methods, methods)
         parts = list(itertools.product(files, methods, changes.items()))
-        names = unique_names([_name(file, method, label) for file, method, (label, _) in parts])
+        names = make_unique_names([_name(file, method, label) for file, method, (label, _) in parts])
         jobs = tuple(_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
-    return Batch(name_of(path), jobs, made)
+    return Batch(find_name(path), jobs, made)
 
 
-def find_jobs(said: str) -> Path:
+def find_jobs_file(said: str) -> Path:
     """Return a JOBS file: a sample's name, or a file.
 
     Raises
@@ -107,10 +107,10 @@ def find_jobs(said: str) -> Path:
     return found(said, named(BATCHES, ".toml"), "sample batch")
 
 
-def job_outputs(path: Path) -> Outputs:
+def read_outputs(path: Path) -> Outputs:
     """Read a ``job.toml``; SceneError says in one line what is wrong with it."""
     try:
-        return outputs(read_table(path))
+        return make_outputs(read_table(path))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
 
@@ -153,7 +153,7 @@ def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
         if not re.fullmatch(r"\w[\w.+-]*", label):
             raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
         option = f"settings.{label}"
-        found[label] = [Setting(key, word(value), option) for key, value in _flat(changes)]
+        found[label] = [Setting(key, write_value(value), option) for key, value in _flat(changes)]
     return found
 
 
@@ -174,12 +174,12 @@ def _found(jobs: Path, said: str) -> Path:
 
 def _name(file: Path, method: str, label: str) -> str:
     """Return what a job is called by its parts."""
-    return "-".join(part for part in (name_of(file, SCENE), method, label) if part)
+    return "-".join(part for part in (find_name(file, SCENE), method, label) if part)
 
 
 def _job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
     """Make one job."""
-    chosen = [Setting("control.method", word(method), "methods")] if method else []
+    chosen = [Setting("control.method", write_value(method), "methods")] if method else []
     try:
         return Job(name, _alone(load(file, [*chosen, *setting[1]])))
     except (SceneError, ParameterError) as error:

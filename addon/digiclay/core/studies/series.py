@@ -16,8 +16,8 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from ..base.errors import DigiclayError, OutputError, one_line
-from ..base.file_lock import held
-from ..base.run_folder import busy, inside, lock_beside
+from ..base.file_lock import hold_lock
+from ..base.run_folder import describe_claim, lock_name, resolve_inside
 from ..base.unfinished import is_unfinished, remove_abandoned
 from ..base.whole_files import as_json, read_json, write_whole
 
@@ -77,7 +77,7 @@ def open_series(
                 if there != description:
                     write_whole(path / kind.mark, as_json(description))
                 for name in kind.folders:
-                    inside(path, name).mkdir(exist_ok=True)
+                    resolve_inside(path, name).mkdir(exist_ok=True)
                     remove_abandoned(path / name)
                 remove_abandoned(path)
             except OSError as error:
@@ -92,13 +92,13 @@ def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_
     above = [folder for folder in (path, *path.resolve().parents) if not folder.exists()]
     if not path.exists() or os.access(path.resolve().parent, os.W_OK):
         # A run of this name cannot end in between, nor one begin.
-        while_it_is_made.enter_context(held(lock_beside(path), busy(path, "being written")))
+        while_it_is_made.enter_context(lock_name(path))
     for folder in reversed(above):  # the innermost goes first
         until_the_end.callback(_remove_empty, folder)
     path.mkdir(parents=True, exist_ok=True)
     if any(path.iterdir()) and not _is_ours(path, kind):
         raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
-    until_the_end.enter_context(held(path / LOCK, busy(path, "being worked in")))
+    until_the_end.enter_context(hold_lock(path / LOCK, describe_claim(path, "being worked in")))
 
 
 def _remove_empty(folder: Path) -> None:

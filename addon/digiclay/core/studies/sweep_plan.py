@@ -48,7 +48,14 @@ class Folder:
         return records
 
     def keep(self, point: Point, axes: Sequence[Axis], record: Record) -> None:
-        """Write the file of a finished point, whole or not at all."""
+        """Write the file of a finished point, whole or not at all.
+
+        Parameters
+        ----------
+        point : Point
+        axes : sequence of Axis
+        record : Record
+        """
         values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
         write_whole(self.path / POINTS / f"{point.index:06d}.json", as_json({"values": values, **record}))
 
