@@ -186,7 +186,7 @@ def period_calls(system: System, trajectories: Sequence[Trajectory], count: int)
     several = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
     starts = np.arange(count)[:, None] * system.period
     poses = sample_poses(trajectories, (starts + system.instants).ravel())
-    ways = simulation.approaches(system, poses.reshape(count, -1, len(trajectories), 7))
+    ways = simulation.trace_fingers(system, poses.reshape(count, -1, len(trajectories), 7))
     Counted.ledger = ledger = Ledger()
     calls, before, state = [], 0, state._replace(**several)
     with methods_noted():

@@ -29,8 +29,8 @@ from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Finger, Scene, Simulation
-from digiclay.core.session.snapshot import packed
-from digiclay.core.session.take import Take, states
+from digiclay.core.session import snapshot
+from digiclay.core.session.take import Take, replay
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -165,8 +165,8 @@ def record(system: System, trajectory: Trajectory | Motion, count: int, state: S
 
 def replayed(take: Take) -> bool:
     """Tell whether a take played again ends in the very same state, bit for bit."""
-    *_, last = states(take)
-    return packed(assemble(take.scene), last) == take.end
+    *_, last = replay(take)
+    return snapshot.dump(assemble(take.scene), last) == take.end
 
 
 def place(x: Floats, y: Floats) -> Floats:

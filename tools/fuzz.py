@@ -21,16 +21,17 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.quantity import quantities
-from digiclay.core.base.toml_text import tables
+from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.control.methods import METHODS
-from digiclay.core.engine.simulation import advance, approaches, begin, periods
+from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.system import System
-from digiclay.core.model.trajectory import Path, Waypoint, along
+from digiclay.core.model.trajectory import Path, Waypoint, interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, STEPPERS, UNASKED, parameters
 from digiclay.core.scene.toml_table import ABSENT, PRESETS, resolve, text
+from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import run
-from digiclay.core.session.snapshot import START, carried, packed, unpacked
+from digiclay.core.session.snapshot import START
 
 __all__ = ["CASES", "failure", "main"]
 
@@ -126,13 +127,13 @@ def scene(chance: np.random.Generator) -> None:
     """Take in a scene and begin its session, or have it refused."""
     if chance.random() < 0.2:
         try:
-            made = tables(spoilt(chance))
+            made = parse_tables(spoilt(chance))
         except (ValueError, RecursionError):  # said with file and line by `scene_source.read_table`
             return
     else:
         made = table(chance)
     found = resolve(made)
-    assert resolve(tables(text(found))) == found
+    assert resolve(parse_tables(text(found))) == found
     if found.cells > CELLS or found.cells * found.periods > RECORDED:
         return
     seen: list[int] = []
@@ -151,7 +152,7 @@ def kept(method: str) -> tuple[System, bytes]:
     places = ((0.0, 42e-3), (0.2, 37e-3))
     way = Path("linear", tuple(Waypoint(time=when, position=(0.0, 0.0, z)) for when, z in places))
     *_, last = periods(system, [way.trajectory()], begin(system), 50)
-    return system, packed(system, last)
+    return system, snapshot.dump(system, last)
 
 
 def crafted(chance: np.random.Generator, data: bytes) -> bytes:
@@ -190,12 +191,12 @@ def state(chance: np.random.Generator) -> None:
     """Take up a crafted state and go on from it, or have it refused."""
     system, data = kept(list(METHODS)[chance.integers(len(METHODS))])
     finger = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
-    for take_up in (unpacked, carried):
+    for take_up in (snapshot.load, snapshot.transfer_heights):
         found = take_up(system, crafted(chance, data))
         for _ in range(PERIODS):
-            (way,) = approaches(system, along(finger, system.instants / system.period))
+            (way,) = trace_fingers(system, interpolate_poses(finger, system.instants / system.period))
             found = advance(system, found, way)
-        packed(system, found)
+        snapshot.dump(system, found)
 
 
 #: What can be made, and had taken or refused.

@@ -11,7 +11,7 @@ from digiclay.core.engine.simulation import begin, step
 from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.session.snapshot import packed
+from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.exchange import formed_bed
@@ -185,7 +185,7 @@ def test_a_session_tells_its_forces_whether_they_are_drawn_or_not(bed):
     view.show_state(bed, system, state)
     force = state.row(system.rows.force).copy()
     assert force.max() > 1e-3
-    bed["digiclay_state"] = packed(system, state)
+    bed["digiclay_state"] = snapshot.dump(system, state)
     np.testing.assert_array_equal(formed_bed.formed(bed).force, force)
     bed["digiclay_state"] = b"damaged"
     assert not np.array_equal(formed_bed.formed(bed).force, force)

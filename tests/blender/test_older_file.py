@@ -11,7 +11,7 @@ import pytest
 from digiclay import bridge
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.session.snapshot import unpacked
+from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.exchange import formed_bed
 from digiclay.live import bed_state, running, tick
@@ -70,8 +70,8 @@ def test_the_take_replays_to_the_stored_heights() -> None:
     assert (first.name, second.name) == ("A press", "Take 2")  # the second was recorded when it was saved
     take = takes.read(found, first.number)
     system = assemble(take.scene)
-    np.testing.assert_array_equal(unpacked(system, take.start).row(0), HEIGHTS["take_start"])
-    np.testing.assert_array_equal(unpacked(system, take.end).row(0), HEIGHTS["take_end"])
+    np.testing.assert_array_equal(snapshot.load(system, take.start).row(0), HEIGHTS["take_start"])
+    np.testing.assert_array_equal(snapshot.load(system, take.end).row(0), HEIGHTS["take_end"])
     assert bpy.ops.digiclay.take_replay(take=first.number) == {"FINISHED"}
     np.testing.assert_allclose(exact(found), HEIGHTS["take_end"], rtol=0, atol=ROUNDING)
 

@@ -12,7 +12,7 @@ from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.session.snapshot import unpacked
+from digiclay.core.session import snapshot
 from digiclay.core.shapes.height_text import unpacked as heights_of
 from digiclay.core.shapes.source_file import sample_shapes
 from digiclay.device import view
@@ -71,7 +71,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     assert np.abs(heights(made) - wanted).max() <= SHOWN
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
-    state = unpacked(system, bed_state.kept(made))
+    state = snapshot.load(system, bed_state.kept(made))
     assert system.controller.displayed(state.memory)
     assert np.abs(state.row(0) - wanted).max() <= SHOWN
 

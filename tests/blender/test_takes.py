@@ -18,8 +18,8 @@ from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.live_periods import lived
-from digiclay.core.session.snapshot import packed
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_periods import simulate_path
 from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant
@@ -40,12 +40,12 @@ def taken(count: int = COUNT) -> tuple[Take, Floats]:
     made = scene()
     system = assemble(made)
     state = begin(system)
-    first, heights = packed(system, state), [state.row(0)]
+    first, heights = snapshot.dump(system, state), [state.row(0)]
     poses = np.tile([0.0, 0.0, 0.0, *LEVEL], (count + 1, 1))
     poses[:, 2] = np.linspace(41e-3, 35e-3, count + 1)
-    for state in lived(system, state, poses[:, None]):  # noqa: B020
+    for state in simulate_path(system, state, poses[:, None]):  # noqa: B020
         heights.append(state.row(0))
-    return Take(made, first, poses[:, None], packed(system, state)), np.array(heights)
+    return Take(made, first, poses[:, None], snapshot.dump(system, state)), np.array(heights)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from digiclay.core.model.fingertip import JOIN, Fingertip, reach, reaches
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.model.touch import approach, reached
+from digiclay.core.model.touch import reached, trace_finger
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def test_the_window_has_every_cell_the_finger_could_touch_on_its_way(
     direction = np.array(toward) / max(np.linalg.norm(toward), 1e-3)
     poses = np.array([pose(tuple(np.array(spot) + part * way * direction), turn) for part in (0.0, 0.5, 1.0)])
     outline, peak = finger.outline(poses), 40e-3
-    disc = reached(approach(finger, poses[None])[0].window, peak)
+    disc = reached(trace_finger(finger, poses[None])[0].window, peak)
     cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()
@@ -75,7 +75,7 @@ def test_a_dip_within_the_period_is_seen_as_well(
 ) -> None:
     poses = np.array([pose(at, turn) for at in (spot, dip, spot)])
     outline, peak = finger.outline(poses), 40e-3
-    disc = reached(approach(finger, poses[None])[0].window, peak)
+    disc = reached(trace_finger(finger, poses[None])[0].window, peak)
     cells = BED.disc(*disc) if disc else np.empty(0, int)
     touchable = np.flatnonzero((under(outline, BED.x, BED.y) < peak).any(axis=0))
     assert np.isin(touchable, cells).all()

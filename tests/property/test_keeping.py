@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from digiclay.core.base.errors import StateError
-from digiclay.core.engine.simulation import advance, approaches, begin, periods
+from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.state import State
-from digiclay.core.model.trajectory import along
+from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.snapshot import carried, packed, unpacked
+from digiclay.core.session import snapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,20 +17,20 @@ from tests.assemble import path
 
 SYSTEM = assemble(resolve({"layout": {"rows": 6, "columns": 10}}))
 *_, LAST = periods(SYSTEM, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(SYSTEM), 50)
-KEPT = packed(SYSTEM, LAST)
+KEPT = snapshot.dump(SYSTEM, LAST)
 FINGER = np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (2, 1, 1))
 
 
 def goes_on(state: State) -> bool:
     """Tell whether a state can be simulated and kept again."""
-    (finger,) = approaches(SYSTEM, along(FINGER, SYSTEM.instants / SYSTEM.period))
-    return bool(packed(SYSTEM, advance(SYSTEM, state, finger)))
+    (finger,) = trace_fingers(SYSTEM, interpolate_poses(FINGER, SYSTEM.instants / SYSTEM.period))
+    return bool(snapshot.dump(SYSTEM, advance(SYSTEM, state, finger)))
 
 
 def refusals(data: bytes) -> list[str]:
     """Take up bytes both ways; return why each is refused, all that may go wrong, "" if it is not."""
     told = []
-    for take_up in (unpacked, carried):
+    for take_up in (snapshot.load, snapshot.transfer_heights):
         refused = ""
         try:
             state = take_up(SYSTEM, data)
@@ -78,7 +78,7 @@ def test_a_state_anywhere_in_a_session_is_taken_up_exactly(spots: list[tuple[int
     way = path(*[(t, x / 10, 0, z / 10) for t, (x, z) in zip(times, spots, strict=True)])
     for state in periods(SYSTEM, [way], begin(SYSTEM), 80):
         if state.period % 20 == 0:
-            data = packed(SYSTEM, state)
-            again = unpacked(SYSTEM, data)
-            assert packed(SYSTEM, again) == data
+            data = snapshot.dump(SYSTEM, state)
+            again = snapshot.load(SYSTEM, data)
+            assert snapshot.dump(SYSTEM, again) == data
             assert goes_on(again)

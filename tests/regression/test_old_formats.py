@@ -13,8 +13,8 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import SECTIONS, Scene
 from digiclay.core.scene.toml_table import ABSENT, text
-from digiclay.core.session.snapshot import carried, unpacked
-from digiclay.core.session.take import from_bytes, states
+from digiclay.core.session import snapshot
+from digiclay.core.session.take import from_bytes, replay
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 #: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
@@ -82,7 +82,7 @@ def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path: Path) -
 @pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
 def test_a_kept_state_of_an_older_version_is_what_it_was(path: Path) -> None:
     system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
-    state = unpacked(system, path.read_bytes())
+    state = snapshot.load(system, path.read_bytes())
     rows = np.array([state.row(index) for index in range(len(state.rows))])
     assert state.period == known["period"]
     np.testing.assert_array_equal(rows, known["rows"])
@@ -94,7 +94,7 @@ def test_a_kept_state_of_an_older_version_is_what_it_was(path: Path) -> None:
 def test_a_session_goes_on_from_a_kept_state_of_an_older_version_as_it_did(path: Path) -> None:
     scene, known = load(path.with_suffix(".toml")), np.load(path.with_suffix(".npz"))
     system = assemble(scene)
-    height, force, state = [], [], unpacked(system, path.read_bytes())
+    height, force, state = [], [], snapshot.load(system, path.read_bytes())
     for now in periods(system, scene.trajectories(), state, 50):
         height.append(now.row(0))
         force.append(now.row(system.rows.force))
@@ -105,7 +105,7 @@ def test_a_session_goes_on_from_a_kept_state_of_an_older_version_as_it_did(path:
 @pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)
 def test_the_heights_of_a_kept_state_of_an_older_version_are_taken_up_by_another_session(path: Path) -> None:
     system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
-    state = carried(system, path.read_bytes())
+    state = snapshot.transfer_heights(system, path.read_bytes())
     np.testing.assert_array_equal(state.row(0), known["carried_height"])
     np.testing.assert_array_equal(state.mode(), known["carried_mode"])
 
@@ -114,5 +114,5 @@ def test_the_heights_of_a_kept_state_of_an_older_version_are_taken_up_by_another
 def test_a_take_of_an_older_version_is_played_as_it_was(path: Path) -> None:
     take, known = from_bytes(path.read_bytes()), np.load(path.with_suffix(".npz"))
     np.testing.assert_array_equal(take.poses, known["poses"][:, None])
-    height = [state.row(0) for state in states(take)]
+    height = [state.row(0) for state in replay(take)]
     np.testing.assert_allclose(height[::10], known["height"], rtol=0.0, atol=ROUNDING)

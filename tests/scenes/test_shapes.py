@@ -14,8 +14,8 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import Result, run
-from digiclay.core.session.snapshot import packed, unpacked
 
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
 #: Within this time a shape of 10 mm has come up; then the finger comes down.
@@ -129,11 +129,11 @@ def test_a_state_is_kept_and_taken_up_bit_for_bit(method: str, moment: float) ->
     made = scene(method)
     system, way = assemble(made), made.section("trajectory").trajectory()
     (state,) = deque(periods(system, [way], begin(system), round(moment / PERIOD)), maxlen=1)
-    again = unpacked(system, packed(system, state))
+    again = snapshot.load(system, snapshot.dump(system, state))
     (one,) = deque(periods(system, [way], state, 40), maxlen=1)
     (other,) = deque(periods(system, [way], again, 40), maxlen=1)
     assert np.array_equal(one.row(0), other.row(0))
-    assert packed(system, one) == packed(system, other)
+    assert snapshot.dump(system, one) == snapshot.dump(system, other)
 
 
 def test_a_hand_over_counts_the_finger_s_losses() -> None:

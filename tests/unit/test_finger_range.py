@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
-from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, beyond_words, largest_indentation
+from digiclay.core.model.finger_range import (
+    MOST_FORCE,
+    MOST_INDENTATION,
+    describe_excess,
+    find_largest_indentation,
+)
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.schema import Scene
@@ -63,7 +68,7 @@ def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
     # Beyond the rim of a finger that is lifted: no force, whatever the heights.
     assert shallow.history is not None
     free = {**shallow.history, "force": np.zeros_like(shallow.history["force"])}
-    assert largest_indentation(Fingertip(), free) == 0.0
+    assert find_largest_indentation(Fingertip(), free) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -77,7 +82,7 @@ def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
     ],
 )
 def test_only_what_is_beyond_is_named(force: float | None, indentation: float | None, parts: int) -> None:
-    assert beyond_words(force, indentation).count("up to") == parts
+    assert describe_excess(force, indentation).count("up to") == parts
 
 
 def test_the_overlay_says_when_no_finger_presses_so_hard() -> None:

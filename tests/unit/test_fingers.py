@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError, SceneError, StateError
-from digiclay.core.base.toml_text import tables
+from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve, text
-from digiclay.core.session.snapshot import START, packed, unpacked
-from digiclay.core.session.take import Take, as_scene, from_bytes, to_bytes
+from digiclay.core.session import snapshot
+from digiclay.core.session.snapshot import START
+from digiclay.core.session.take import Take, from_bytes, make_scene, to_bytes
 
 ROOT = Path(__file__).parents[2]
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
@@ -42,7 +43,7 @@ ONE = TWO[: TWO.rindex("[[finger]]")]
 
 def scene(words: str) -> Scene:
     """Return the scene of a text."""
-    return resolve(tables(BED + words), "bed")
+    return resolve(parse_tables(BED + words), "bed")
 
 
 def refused(words: str) -> str:
@@ -65,8 +66,10 @@ def test_a_session_lasts_as_long_as_the_longest_path() -> None:
 
 @pytest.mark.parametrize("words", [TWO, "finger = []\nsimulation.duration = 1.0\n"])
 def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(words: str) -> None:
-    made = resolve(tables(words + BED) if words.startswith("finger") else tables(BED + words), "bed")
-    assert resolve(tables(text(made))) == made
+    made = resolve(
+        parse_tables(words + BED) if words.startswith("finger") else parse_tables(BED + words), "bed"
+    )
+    assert resolve(parse_tables(text(made))) == made
 
 
 def test_one_finger_in_a_list_is_the_same_as_one_beside_the_other_sections() -> None:
@@ -119,7 +122,7 @@ def test_a_number_of_fingers_that_the_physics_does_not_carry_is_refused_in_one_l
 
 def test_a_kept_state_of_two_fingers_is_refused() -> None:
     system = assemble(scene(ONE))
-    data = packed(system, begin(system))
+    data = snapshot.dump(system, begin(system))
     length = int.from_bytes(data[len(START) : len(START) + 4], "little")
     header = json.loads(data[len(START) + 4 : len(START) + 4 + length])
     assert header["gathered"]["fingers"] == [{"reach": None}]
@@ -127,7 +130,7 @@ def test_a_kept_state_of_two_fingers_is_refused() -> None:
     head = json.dumps(header).encode()
     two = START + len(head).to_bytes(4, "little") + head + data[len(START) + 4 + length :]
     with pytest.raises(StateError, match=r"must have the same number of fingers as the bed now, 1 \(got 2\)"):
-        unpacked(system, two)
+        snapshot.load(system, two)
 
 
 def take_of(made: Scene) -> Take:
@@ -156,7 +159,7 @@ def test_a_take_of_a_later_version_is_refused() -> None:
 def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
     made = scene(ONE)
     system = assemble(made)
-    (finger,) = as_scene(replace(take_of(made), start=packed(system, begin(system))), "take").fingers
+    (finger,) = make_scene(replace(take_of(made), start=snapshot.dump(system, begin(system))), "take").fingers
     assert [point.time for point in finger.trajectory.waypoints] == [0.0, pytest.approx(0.015)]
 
 

@@ -10,14 +10,20 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.set_point import SetPoint
-from digiclay.core.model.trajectory import along, between
+from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import accuracy
+from digiclay.core.session import accuracy, snapshot
 from digiclay.core.session.accuracy import PAUSE, STRETCH, Errors
-from digiclay.core.session.live_periods import Clock, due, lived, reachable, spent, way
+from digiclay.core.session.live_periods import (
+    Clock,
+    clamp_pose,
+    interpolate_path,
+    periods_due,
+    simulate_path,
+    update_cost,
+)
 from digiclay.core.session.recent_trace import ROWS, begun, extended, felt, picked, row
-from digiclay.core.session.snapshot import packed
 from numpy.typing import NDArray
 
 from tests.assemble import path
@@ -32,7 +38,7 @@ def looked(times: list[float], most: int = 100, clock: Clock | None = None) -> t
     """Look at the clock at some times; return the periods due each time."""
     clock, counts = clock or Clock(), []
     for time in times:
-        count, clock = due(clock, time, PERIOD, most)
+        count, clock = periods_due(clock, time, PERIOD, most)
         counts.append(count)
     return counts, clock
 
@@ -62,9 +68,9 @@ def test_more_than_the_most_is_dropped_and_not_made_up_for() -> None:
 def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
     clock, now, looks = Clock(), 0.0, []
     for _ in range(200):
-        count, clock = due(clock, now, PERIOD, 1000)
+        count, clock = periods_due(clock, now, PERIOD, 1000)
         took = count * 4 * PERIOD  # a period takes four times as long as it lasts
-        clock = spent(clock, count, took)
+        clock = update_cost(clock, count, took)
         now += took + 0.02  # drawing
         looks.append(took)
     assert max(looks[5:]) < 0.1
@@ -73,7 +79,7 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling() -> None:
 
 def test_a_machine_too_slow_simulates_for_seven_tenths_of_the_time_and_draws_in_the_rest() -> None:
     _, clock = looked([0.0])
-    count, _ = due(spent(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)
+    count, _ = periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)
     # 101 periods have gone by, and each takes five to simulate: 14 take 70, 15 would take 75.
     assert count == 14
 
@@ -99,7 +105,7 @@ def pose(x: float = 0.0, z: float = 0.05) -> Floats:
 
 def test_the_way_begins_where_the_finger_was_and_ends_where_it_is() -> None:
     start, end = pose(), np.array([[0.01, 0.0, 0.03, 0.6, 0.0, 0.8, 0.0]])
-    path = way(start, end, 7)
+    path = interpolate_path(start, end, 7)
     assert path.shape == (8, 1, 7)
     assert np.array_equal(path[0], start)
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
@@ -111,17 +117,22 @@ def test_ways_worked_out_together_are_those_worked_out_one_by_one() -> None:
     poses = random.normal(size=(40, 2, 7))
     poses[..., 3:] /= np.linalg.norm(poses[..., 3:], axis=-1)[..., None]
     parts = np.array([0.0, 0.2, 0.21, 0.7, 1.0])
-    alone = [between(a, b, parts) for a, b in pairwise(poses)]
-    assert np.array_equal(along(poses, parts), alone)
+    alone = [interpolate_poses(np.array(pair), parts)[0] for pair in pairwise(poses)]
+    assert np.array_equal(interpolate_poses(poses, parts), alone)
 
 
 def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() -> None:
-    poses = np.concatenate([way(pose(), pose(z=0.035), 40), way(pose(z=0.035), pose(0.01, 0.035), 50)[1:]])
-    *_, together = lived(SYSTEM, begin(SYSTEM), poses)
+    poses = np.concatenate(
+        [
+            interpolate_path(pose(), pose(z=0.035), 40),
+            interpolate_path(pose(z=0.035), pose(0.01, 0.035), 50)[1:],
+        ]
+    )
+    *_, together = simulate_path(SYSTEM, begin(SYSTEM), poses)
     state = begin(SYSTEM)
     for first in range(0, 90, 7):
-        *_, state = lived(SYSTEM, state, poses[first : first + 8])
-    assert packed(SYSTEM, state) == packed(SYSTEM, together)
+        *_, state = simulate_path(SYSTEM, state, poses[first : first + 8])
+    assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, together)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +146,7 @@ def test_a_path_gives_the_same_states_however_many_periods_are_done_at_a_time() 
 def test_a_finger_stays_where_a_finger_can_be(given: tuple[float, ...], wanted: tuple[float, ...]) -> None:
     (at,) = pose()
     at[:3] = given
-    assert reachable(at, 0.1)[:3].tolist() == list(wanted)
+    assert clamp_pose(at, 0.1)[:3].tolist() == list(wanted)
 
 
 def test_a_trace_never_holds_more_than_its_rows() -> None:
@@ -204,7 +215,7 @@ def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
     assert monitor is not None
     start = begin(system)
     monitor = accuracy.begin_stretch(monitor, start)
-    for index, state in enumerate(lived(system, start, finger)):
+    for index, state in enumerate(simulate_path(system, start, finger)):
         monitor, errors = accuracy.follow(monitor, state, finger[index : index + 2])
         found += [errors] if errors else []
     assert index == count - 1
@@ -213,13 +224,13 @@ def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
 
 def test_a_monitor_follows_for_a_stretch_now_and_then() -> None:
     count = 2 * (STRETCH + PAUSE) + STRETCH
-    assert len(monitored(count, way(pose(), pose(z=0.05), count))) == 3
+    assert len(monitored(count, interpolate_path(pose(), pose(z=0.05), count))) == 3
 
 
 def test_the_monitor_finds_the_error_of_a_stretch() -> None:
     # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
     # before them changed, so it is no more than the right size that is asked for.
-    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
     (found,) = monitored(STRETCH, finger)
     fine = assemble(
         resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "0.05 ms"}})
@@ -227,15 +238,15 @@ def test_the_monitor_finds_the_error_of_a_stretch() -> None:
     coarse = assemble(
         resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "1 ms"}})
     )
-    *_, exact = lived(fine, begin(fine), finger)
-    *_, state = lived(coarse, begin(coarse), finger)
+    *_, exact = simulate_path(fine, begin(fine), finger)
+    *_, state = simulate_path(coarse, begin(coarse), finger)
     error = np.abs(exact.row(0) - state.row(0)).max()
     assert 0.3 * error < found.height < 3.0 * error
     assert error > 1e-9
 
 
 def test_a_finer_step_has_smaller_errors() -> None:
-    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
     coarse, fine = monitored(STRETCH, finger)[0], monitored(STRETCH, finger, "0.25 ms")[0]
     # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
     assert fine.height < coarse.height / 8
@@ -243,14 +254,14 @@ def test_a_finer_step_has_smaller_errors() -> None:
 
 
 def test_a_monitor_leaves_the_session_alone() -> None:
-    finger = way(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
-    *_, alone = lived(SYSTEM, begin(SYSTEM), finger)
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    *_, alone = simulate_path(SYSTEM, begin(SYSTEM), finger)
     monitor, start = accuracy.start(SCENE), begin(SYSTEM)
     assert monitor is not None
     monitor = accuracy.begin_stretch(monitor, start)
-    for index, state in enumerate(lived(SYSTEM, start, finger)):
+    for index, state in enumerate(simulate_path(SYSTEM, start, finger)):
         monitor, _ = accuracy.follow(monitor, state, finger[index : index + 2])
-    assert packed(SYSTEM, state) == packed(SYSTEM, alone)
+    assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
     assert felt(SYSTEM, state) > 0.0
 
 

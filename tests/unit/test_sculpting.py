@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import live_periods
-from digiclay.core.session.snapshot import packed
+from digiclay.core.session import live_periods, snapshot
 from digiclay.live import running, sculpting
 
 from tests.hand import SCENE, SIZES, TICK, Hand, heights, pose, started
@@ -137,7 +136,7 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     session = hand.press(started())
     kept = session.kept
     back = sculpting.restored(hand.press(session, 6.0), kept, pose())
-    assert packed(back.system, back.state) == kept
+    assert snapshot.dump(back.system, back.state) == kept
     assert len(back.gestures) == 1
 
 
@@ -150,7 +149,7 @@ def test_a_bed_goes_on_from_what_was_kept() -> None:
     session = Hand().press(started())
     other, said = sculpting.begun(8, "Copy", SCENE, pose(), session.kept)
     assert said == ""
-    assert packed(other.system, other.state) == session.kept
+    assert snapshot.dump(other.system, other.state) == session.kept
 
 
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.session import live_periods
-from digiclay.core.session.live_periods import lived
-from digiclay.core.session.snapshot import packed, unpacked
+from digiclay.core.session import live_periods, snapshot
+from digiclay.core.session.live_periods import simulate_path
 from digiclay.live import sculpting
 
 from tests.hand import Hand, started
@@ -24,8 +23,8 @@ def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
     session = hand.press(hand.press(session), 6.0)
     keep = session.recording
     assert keep is not None
-    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
-    assert packed(session.system, again) == session.kept
+    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
+    assert snapshot.dump(session.system, again) == session.kept
 
 
 def test_undo_shortens_a_recording_to_what_led_there() -> None:
@@ -37,8 +36,8 @@ def test_undo_shortens_a_recording_to_what_led_there() -> None:
     session = hand.press(session, 3.0)
     keep = session.recording
     assert keep is not None
-    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
-    assert packed(session.system, again) == session.kept
+    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
+    assert snapshot.dump(session.system, again) == session.kept
 
 
 def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
@@ -69,8 +68,8 @@ def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     session = hand.press(sculpting.rewind(hand.press(session)), 6.0)
     keep = session.recording
     assert keep is not None
-    *_, again = lived(session.system, unpacked(session.system, keep.start), keep.path)
-    assert packed(session.system, again) == session.kept
+    *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
+    assert snapshot.dump(session.system, again) == session.kept
 
 
 def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:

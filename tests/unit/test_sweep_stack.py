@@ -17,7 +17,7 @@ from digiclay.core.batch.packing import put_together
 from digiclay.core.batch.padding import reach
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.supply import Supply
-from digiclay.core.model.touch import approach
+from digiclay.core.model.touch import trace_finger
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.studies.axes import Point, make_points, read_axis
@@ -75,7 +75,7 @@ def test_the_reach_of_many_fingers_is_that_of_each() -> None:
 
     poses = np.zeros((3, 2, 7))
     poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
-    windows = [one.window for one in approach(Fingertip(), poses)]
+    windows = [one.window for one in trace_finger(Fingertip(), poses)]
     _, _, found = reach(np.array(windows).T, np.full(3, 0.04))
     expected = [alone(base, tilt, bend, 0.04) + spread for _, _, spread, base, tilt, bend in windows]
     np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-12)

@@ -16,9 +16,9 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import text
-from digiclay.core.session.live_periods import lived
-from digiclay.core.session.snapshot import packed
-from digiclay.core.session.take import Take, as_scene, finer, from_bytes, states, to_bytes
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.take import Take, from_bytes, make_scene, refine, replay, to_bytes
 from numpy.typing import NDArray
 
 from tests.assemble import record, replayed, sample
@@ -51,14 +51,14 @@ def taken(start: State | None = None) -> tuple[System, Take, State]:
     """Live through the gesture; return the system, the take and the last state."""
     system = assemble(scene())
     state = start or begin(system)
-    first, poses = packed(system, state), gesture()
-    *_, last = lived(system, state.copy(), poses)
-    return system, Take(scene(), first, poses, packed(system, last)), last
+    first, poses = snapshot.dump(system, state), gesture()
+    *_, last = simulate_path(system, state.copy(), poses)
+    return system, Take(scene(), first, poses, snapshot.dump(system, last)), last
 
 
 def difference(take: Take, parts: int) -> float:
     """Return how far a take's heights are from those at a finer physics step, at most, m."""
-    both = zip(states(take), states(take, finer(take.scene, parts)), strict=True)
+    both = zip(replay(take), replay(take, refine(take.scene, parts)), strict=True)
     return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
 
 
@@ -108,13 +108,13 @@ def test_the_same_step_makes_no_difference() -> None:
 @pytest.mark.parametrize("parts", [0, -1, 65])
 def test_a_step_cut_into_too_few_or_too_many_parts_is_refused(parts: int) -> None:
     with pytest.raises(ParameterError, match="must be from 1 to 64"):
-        finer(scene(), parts)
+        refine(scene(), parts)
 
 
 def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> None:
     system, take, last = taken()
     file = tmp_path / "my take.toml"  # type: ignore[operator]
-    file.write_text(text(as_scene(take, "my take")), encoding="utf-8")
+    file.write_text(text(make_scene(take, "my take")), encoding="utf-8")
     read = load(file)
     done = record(assemble(read), read.section("trajectory").trajectory(), read.periods)
     assert read.periods == COUNT
@@ -127,8 +127,8 @@ def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
     # Nobody begins to record in the very period a session starts in.
     system, take, last = taken()
     away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1))
-    *_, waited = lived(system, begin(system), away)
-    late = as_scene(replace(take, start=packed(system, waited)), "late")
+    *_, waited = simulate_path(system, begin(system), away)
+    late = make_scene(replace(take, start=snapshot.dump(system, waited)), "late")
     done = record(assemble(late), late.section("trajectory").trajectory(), late.periods)
     assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
 
@@ -136,19 +136,19 @@ def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
 def test_only_turning_points_of_the_path_become_waypoints() -> None:
     _, take, _ = taken()
     # The finger was read every 6th period, and goes straight in between.
-    assert len(as_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
+    assert len(make_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
 
 
 def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
     _, _, formed = taken()
     _, take, _ = taken(formed)
     with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
-        as_scene(take, "late")
+        make_scene(take, "late")
 
 
 def test_states_come_one_a_period() -> None:
     _, take, _ = taken()
-    assert [state.period for state in states(take)] == list(range(1, COUNT + 1))
+    assert [state.period for state in replay(take)] == list(range(1, COUNT + 1))
 
 
 @pytest.mark.parametrize(

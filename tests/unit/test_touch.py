@@ -10,7 +10,7 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.model.null_parts import Unrelaxed
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.touch import MOST, Touch, approach, force, reached
+from digiclay.core.model.touch import MOST, Touch, force, reached, trace_finger
 
 from tests.assemble import AWAY, make_system, path, record
 
@@ -37,7 +37,7 @@ def test_there_is_no_force_across_a_gap() -> None:
 def near(*poses: tuple[float, float, float]) -> np.ndarray:
     """Return the cells a level finger may touch while it is at some places, mm; pins stand at 40 mm."""
     bed, table = grid(Layout()), np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]])
-    disc = reached(approach(Fingertip(), table)[0].window, 40e-3)
+    disc = reached(trace_finger(Fingertip(), table)[0].window, 40e-3)
     return bed.disc(*disc) if disc else np.empty(0, int)
 
 
@@ -74,21 +74,21 @@ def dragged(periods: int) -> np.ndarray:
 
 def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
     poses, places = dragged(70), grid(Layout()).place(np.arange(100, 400))
-    together = [one.under(places) for one in approach(Fingertip(), poses)]
-    alone = [approach(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
+    together = [one.under(places) for one in trace_finger(Fingertip(), poses)]
+    alone = [trace_finger(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
     assert np.array_equal(np.array(together), np.array(alone))
 
 
 def test_other_places_in_mid_way_have_their_own_undersides() -> None:
-    bed, coming = grid(Layout()), approach(Fingertip(), dragged(8))
+    bed, coming = grid(Layout()), trace_finger(Fingertip(), dragged(8))
     first, second = bed.place(np.arange(50)), bed.place(np.arange(300, 350))
     coming[0].under(first)
-    fresh = approach(Fingertip(), dragged(8))[1].under(second)
+    fresh = trace_finger(Fingertip(), dragged(8))[1].under(second)
     assert np.array_equal(coming[1].under(second), fresh)
 
 
 def test_a_finger_over_a_large_bed_is_worked_out_for_few_periods_at_a_time() -> None:
-    coming = approach(Fingertip(), dragged(8))
+    coming = trace_finger(Fingertip(), dragged(8))
     many = np.zeros((6, MOST // 6))  # three instants a period: twice as many cells would be all of `MOST`
     assert coming[0].under(many).base.size <= 2 * 2 * MOST  # R and the tangent of two periods
 

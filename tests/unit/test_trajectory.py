@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.trajectory import Trajectory, between, level
+from digiclay.core.model.trajectory import Trajectory, interpolate_poses, level
 from scipy.spatial.transform import Rotation
 
 RANDOM = np.random.default_rng(3)
@@ -110,7 +110,7 @@ def test_the_duration_is_the_time_of_the_last_waypoint() -> None:
 
 def test_the_way_between_two_poses_starts_and_ends_there() -> None:
     start, end = (np.concatenate([POSITIONS[i], TURNS[i]]) for i in (0, 1))
-    ways = between(start[None], end[None], np.array([0.0, 1.0]))[:, 0]
+    ways = interpolate_poses(np.array([start, end])[:, None], np.array([0.0, 1.0]))[0, :, 0]
     assert ways[:, :3] == pytest.approx(np.array([start[:3], end[:3]]), abs=1e-17)
     assert np.abs(np.einsum("ij,ij->i", ways[:, 3:], [start[3:], end[3:]])) == pytest.approx(1.0, abs=1e-14)
 

@@ -20,8 +20,8 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import available_memory
 from digiclay.core.scene.scene_source import Setting, find, load, read_table
 from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import read_run
-from digiclay.core.session.snapshot import packed
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 from digiclay.core.shapes.heightmap import height_map
 from digiclay.core.shapes.request import Shape
@@ -207,14 +207,14 @@ def test_a_damaged_history_is_refused(tmp_path: Path, spoil: Callable[[bytes], b
 def take() -> bytes:
     """Return a take of one period."""
     scene = resolve({"layout": {"rows": 2, "columns": 2}, "blister": SMALL})
-    state = packed(assemble(scene), begin(assemble(scene)))
-    return to_bytes(Take(scene, state, np.tile([0.0, 0, 1, 1, 0, 0, 0], (2, 1)), state))
+    state = snapshot.dump(assemble(scene), begin(assemble(scene)))
+    return to_bytes(Take(scene, state, np.tile([0.0, 0, 1, 1, 0, 0, 0], (2, 1, 1)), state))
 
 
 def test_a_take_that_unpacks_to_more_than_it_is_is_refused() -> None:
     data = io.BytesIO()
     with np.load(io.BytesIO(take())) as arrays:
-        np.savez_compressed(data, **{**arrays, "poses": np.zeros((1_000_000, 7))})
+        np.savez_compressed(data, **{**arrays, "poses": np.zeros((1_000_000, 1, 7))})
     assert len(data.getvalue()) < 100_000
     said = refused(lambda: from_bytes(data.getvalue()))
     assert "must unpack to at most its own" in said

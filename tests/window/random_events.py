@@ -165,9 +165,9 @@ class Events:
 
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
-    running, keeping = blender.part("live.running"), blender.part("core.session.snapshot")
+    running, snapshot = blender.part("live.running"), blender.part("core.session.snapshot")
     for session in running.all():
-        state = keeping.unpacked(session.system, session.kept)
+        state = snapshot.load(session.system, session.kept)
         height = state.row(0)
         assert np.isfinite(height).all()
         assert height.min() >= 0.0

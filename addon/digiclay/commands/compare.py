@@ -15,7 +15,7 @@ from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
 from ..core.control.methods import METHODS
 from ..core.metrics.finger_path import sum_cells
-from ..core.model.finger_range import beyond_words, largest_indentation
+from ..core.model.finger_range import describe_excess, find_largest_indentation
 from ..core.model.set_point import asked
 from ..core.scene.assembly import assemble
 from ..core.scene.scene_source import Setting, find, load
@@ -128,8 +128,8 @@ def _run(scene: Scene, method: str, *, quiet: bool) -> Trial:
 def _beyond(done: Trial) -> str:
     """Say what of a run is beyond a finger."""
     touch, history = assemble(done.scene).cell.touch, done.history
-    deepest = largest_indentation(touch.fingertip, history) if touch else None
-    return beyond_words(float(history["total_force"].max()), deepest)
+    deepest = find_largest_indentation(touch.fingertip, history) if touch else None
+    return describe_excess(float(history["total_force"].max()), deepest)
 
 
 def _speeds(scene: Scene) -> Metrics:

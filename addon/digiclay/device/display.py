@@ -11,8 +11,8 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.scene.assembly import assemble
+from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
-from ..core.session.snapshot import unpacked
 from ..live import bed_state, running
 from ..overlay import views
 from ..settings import properties
@@ -63,7 +63,7 @@ def _rewrite(bed: Any) -> None:
     if kept is not None:
         try:
             system = assemble(properties.scene_of(bed))
-            view.show_state(bed, system, unpacked(system, kept))
+            view.show_state(bed, system, snapshot.load(system, kept))
         except DigiclayError:
             # The settings have changed since the state was kept: what was last drawn stays.
             return

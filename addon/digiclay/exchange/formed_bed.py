@@ -13,7 +13,7 @@ from ..core.engine.system import System
 from ..core.mesh_io.export_model import Model
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session.snapshot import unpacked
+from ..core.session import snapshot
 from ..core.surface.formed import Formed
 from ..live import bed_state, running
 from ..settings import properties
@@ -103,7 +103,7 @@ def _state(bed: Any) -> tuple[System, State] | None:
         return None
     try:
         system = assemble(properties.scene_of(bed))
-        return system, unpacked(system, data)
+        return system, snapshot.load(system, data)
     except DigiclayError:  # the settings have changed since: what is drawn is all there is
         return None
 

@@ -17,7 +17,7 @@ from ..core.model.trajectory import level
 from ..core.scene.assembly import assemble
 from ..core.scene.forming import display_of, display_time, touch_height
 from ..core.scene.schema import Scene
-from ..core.session.snapshot import packed as kept_bytes
+from ..core.session import snapshot
 from ..core.shapes.height_text import packed
 from ..core.shapes.mesh_relief import ShapeMesh, shape_mesh
 from ..core.shapes.relief import Relief
@@ -109,7 +109,7 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     # All that can fail is done: from here on the bed changes.
     properties.adopt(bed, scene)
     began, said = sculpting.begun(
-        bed.session_uid, bed.name, scene, pose, kept_bytes(system, state), bed_state.moment(bed)
+        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), bed_state.moment(bed)
     )
     if said:
         raise DigiclayError(f"{bed.name}: {said}")

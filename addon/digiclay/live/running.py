@@ -63,7 +63,7 @@ class Recording:
 
     @property
     def path(self) -> Floats:
-        """Poses, shape (t + 1, f, 7): `core.session.live_periods.lived` simulates them again bit for bit."""
+        """Poses, shape (t + 1, f, 7): `simulate_path` simulates them again bit for bit."""
         return self.rows[: self.count, :-1].reshape(self.count, -1, 7)
 
     @property

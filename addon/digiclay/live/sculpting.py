@@ -16,11 +16,17 @@ from ..core.engine.system import System
 from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session import accuracy
-from ..core.session.live_periods import Clock, due, lived, reachable, spent, way
+from ..core.session import accuracy, snapshot
+from ..core.session.live_periods import (
+    Clock,
+    clamp_pose,
+    interpolate_path,
+    periods_due,
+    simulate_path,
+    update_cost,
+)
 from ..core.session.recent_trace import begun as trace_begun
 from ..core.session.recent_trace import extended, felt, picked, row
-from ..core.session.snapshot import carried, packed, unpacked
 from ..device.instant import CLEARANCE
 from .running import Gesture, Recording, Running
 from .stroke_queue import drop_strokes, take_path
@@ -69,8 +75,8 @@ def begun(
     """
     system = assemble(scene)
     state, said = _taken_up(system, kept)
-    pose = reachable(pose, system.cell.actuator.stroke)
-    now = packed(system, state)
+    pose = clamp_pose(pose, system.cell.actuator.stroke)
+    now = snapshot.dump(system, state)
     running = Running(
         uid, name, scene, system, state, now, pose, moment + 1, Clock(),
         trace_begun(system.period), accuracy.start(scene), coming=Gesture(state.period, now, pose),
@@ -84,7 +90,7 @@ def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
         return begin(system), ""
     # The state of other parts has heights at least; what has none is of no use.
     refused = ""
-    for read, said in ((unpacked, ""), (carried, CHANGED)):
+    for read, said in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
             return read(system, kept), said
         except StateError as error:
@@ -120,7 +126,7 @@ def advanced(
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
-        count, clock = due(running.clock, now, running.system.period, most)
+        count, clock = periods_due(running.clock, now, running.system.period, most)
     running = replace(running, clock=clock, steps=0, moment=running.moment + 1)
     return followed(running, pose, count) if count else running
 
@@ -136,23 +142,23 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
     if running.strokes:
         running, path = take_path(running, count)
     else:
-        pose = reachable(pose, system.cell.actuator.stroke)
+        pose = clamp_pose(pose, system.cell.actuator.stroke)
         running = _about_to_touch(running, pose, count)
-        path = way(running.pose[None], pose[None], count)[:, 0]
+        path = interpolate_path(running.pose[None], pose[None], count)[:, 0]
     rows, errors, paths = [], running.errors, wrap_one(path)
     started = time.perf_counter()
     # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
     with np.errstate(over="ignore", invalid="ignore"):
         monitor = monitor and accuracy.begin_stretch(monitor, state)
-        for index, state in enumerate(lived(system, running.state, paths)):
+        for index, state in enumerate(simulate_path(system, running.state, paths)):
             if monitor:
                 monitor, found = accuracy.follow(monitor, state, paths[index : index + 2])
                 errors = found or errors
             if state.period % running.trace.every == 0:
                 rows.append(row(system, state, running.scene.set_point, running.trace.pins))
-    clock = spent(running.clock, len(path) - 1, time.perf_counter() - started)
+    clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
-        running, state=state, kept=packed(system, state), pose=path[-1], clock=clock, monitor=monitor,
+        running, state=state, kept=snapshot.dump(system, state), pose=path[-1], clock=clock, monitor=monitor,
         errors=errors, trace=extended(running.trace, rows),
         recording=running.recording and running.recording.extended(paths[1:], running.moment),
     )  # fmt: skip
@@ -192,14 +198,14 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
         When it was that state; a recording goes back to it, or ends if it did not lead there.
     """
     state, _ = _taken_up(running.system, kept)
-    now = packed(running.system, state)
+    now = snapshot.dump(running.system, state)
     keep = running.recording
     if keep is not None:
         keep = keep.at(running.moment if moment is None else moment, state.period)
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
     free = felt(running.system, state) == 0.0
     return replace(
-        running, state=state, kept=now, pose=reachable(pose, running.system.cell.actuator.stroke),
+        running, state=state, kept=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
         clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
         recording=keep, gestures=gestures, moment=running.moment + 1, rested=0.0,
         coming=Gesture(state.period, now, pose) if free else None,

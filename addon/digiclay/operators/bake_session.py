@@ -8,7 +8,7 @@ import numpy as np
 from ..compat import bpy
 from ..core.engine.simulation import begin
 from ..core.scene.assembly import assemble
-from ..core.session.snapshot import packed
+from ..core.session import snapshot
 from ..core.session.take import Take
 from ..device.instant import find_ellipsoid
 from ..device.view import bed_of
@@ -75,7 +75,7 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
                     poses = step
             system = assemble(made)
             # How a path ends is not known before it is simulated, and nobody asks.
-            take = Take(made, packed(system, begin(system)), poses, b"")
+            take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
         rate = scene.render.fps / scene.render.fps_base
         for step in bake.moments_of(take, rate):
             if isinstance(step, float):

@@ -10,9 +10,9 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import LEVEL
 from ..core.scene.assembly import assemble
-from ..core.session.live_periods import Clock, due, lived
-from ..core.session.snapshot import packed, unpacked
-from ..core.session.take import MOST_PARTS, Take, finer
+from ..core.session import snapshot
+from ..core.session.live_periods import Clock, periods_due, simulate_path
+from ..core.session.take import MOST_PARTS, Take, refine
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose
 from ..device.view import bed_of
@@ -78,7 +78,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         if bed is None or bed.session_uid != self._uid:
             return self._left(context)
         period = self._system.period
-        count, self._clock = due(
+        count, self._clock = periods_due(
             self._clock, time.perf_counter(), period, preferences.of(context).most_periods
         )
         try:
@@ -110,12 +110,12 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         # Where the finger is now: it may have been moved since the last session.
         self._stood = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
         self._took: Take = takes.read(bed, self.take)
-        self._system = assemble(finer(self._took.scene, self.parts))
+        self._system = assemble(refine(self._took.scene, self.parts))
         if self._system.grid.count != len(bed.data.vertices):
             here, there = len(bed.data.vertices), self._system.grid.count
             raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
-        self._state = unpacked(self._system, self._took.start)
-        self._states = lived(self._system, self._state, self._took.poses)
+        self._state = snapshot.load(self._system, self._took.start)
+        self._states = simulate_path(self._system, self._state, self._took.poses)
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
@@ -128,7 +128,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     def _finish(self, context: Any) -> set[str]:
         """Leave the bed in the final state of the take, and report the comparison."""
         bed, system = bed_of(context), self._system
-        state = packed(system, self._state)
+        state = snapshot.dump(system, self._state)
         self._place(bed)
         bed_state.write(bed, self._came_to(bed, state))
         view.show_state(bed, system, self._state)
@@ -147,7 +147,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
 
     def _off(self) -> float:
         """Return the largest difference of a height at the end from the take's, µm."""
-        ended = unpacked(self._system, self._took.end)
+        ended = snapshot.load(self._system, self._took.end)
         return 1e6 * float(np.abs(self._state.row(0) - ended.row(0)).max())
 
     def _came_to(self, bed: Any, state: bytes) -> Running:

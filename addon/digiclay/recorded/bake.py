@@ -15,8 +15,8 @@ from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_se
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip, wrap_one
 from ..core.scene.assembly import assemble
-from ..core.session.live_periods import lived
-from ..core.session.snapshot import unpacked
+from ..core.session import snapshot
+from ..core.session.live_periods import simulate_path
 from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
@@ -82,8 +82,8 @@ def moments_of(take: Take, rate: float) -> Iterator[float | Moments]:
     count = system.grid.count
     height = np.empty((wanted.size, count), np.float32)
     force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
-    frame, start = 0, unpacked(system, take.start)
-    for period, state in enumerate(chain([start], lived(system, start, take.poses))):
+    frame, start = 0, snapshot.load(system, take.start)
+    for period, state in enumerate(chain([start], simulate_path(system, start, take.poses))):
         while frame < wanted.size and wanted[frame] == period:
             height[frame], force[frame] = state.row(0), state.row(system.rows.force)
             mode[frame] = state.mode()

@@ -12,8 +12,8 @@ from ..core.engine.simulation import begin
 from ..core.model.trajectory import sample_poses
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session.live_periods import lived
-from ..core.session.snapshot import packed
+from ..core.session import snapshot
+from ..core.session.live_periods import simulate_path
 from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
@@ -136,7 +136,7 @@ def simulate(scene: Scene) -> Take | None:
     times = np.arange(scene.periods + 1) * scene.simulation.control_period
     poses = sample_poses(scene.trajectories(), times)
     state = begin(system)
-    start = packed(system, state)
+    start = snapshot.dump(system, state)
     # Only the last state is wanted: the others' arrays are used up.
-    (state,) = deque(lived(system, state, poses), maxlen=1)
-    return Take(scene, start, poses, packed(system, state))
+    (state,) = deque(simulate_path(system, state, poses), maxlen=1)
+    return Take(scene, start, poses, snapshot.dump(system, state))

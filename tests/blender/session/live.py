@@ -10,7 +10,7 @@ import numpy as np
 from digiclay import bridge
 from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.session.snapshot import unpacked
+from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.live import bed_state, handlers, running, tick
 from digiclay.settings import properties
@@ -60,7 +60,7 @@ def exact(bed: Any) -> np.ndarray:
     """Return the pin tops the bed keeps, exactly, m."""
     system = assemble(properties.scene_of(bed))
     kept = bed_state.kept(bed)
-    return (begin(system) if kept is None else unpacked(system, kept)).row(0)
+    return (begin(system) if kept is None else snapshot.load(system, kept)).row(0)
 
 
 def shown(bed: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.core.model.set_point import SetPoint
-from digiclay.core.session.snapshot import packed
+from digiclay.core.session import snapshot
 from digiclay.device import view
 from digiclay.live import bed_state, running, sculpting, tick
 
@@ -39,7 +39,7 @@ def test_the_bed_keeps_and_shows_what_the_session_is(bed: Any, clock: Clock) -> 
     press(bed, clock)
     session = running.of(bed)
     assert session is not None
-    assert bed_state.kept(bed) == packed(session.system, session.state)
+    assert bed_state.kept(bed) == snapshot.dump(session.system, session.state)
     assert np.array_equal(bed_state.pose(bed), session.pose)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3

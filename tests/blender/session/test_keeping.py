@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from digiclay.core.session.snapshot import packed
+from digiclay.core.session import snapshot
 from digiclay.live import bed_state, handlers, running, sculpting, tick
 
 from tests.blender.session.live import (
@@ -36,7 +36,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     undone(clock)
     session = running.of(only_bed())
     assert session is not None
-    assert packed(session.system, session.state) == first
+    assert snapshot.dump(session.system, session.state) == first
     assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
     np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
     undone(clock)
@@ -95,7 +95,7 @@ def test_a_file_saved_in_mid_session_goes_on_bit_for_bit(bed: Any, clock: Clock,
     assert "another file was loaded" in running.said()
     started(bed)
     session = running.of(bed)
-    assert packed(session.system, session.state) == kept
+    assert snapshot.dump(session.system, session.state) == kept
     assert session.state.period == periods
 
 
@@ -151,7 +151,7 @@ def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Pat
     appended = only_bed()
     notes = tick.start(bpy.context, appended)
     session = running.of(appended)
-    assert packed(session.system, session.state) == kept
+    assert snapshot.dump(session.system, session.state) == kept
     assert all(note.level == "INFO" for note in notes)
 
 

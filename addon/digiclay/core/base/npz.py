@@ -14,7 +14,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BROKEN_ZIP", "Head", "array", "heads", "mapped"]
+__all__ = ["BROKEN_ZIP", "Head", "map_array", "read_array", "read_heads"]
 
 #: All that is raised over a zip that is damaged.
 BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError)
@@ -37,7 +37,7 @@ class Head(NamedTuple):
         return math.prod(self.shape) * self.kind.itemsize
 
 
-def heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
+def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
     """Return what arrays of a file .npz are.
 
     Parameters
@@ -83,7 +83,7 @@ def _head(file: IO[bytes], name: str) -> Head:
         raise ValueError(f"{name} has no head of an array of numbers") from None
 
 
-def array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+def read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     """Read an array whose head has been looked at.
 
     Parameters
@@ -97,7 +97,7 @@ def array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
         return read
 
 
-def mapped(path: Path) -> NDArray[Any]:
+def map_array(path: Path) -> NDArray[Any]:
     """Return the array of a file .npy, still in the file: nothing is read before it is used.
 
     Raises

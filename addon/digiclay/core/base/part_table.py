@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from .errors import ParameterError
 from .quantity import Parameters, nearest, parse, quantities
 
-__all__ = ["cut", "read_part", "refuse_unknown", "shown"]
+__all__ = ["read_part", "refuse_unknown", "shorten", "show_value"]
 
 Table = Mapping[str, Any]
 Part = TypeVar("Part", bound=Parameters)
@@ -24,7 +24,7 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
         close = nearest(key, list(names))
         asked = f"Did you mean {owner}{close}?" if close else f"Known here: {', '.join(names)}."
         name = key if re.fullmatch(r"[\w-]+", key) else repr(key)
-        raise ParameterError(f"{owner}{name}", "", "must be a known key", shown(value), asked)
+        raise ParameterError(f"{owner}{name}", "", "must be a known key", show_value(value), asked)
 
 
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
@@ -37,7 +37,7 @@ def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Pa
     except ParameterError as error:
         rule = error.rule.replace(f"{error.owner}.", f"{section}.")
         said = own.get(error.field)
-        value = shown(said) if isinstance(said, str) else cut(error.value)
+        value = show_value(said) if isinstance(said, str) else shorten(error.value)
         raise ParameterError(section, error.field, rule, value, error.hint) from None
 
 
@@ -50,16 +50,16 @@ def _measured(section: str, key: str, value: Any, unit: str) -> Any:
     try:
         return parse(value, unit)
     except ValueError as error:
-        raise ParameterError(section, key, str(error), shown(value)) from None
+        raise ParameterError(section, key, str(error), show_value(value)) from None
 
 
-def shown(value: Any) -> str:
+def show_value(value: Any) -> str:
     """Write a value from a file on one short line."""
     if isinstance(value, dict):
         return "a section" if value else "an empty section"
-    return cut(repr(value))
+    return shorten(repr(value))
 
 
-def cut(text: str) -> str:
+def shorten(text: str) -> str:
     """Shorten a text that would not fit on a line."""
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -6,7 +6,7 @@ import re
 import tomllib
 from typing import Any
 
-__all__ = ["LARGEST", "tables"]
+__all__ = ["LARGEST", "parse_tables"]
 
 #: Most bytes of a text: the heights of the largest bed, 20 million cells, packed, take 107 MB of them.
 LARGEST = 128_000_000
@@ -23,7 +23,7 @@ _PIECES = re.compile(
 )
 
 
-def tables(text: str) -> dict[str, Any]:
+def parse_tables(text: str) -> dict[str, Any]:
     """Return the tables of a TOML text.
 
     Raises

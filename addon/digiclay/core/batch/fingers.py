@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..engine.system import System
 from ..model.layout import Grid
-from ..model.touch import approach
+from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
 from .broadcasting import Floats, mapped
 
@@ -24,7 +24,7 @@ CHUNK = 256
 class Fingers:
     """Fingertip paths over t control periods, at p instants of each.
 
-    The last axis is b, or 1 where all runs have one and the same finger; see `touch.Approach`.
+    The last axis is b, or 1 where all runs have one and the same finger; see `touch.FingerPeriod`.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, c
     """
     runs = list(zip(systems, ways, strict=True))
     alike = all(_same(run, runs[0]) for run in runs)
-    known = [_approaches(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
+    known = [_trace_finger(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
     return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
 
 
@@ -85,12 +85,12 @@ def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> b
     )
 
 
-def _approaches(system: System, way: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
+def _trace_finger(system: System, way: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
     """Work out how one finger comes: the arrays of `Fingers`, without their last axis."""
     assert system.cell.touch is not None
     starts = (first + np.arange(count)) * system.period
     poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
-    coming = approach(system.cell.touch.fingertip, poses)[0].coming
+    coming = trace_finger(system.cell.touch.fingertip, poses)[0].coming
     return coming.forms, coming.join, np.array(coming.windows)
 
 

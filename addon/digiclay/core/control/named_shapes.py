@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
-from ..base.npz import mapped
+from ..base.npz import map_array
 from ..model.layout import Grid
 
 __all__ = ["FILE", "SHAPES", "check_shape", "from_file", "named"]
@@ -130,7 +130,7 @@ def from_file(field: str, path: str, grid: Grid, low: float, high: float, unit: 
     """
     plan = grid.layout
     try:
-        read = mapped(Path(path))
+        read = map_array(Path(path))
         shape = read.shape
         # Only what fits the bed is read.
         values = np.asarray(read if shape == (plan.rows, plan.columns) else 0.0, dtype=np.float64)

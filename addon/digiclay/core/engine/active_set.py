@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..model.layout import Disc, Grid
-from ..model.touch import Approach, reached
+from ..model.touch import FingerPeriod, reached
 from .state import Gathered, State
 from .system import System
 
@@ -28,7 +28,7 @@ KEPT = 32
 
 
 def taking_part(
-    system: System, state: State, finger: Approach | None, control: tuple[float, float, float] | None
+    system: System, state: State, finger: FingerPeriod | None, control: tuple[float, float, float] | None
 ) -> State:
     """Return a state whose gathered cells are all that can change in the coming period.
 
@@ -37,7 +37,7 @@ def taking_part(
     system : System
     state : State
         Its arrays are used up.
-    finger : Approach or None
+    finger : FingerPeriod or None
         The finger's way through the period.
     control : (float, float, float) or None
         Disc x, y, radius that the controller will command, m.
@@ -75,7 +75,7 @@ def taking_part(
     return State(state.period, state.rows, state.modes, state.aged, top, held, state.memory)
 
 
-def _reach(finger: Approach | None, peak: float) -> Disc | None:
+def _reach(finger: FingerPeriod | None, peak: float) -> Disc | None:
     """Return the disc the finger may touch while no pin is above `peak`, m; None without a finger."""
     return reached(finger.window, peak) if finger else None
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from ..base.errors import DivergenceError
 from ..model.fingertip import require_one
 from ..model.interfaces import Measurement, Movement, Truth
-from ..model.touch import Approach, approach
+from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
 from .active_set import taking_part
 from .state import Gathered, Part, State, at_rest
 from .system import System
 
-__all__ = ["advance", "approaches", "begin", "periods", "step"]
+__all__ = ["advance", "begin", "periods", "step", "trace_fingers"]
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def begin(system: System) -> State:
     return at_rest(system.rows, system.grid.count, system.cell.actuator.rest_height, memory)
 
 
-def approaches(system: System, poses: Floats) -> list[Approach | None]:
+def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:
     """Work out the fingers' ways through some control periods; None where nothing touches.
 
     Parameters
@@ -44,7 +44,7 @@ def approaches(system: System, poses: Floats) -> list[Approach | None]:
     """
     if system.cell.touch is None:
         return [None] * len(poses)
-    return list(approach(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3)))))
+    return list(trace_finger(system.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3)))))
 
 
 def step(system: System, state: State, poses: Floats) -> State:
@@ -63,10 +63,10 @@ def step(system: System, state: State, poses: Floats) -> State:
     DivergenceError
         When a height, force or opening is no longer finite.
     """
-    return advance(system, state.copy(), approaches(system, poses[None])[0])
+    return advance(system, state.copy(), trace_fingers(system, poses[None])[0])
 
 
-def advance(system: System, state: State, finger: Approach | None) -> State:
+def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
     """Simulate one control period in the arrays of `state`, which is used up.
 
     Parameters
@@ -74,8 +74,8 @@ def advance(system: System, state: State, finger: Approach | None) -> State:
     system : System
     state : State
         Not to be used again; keep a `State.copy` to come back to it.
-    finger : Approach or None
-        From `approaches`.
+    finger : FingerPeriod or None
+        From `trace_fingers`.
     """
     memory, control = _locate(system, state)
     state = taking_part(system, state, finger, control)
@@ -143,7 +143,7 @@ def _measured(system: System, true: Measurement, part: Part, period: int) -> Mea
     return true._replace(force=force, height=height)
 
 
-def _underside(system: System, finger: Approach | None, held: Gathered) -> Floats:
+def _underside(system: System, finger: FingerPeriod | None, held: Gathered) -> Floats:
     """Return the finger's underside over the near cells at the period's instants, shape (p, k), m."""
     if finger is None or not held.near:
         return np.empty((system.instants.size, 0))
@@ -213,7 +213,7 @@ def periods(system: System, trajectories: Sequence[Trajectory], state: State, co
         starts = (state.period + np.arange(chunk)) * system.period
         times = (starts[:, None] + system.instants).ravel()
         poses = sample_poses(trajectories, times).reshape(chunk, -1, len(trajectories), 7)
-        for finger in approaches(system, poses):
+        for finger in trace_fingers(system, poses):
             state = advance(system, state, finger)
             yield state
         done += chunk

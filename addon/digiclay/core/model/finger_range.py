@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .fingertip import Fingertip, forms, underside
 
-__all__ = ["MOST_FORCE", "MOST_INDENTATION", "beyond_words", "largest_indentation"]
+__all__ = ["MOST_FORCE", "MOST_INDENTATION", "describe_excess", "find_largest_indentation"]
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ MOST_INDENTATION = 3e-3
 ROWS = 64
 
 
-def largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> float:
+def find_largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> float:
     """Return how deep the deepest pin that is felt stands in the finger, over all rows, m.
 
     Parameters
@@ -50,7 +50,7 @@ def largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> 
     return found
 
 
-def beyond_words(force: float | None, indentation: float | None) -> str:
+def describe_excess(force: float | None, indentation: float | None) -> str:
     """Return the message on values beyond the contact law; empty without any.
 
     Parameters

@@ -14,7 +14,7 @@ from .fingertip import Fingertip, forms, reach, reaches, underside
 from .interfaces import Pulp
 from .layout import Disc
 
-__all__ = ["Approach", "Coming", "Touch", "Window", "approach", "force", "reached"]
+__all__ = ["FingerPath", "FingerPeriod", "Touch", "Window", "force", "reached", "trace_finger"]
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ Window = tuple[float, float, float, float, float, float]
 
 
 @dataclass(eq=False)
-class Coming:
+class FingerPath:
     """Fingertip path over t control periods, at p instants of each.
 
     Attributes
@@ -58,7 +58,7 @@ class Coming:
         self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
 
     def under(self, period: int, place: Floats) -> Floats:
-        """Return the underside in one of the periods, see `Approach.under`.
+        """Return the underside in one of the periods, see `FingerPeriod.under`.
 
         It is asked for period by period, mostly of the same places: several are worked out at a time.
         """
@@ -73,10 +73,10 @@ class Coming:
         return under
 
 
-class Approach(NamedTuple):
+class FingerPeriod(NamedTuple):
     """Fingertip path in one control period."""
 
-    coming: Coming
+    coming: FingerPath
     period: int
     window: Window
 
@@ -85,7 +85,7 @@ class Approach(NamedTuple):
         return self.coming.under(self.period, place)
 
 
-def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
+def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
     """Work out how the finger comes, for some control periods.
 
     Parameters
@@ -101,8 +101,8 @@ def approach(fingertip: Fingertip, poses: Floats) -> list[Approach]:
     shape = reaches(outline)
     farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
     windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    coming = Coming(*forms(outline), [tuple(window) for window in windows])
-    return [Approach(coming, period, window) for period, window in enumerate(coming.windows)]
+    coming = FingerPath(*forms(outline), [tuple(window) for window in windows])
+    return [FingerPeriod(coming, period, window) for period, window in enumerate(coming.windows)]
 
 
 def reached(window: Window, peak: float) -> Disc | None:

@@ -13,7 +13,7 @@ from ..base.quantity import Parameters, quantity
 from ..base.spline import inner_slopes
 from .fingertip import LEVEL
 
-__all__ = ["Path", "Trajectory", "Waypoint", "along", "between", "level", "sample_poses"]
+__all__ = ["Path", "Trajectory", "Waypoint", "interpolate_poses", "level", "sample_poses"]
 
 Floats = NDArray[np.float64]
 
@@ -162,31 +162,17 @@ def sample_poses(trajectories: Sequence[Trajectory], times: Floats) -> Floats:
     return np.stack([trajectory.poses(times) for trajectory in trajectories], axis=1)
 
 
-def between(start: Floats, end: Floats, parts: Floats) -> Floats:
-    """Return poses (k, f, 7) on the straight ways from some poses to others.
+def interpolate_poses(path: Floats, parts: Floats) -> Floats:
+    """Return poses (t, p, f, 7) on the straight lines from each row of a path to the next.
 
-    Parameters
-    ----------
-    start, end : ndarray (f, 7)
-        Poses of the fingers: position, m, and unit quaternion.
-    parts : ndarray (k,)
-        Where on the way, 0 to 1.
-    """
-    poses: Floats = along(np.array([start, end]), parts)[0]
-    return poses
-
-
-def along(path: Floats, parts: Floats) -> Floats:
-    """Return poses (t, p, f, 7) on the straight ways from each row of a path to the next.
-
-    Whether the ways are worked out one by one or together makes no difference to any bit.
+    Whether they are computed row by row or together makes no difference to any bit.
 
     Parameters
     ----------
     path : ndarray (t + 1, f, 7)
         Poses of the fingers: position, m, and unit quaternion.
     parts : ndarray (p,)
-        Where on each way, 0 to 1.
+        Where on each line, 0 to 1.
     """
     count, fingers = len(path) - 1, path.shape[1]
     start, end = (np.repeat(rows, parts.size, axis=0).reshape(-1, 7) for rows in (path[:-1], path[1:]))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError, SceneError
 from ..base.sample_file import found, named
-from ..base.toml_text import LARGEST, tables
+from ..base.toml_text import LARGEST, parse_tables
 from .schema import Scene
 from .toml_table import merge_one_finger, resolve
 
@@ -104,7 +104,7 @@ def read_table(path: Path) -> dict[str, Any]:
             raise SceneError(f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB).")
         # A byte order mark at the beginning is no part of the text.
         text = path.read_text(encoding="utf-8-sig")
-        return tables(text)
+        return parse_tables(text)
     except OSError as error:
         raise SceneError(f"{path} cannot be read: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:
@@ -144,7 +144,7 @@ def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str
 def _read_value(text: str) -> Any:
     """Read the value of a setting: TOML, or else a bare text."""
     try:
-        read = tables(f"value = {text}")
+        read = parse_tables(f"value = {text}")
     except (ValueError, RecursionError):
         return text.strip()
     return read["value"] if len(read) == 1 else text.strip()

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.part_table import cut, read_part, refuse_unknown, shown
+from ..base.part_table import read_part, refuse_unknown, shorten, show_value
 from ..base.quantity import Parameters, quantities
 from ..control.methods import METHODS
 from ..model.trajectory import Path, Waypoint
@@ -97,11 +97,11 @@ def _finger_tables(table: Table) -> list[tuple[str, Table]]:
         return [("", own)]
     given = table[FINGERS]
     if not isinstance(given, list) or not all(isinstance(finger, dict) for finger in given):
-        raise ParameterError(FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", shown(given))
+        raise ParameterError(FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", show_value(given))
     if own:
         section = next(iter(own))
         rule = f"must be left out where there is [[{FINGERS}]]: give it there"
-        raise ParameterError(section, "", rule, shown(own[section]))
+        raise ParameterError(section, "", rule, show_value(own[section]))
     owners = [f"{FINGERS} #{number}." for number in range(1, len(given) + 1)]
     for owner, finger in zip(owners, given, strict=True):
         refuse_unknown(owner.removesuffix("."), finger, FINGER_SECTIONS)
@@ -136,9 +136,9 @@ def _finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_
 def _text(key: str, value: Any) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
-        raise ParameterError(key, "", "must be a text", shown(value))
+        raise ParameterError(key, "", "must be a text", show_value(value))
     if not all(letter.isprintable() or (letter in "\n\t" and key == "description") for letter in value):
-        raise ParameterError(key, "", "must be printable", shown(value))
+        raise ParameterError(key, "", "must be printable", show_value(value))
     return value
 
 
@@ -149,14 +149,14 @@ def _section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None
     if isinstance(value, dict):
         return dict(value)
     rule = f"must be a section, [{section}]" + (f', or "{ABSENT}"' if section in OPTIONAL else "")
-    raise ParameterError(owner + section, "", rule, shown(value))
+    raise ParameterError(owner + section, "", rule, show_value(value))
 
 
 def _method(control: dict[str, Any] | None) -> str:
     """Take the method out of the control's section."""
     method = (control or {}).pop("method", "virtual_master")
     if not isinstance(method, str) or method not in METHODS:
-        raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", shown(method))
+        raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", show_value(method))
     return method
 
 
@@ -164,7 +164,7 @@ def _forms_one(method: str, own: dict[str, Any]) -> bool:
     """Return whether a method forms a blister; refuse a section [blister] where it does not."""
     if METHODS[method].blister is None and own:
         raise ParameterError(
-            "blister", "", f"must be left out: the method {method} forms no blister", shown(own)
+            "blister", "", f"must be left out: the method {method} forms no blister", show_value(own)
         )
     return METHODS[method].blister is not None
 
@@ -172,7 +172,7 @@ def _forms_one(method: str, own: dict[str, Any]) -> bool:
 def _path(owner: str, table: Any, rest_height: float) -> Path:
     """Read the section of the finger's path."""
     if not isinstance(table, dict):
-        raise ParameterError(owner, "", "must be a section, [trajectory]", shown(table))
+        raise ParameterError(owner, "", "must be a section, [trajectory]", show_value(table))
     refuse_unknown(owner, table, ("interpolation", "waypoints"))
     kind = table.get("interpolation", "smooth")
     if "waypoints" not in table:
@@ -181,12 +181,12 @@ def _path(owner: str, table: Any, rest_height: float) -> Path:
         rows = table["waypoints"]
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
-            raise ParameterError(owner, "waypoints", rule, shown(rows))
+            raise ParameterError(owner, "waypoints", rule, show_value(rows))
         path = Path(kind, tuple(_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1)))
     try:
         path.trajectory()
     except ParameterError as error:
-        raise ParameterError(owner, error.field, error.rule, cut(error.value)) from None
+        raise ParameterError(owner, error.field, error.rule, shorten(error.value)) from None
     return path
 
 

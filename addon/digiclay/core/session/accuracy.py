@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ..base.errors import DigiclayError
 from ..control.replay import Replay
-from ..engine.simulation import advance, approaches, begin, periods
+from ..engine.simulation import advance, begin, periods, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
-from ..model.trajectory import along
+from ..model.trajectory import interpolate_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
 
@@ -199,13 +199,13 @@ def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMoni
     after : State
         The session's, at the end of the period.
     path : ndarray (2, f, 7)
-        The finger at both ends of the period; see `live_periods.lived`.
+        The finger at both ends of the period; see `live_periods.simulate_path`.
     """
     if monitor.state is None:
         return begin_stretch(replace(monitor, left=monitor.left - 1), after), None
     rows = monitor.system.rows
     system = _replay(monitor.system, after.row(rows.command)[None])
-    finger = approaches(system, along(path, system.instants / system.period))[0]
+    finger = trace_fingers(system, interpolate_poses(path, system.instants / system.period))[0]
     try:
         # A period's commands are row 0 of what is played: its own memory does not count on.
         state = advance(system, monitor.state._replace(memory=0), finger)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..base.npz import BROKEN_ZIP, Head, array, heads
+from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
 from ..base.run_folder import MARK
 from ..base.whole_files import read_json
 from ..scene.recorder import Recorder, available_memory
@@ -60,9 +60,9 @@ def read_run(folder: Path, *names: str) -> Run:
     scene = load(folder / "scene.toml")
     try:
         with zipfile.ZipFile(path) as archive:
-            held = heads(archive, ("time", *names))
+            held = read_heads(archive, ("time", *names))
             _refuse(path, scene, held)
-            return Run(scene, {name: array(archive, name) for name in held})
+            return Run(scene, {name: read_array(archive, name) for name in held})
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
 

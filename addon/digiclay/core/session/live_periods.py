@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine.simulation import advance, approaches
+from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
-from ..model.trajectory import along, between
+from ..model.trajectory import interpolate_poses
 
-__all__ = ["Clock", "due", "lived", "reachable", "spent", "way"]
+__all__ = ["Clock", "clamp_pose", "interpolate_path", "periods_due", "simulate_path", "update_cost"]
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class Clock:
         return replace(self, seen=None, left=0.0, ticks=())
 
 
-def due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
+def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int, Clock]:
     """Return how many control periods to simulate now, and the clock after them.
 
     What is more than `most`, or more than this machine can do between two ticks, is dropped and
@@ -100,7 +100,7 @@ def _affordable(clock: Clock, gone: float) -> int:
     return max(1, int(SHARE * max(gone, SHORTEST) / clock.cost))
 
 
-def spent(clock: Clock, count: int, took: float) -> Clock:
+def update_cost(clock: Clock, count: int, took: float) -> Clock:
     """Return the clock after `count` periods of a measured duration, s."""
     if count < 1 or took <= 0.0:
         return clock
@@ -108,7 +108,7 @@ def spent(clock: Clock, count: int, took: float) -> Clock:
     return replace(clock, cost=each if clock.cost <= 0.0 else 0.8 * clock.cost + 0.2 * each)
 
 
-def way(start: Floats, end: Floats, count: int) -> Floats:
+def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
     """Return where the fingers are between periods, shape (count + 1, f, 7), on their ways from pose to pose.
 
     Parameters
@@ -118,12 +118,12 @@ def way(start: Floats, end: Floats, count: int) -> Floats:
     count : int
         Control periods in between, at least 1.
     """
-    path = between(start, end, np.arange(count + 1) / count)
+    path: Floats = interpolate_poses(np.array([start, end]), np.arange(count + 1) / count)[0]
     path[0] = start
     return path
 
 
-def reachable(pose: Floats, stroke: float) -> Floats:
+def clamp_pose(pose: Floats, stroke: float) -> Floats:
     """Return the pose, raised to where a finger can be: its lowest point no deeper than the bed's floor.
 
     Pins bottom out there. A finger an artist drags below it would press with more newtons than
@@ -142,7 +142,7 @@ def reachable(pose: Floats, stroke: float) -> Floats:
     return inside
 
 
-def lived(system: System, state: State, path: Floats) -> Iterator[State]:
+def simulate_path(system: System, state: State, path: Floats) -> Iterator[State]:
     """Simulate the periods of the fingers' paths; the arrays of `state` are used up.
 
     A recorded path gives the same states bit for bit, however many periods are done at a time.
@@ -152,13 +152,13 @@ def lived(system: System, state: State, path: Floats) -> Iterator[State]:
     system : System
     state : State
     path : ndarray (t + 1, f, 7)
-        Where the fingers are between the periods, from `way`.
+        Where the fingers are between the periods, from `interpolate_path`.
 
     Yields
     ------
     State
         After each period; valid until the next one is asked for.
     """
-    for finger in approaches(system, along(path, system.instants / system.period)):
+    for finger in trace_fingers(system, interpolate_poses(path, system.instants / system.period)):
         state = advance(system, state, finger)
         yield state

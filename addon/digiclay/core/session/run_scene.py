@@ -18,7 +18,7 @@ from ..engine.simulation import begin, periods
 from ..engine.state import State
 from ..engine.system import System
 from ..metrics.summary import METRICS, compute_metrics
-from ..model.finger_range import beyond_words, largest_indentation
+from ..model.finger_range import describe_excess, find_largest_indentation
 from ..model.fingertip import require_one
 from ..scene.assembly import assemble
 from ..scene.recorder import Recording, available_memory, refuse_what_cannot_fit, write
@@ -228,9 +228,9 @@ def _metrics(
         known |= judged
         units |= {name: METRICS[name][0] for name in judged}
         if system.cell.touch is not None:
-            known["max_indentation"] = largest_indentation(system.cell.touch.fingertip, history)
+            known["max_indentation"] = find_largest_indentation(system.cell.touch.fingertip, history)
             units["max_indentation"] = "m"
-            known["beyond_a_finger"] = beyond_words(judged["max_total_force"], known["max_indentation"])
+            known["beyond_a_finger"] = describe_excess(judged["max_total_force"], known["max_indentation"])
     return {**known, "units": units}
 
 

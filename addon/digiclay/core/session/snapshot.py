@@ -22,9 +22,9 @@ from ..engine.state import Gathered, Rows, State
 from ..engine.system import System
 from ..model.fingertip import require_one
 from ..model.layout import Disc
-from .snapshot_memory import rebuilt, written
+from .snapshot_memory import flatten, rebuild
 
-__all__ = ["carried", "packed", "unpacked"]
+__all__ = ["dump", "load", "transfer_heights"]
 
 #: What kept bytes start with; the number changes when their arrangement does. Of the first one, the finger's
 #: entry stood by itself.
@@ -48,11 +48,11 @@ class Kept:
     memory: list[NDArray[Any]]
 
 
-def packed(system: System, state: State) -> bytes:
+def dump(system: System, state: State) -> bytes:
     """Write a state as bytes that do not change when the session goes on."""
     held, rows = state.gathered, system.rows
     arrays: list[NDArray[Any]] = []
-    memory = written(state.memory, arrays)
+    memory = flatten(state.memory, arrays)
     header = {
         "cells": system.grid.count,
         "rows": [rows.physics, rows.queue, rows.control, rows.sensors],
@@ -87,7 +87,7 @@ def packed(system: System, state: State) -> bytes:
     return b"".join([START, len(text).to_bytes(4, "little"), text, *parts])
 
 
-def unpacked(system: System, data: bytes) -> State:
+def load(system: System, data: bytes) -> State:
     """Read a state back; a session that goes on from it does so bit for bit.
 
     Raises
@@ -119,7 +119,7 @@ def unpacked(system: System, data: bytes) -> State:
         gathered["peak"],
         gathered["until"],
     )
-    memory = rebuilt(template, header["memory"], kept.memory)
+    memory = rebuild(template, header["memory"], kept.memory)
     return State(
         header["period"],
         kept.arrays["rows"],
@@ -131,7 +131,7 @@ def unpacked(system: System, data: bytes) -> State:
     )
 
 
-def carried(system: System, data: bytes) -> State:
+def transfer_heights(system: System, data: bytes) -> State:
     """Return a session's beginning with the heights of a kept state: what is left when parts have changed.
 
     Every pin stands still at the height it had, as far as the stroke allows; pulp, valves and

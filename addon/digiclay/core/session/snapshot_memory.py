@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ..base.errors import StateError
 
-__all__ = ["rebuilt", "written"]
+__all__ = ["flatten", "rebuild"]
 
 #: No number a controller remembers is larger, but those that may be infinite.
 LARGEST = 1e75
 
 
-def written(memory: Any, arrays: list[NDArray[Any]]) -> Any:
+def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return a memory as JSON holds it; its arrays are put behind those in `arrays`.
 
     A named tuple becomes a list that starts with its name, an array its place among the arrays.
@@ -26,22 +26,22 @@ def written(memory: Any, arrays: list[NDArray[Any]]) -> Any:
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
         return {"array": len(arrays) - 1}
     if isinstance(memory, tuple):
-        return [type(memory).__name__, *(written(item, arrays) for item in memory)]
+        return [type(memory).__name__, *(flatten(item, arrays) for item in memory)]
     if isinstance(memory, Enum):
         return memory.value
     # Numbers of numpy become Python's own, which JSON writes so that they read back as the same ones.
     return memory.item() if isinstance(memory, np.generic) else memory
 
 
-def rebuilt(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return the memory that was `written`, in the types of a memory of the same controller.
+def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
+    """Return the memory that was `flatten`, in the types of a memory of the same controller.
 
     Parameters
     ----------
     template : object
         What the controller begins with.
     kept : object
-        From `written`.
+        From `flatten`.
     arrays : list of ndarray
         Those that were put in, read back.
 

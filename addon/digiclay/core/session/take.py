@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError, ParameterError
-from ..base.npz import BROKEN_ZIP, array, heads
-from ..base.toml_text import tables
+from ..base.npz import BROKEN_ZIP, read_array, read_heads
+from ..base.toml_text import parse_tables
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -25,10 +25,10 @@ from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..scene.toml_table import resolve, text
-from .live_periods import lived
-from .snapshot import packed, unpacked
+from . import snapshot
+from .live_periods import simulate_path
 
-__all__ = ["Take", "as_scene", "finer", "from_bytes", "states", "to_bytes"]
+__all__ = ["Take", "from_bytes", "make_scene", "refine", "replay", "to_bytes"]
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class Take:
     scene : Scene
         Its trajectory is not used: the finger follows `poses`.
     start, end : bytes
-        The states before and after, from `snapshot.packed`.
+        The states before and after, from `snapshot.dump`.
     poses : ndarray (t + 1, f, 7)
         Fingers at the start, and at the end of each of t control periods: lowest point, m,
         and unit quaternion.
@@ -88,14 +88,14 @@ class Take:
         return self.periods * self.scene.simulation.control_period
 
 
-def states(take: Take, scene: Scene | None = None) -> Iterator[State]:
+def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
     """Simulate a take once more.
 
     Parameters
     ----------
     take : Take
     scene : Scene, optional
-        Another way to integrate it, such as `finer`; the take's own when left out.
+        Another way to integrate it, such as `refine`; the take's own when left out.
 
     Yields
     ------
@@ -103,10 +103,10 @@ def states(take: Take, scene: Scene | None = None) -> Iterator[State]:
         After each period; valid until the next one is asked for.
     """
     system = assemble(scene or take.scene)
-    yield from lived(system, unpacked(system, take.start), take.poses)
+    yield from simulate_path(system, snapshot.load(system, take.start), take.poses)
 
 
-def finer(scene: Scene, parts: int) -> Scene:
+def refine(scene: Scene, parts: int) -> Scene:
     """Return a scene whose physics steps are cut into `parts`; control is sampled as before.
 
     Raises
@@ -119,7 +119,7 @@ def finer(scene: Scene, parts: int) -> Scene:
     return replace(scene, simulation=scene.simulation.refined(parts))
 
 
-def as_scene(take: Take, name: str) -> Scene:
+def make_scene(take: Take, name: str) -> Scene:
     """Return a take as a scene that `digiclay run` simulates.
 
     Raises
@@ -153,11 +153,11 @@ def _path(times: Floats, poses: Floats) -> Path:
 
 def _rests(system: System, start: bytes) -> bool:
     """Return whether a state is that of a bed nothing has happened to, however long it has waited."""
-    state, rest = unpacked(system, start), begin(system)
+    state, rest = snapshot.load(system, start), begin(system)
     return (
         all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))
         and np.array_equal(state.mode(), rest.mode())
-        and packed(system, rest._replace(memory=state.memory)) == packed(system, rest)
+        and snapshot.dump(system, rest._replace(memory=state.memory)) == snapshot.dump(system, rest)
     )
 
 
@@ -194,16 +194,16 @@ def from_bytes(data: bytes) -> Take:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = (*PARTS, "version")[: 5 if "version.npy" in archive.namelist() else 4]
-            held = heads(archive, names)
+            held = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to no more than it is.
             size = sum(head.size for head in held.values())
             if size > len(data):
                 raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
-            scene, start, poses, end, *version = (array(archive, name) for name in names)
+            scene, start, poses, end, *version = (read_array(archive, name) for name in names)
         if not version:
             poses = poses[:, None]  # the first version held one finger
         elif int(version[0]) != VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {version[0]})")
-        return Take(resolve(tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
+        return Take(resolve(parse_tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
     except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

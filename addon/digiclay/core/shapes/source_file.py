@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..base.errors import ParameterError, SceneError
-from ..base.npz import mapped
+from ..base.npz import map_array
 from ..base.sample_file import found, named
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_reader import MESHES
@@ -97,7 +97,7 @@ def import_reader(path: Path) -> None:
 def _array(path: Path) -> HeightMap:
     """Read an array of heights, m; its first row lies at the lowest y."""
     try:
-        values = mapped(path)
+        values = map_array(path)
     except OSError as error:
         said = error.strerror or "not an array"
         raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None

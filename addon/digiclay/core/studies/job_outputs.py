@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.part_table import read_part, refuse_unknown, shown
+from ..base.part_table import read_part, refuse_unknown, show_value
 from ..base.quantity import Parameters, quantities
 from ..mesh_io.export_model import Model
 from ..session.render_settings import Film, Still, Turntable
@@ -77,19 +77,19 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])
     if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
-        raise ParameterError("export", "", 'must be a list of formats such as ["stl"]', shown(export))
+        raise ParameterError("export", "", 'must be a list of formats such as ["stl"]', show_value(export))
     if len(set(export)) < len(export):
-        raise ParameterError("export", "", "must not name a format twice", shown(export))
+        raise ParameterError("export", "", "must not name a format twice", show_value(export))
     errors = table.get("errors", True)
     if not isinstance(errors, bool):
-        raise ParameterError("errors", "", "must be true or false", shown(errors))
+        raise ParameterError("errors", "", "must be true or false", show_value(errors))
     parts: dict[str, Any] = {}
     for section, kind in SECTIONS.items():
         if section not in table:
             continue
         own = table[section]
         if not isinstance(own, dict):
-            raise ParameterError(section, "", f"must be a section, [{section}]", shown(own))
+            raise ParameterError(section, "", f"must be a section, [{section}]", show_value(own))
         parts[section] = read_part(section, kind, {}, own)
     return Outputs(tuple(export), errors, **parts)
 

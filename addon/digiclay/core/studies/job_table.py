@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import ParameterError, SceneError, one_line
-from ..base.part_table import refuse_unknown, shown
+from ..base.part_table import refuse_unknown, show_value
 from ..base.safe_names import find_name, make_unique_names
 from ..base.sample_file import found, named
 from ..control.methods import METHODS
@@ -119,7 +119,7 @@ def _scenes(table: Mapping[str, Any]) -> list[str]:
     """Return the scenes of the file."""
     words = table.get("scenes")
     if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
-        value = "none" if words is None else shown(words)
+        value = "none" if words is None else show_value(words)
         raise ParameterError("scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value)
     return words
 
@@ -130,10 +130,10 @@ def _methods(table: Mapping[str, Any]) -> list[str]:
         return [""]
     methods = table["methods"]
     if not isinstance(methods, list) or not methods:
-        raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', shown(methods))
+        raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', show_value(methods))
     for method in methods:
         if not isinstance(method, str) or method not in METHODS:
-            raise ParameterError("methods", "", f"must be some of {', '.join(METHODS)}", shown(method))
+            raise ParameterError("methods", "", f"must be some of {', '.join(METHODS)}", show_value(method))
     return methods
 
 
@@ -144,12 +144,12 @@ def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
     given = table["settings"]
     if not isinstance(given, dict) or not given:
         rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
-        raise ParameterError("settings", "", rule, shown(given))
+        raise ParameterError("settings", "", rule, show_value(given))
     found = {}
     for label, changes in given.items():
         if not isinstance(changes, dict):
             rule = "must be a table such as { control.force_gain = 2 }"
-            raise ParameterError("settings", label, rule, shown(changes))
+            raise ParameterError("settings", label, rule, show_value(changes))
         if not re.fullmatch(r"\w[\w.+-]*", label):
             raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
         option = f"settings.{label}"

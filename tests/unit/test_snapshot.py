@@ -14,7 +14,8 @@ from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.snapshot import START, carried, packed, unpacked
+from digiclay.core.session import snapshot
+from digiclay.core.session.snapshot import START
 
 from tests.assemble import path
 
@@ -50,8 +51,8 @@ def packed_parts(state: State) -> list[Any]:
 def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str) -> None:
     system = system_of(method)
     half = run(system, begin(system), 70)
-    data = packed(system, half)
-    taken_up = unpacked(system, data)
+    data = snapshot.dump(system, half)
+    taken_up = snapshot.load(system, data)
     assert same(taken_up, half)
     assert same(run(system, taken_up, 90), run(system, half, 90))
 
@@ -59,14 +60,14 @@ def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str) -> None:
 def test_sensors_that_remember_are_kept_as_well() -> None:
     system = system_of(sensors={"delay": 3, "observer": "valve", "height_noise": "1 um"})
     half = run(system, begin(system), 70)
-    taken_up = unpacked(system, packed(system, half))
+    taken_up = snapshot.load(system, snapshot.dump(system, half))
     assert same(run(system, taken_up, 50), run(system, half, 50))
 
 
 def test_kept_bytes_do_not_change_when_the_session_goes_on() -> None:
     system = system_of()
     state = run(system, begin(system), 70)
-    data = packed(system, state)
+    data = snapshot.dump(system, state)
     before = bytes(data)
     run(system, state, 10)
     assert data == before
@@ -74,21 +75,21 @@ def test_kept_bytes_do_not_change_when_the_session_goes_on() -> None:
 
 def test_a_state_taken_up_may_be_used_up() -> None:
     system = system_of()
-    data = packed(system, run(system, begin(system), 70))
-    first = run(system, unpacked(system, data), 20)
-    assert same(run(system, unpacked(system, data), 20), first)
+    data = snapshot.dump(system, run(system, begin(system), 70))
+    first = run(system, snapshot.load(system, data), 20)
+    assert same(run(system, snapshot.load(system, data), 20), first)
 
 
 def test_the_bytes_of_a_default_bed_are_few() -> None:
     system = assemble(resolve({}))
     # 10 rows of float64, the time of ageing and a mode for each of 625 cells, and a header.
-    assert len(packed(system, begin(system))) < 625 * (8 * system.rows.count + 9) + 1000
+    assert len(snapshot.dump(system, begin(system))) < 625 * (8 * system.rows.count + 9) + 1000
 
 
 def kept() -> tuple[System, bytes]:
     """Return a small bed and its state in the middle of a press."""
     system = system_of()
-    return system, packed(system, run(system, begin(system), 70))
+    return system, snapshot.dump(system, run(system, begin(system), 70))
 
 
 @pytest.mark.parametrize(
@@ -104,7 +105,7 @@ def kept() -> tuple[System, bytes]:
 def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) -> None:
     _, data = kept()
     with pytest.raises(StateError, match=said):
-        unpacked(assemble(resolve({"layout": SIZES, **tables})), data)
+        snapshot.load(assemble(resolve({"layout": SIZES, **tables})), data)
 
 
 @pytest.mark.parametrize(
@@ -112,14 +113,14 @@ def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) ->
 )
 def test_bytes_that_are_no_state_are_refused(data: Any) -> None:
     with pytest.raises(StateError, match="Reset the session"):
-        unpacked(system_of(), data)
+        snapshot.load(system_of(), data)
 
 
 @pytest.mark.parametrize("cut", [1, 8, 1000, -1])
 def test_a_state_that_was_cut_short_or_added_to_is_refused(cut: int) -> None:
     system, data = kept()
     with pytest.raises(StateError):
-        unpacked(system, data[:-cut] if cut > 0 else data + b"\0")
+        snapshot.load(system, data[:-cut] if cut > 0 else data + b"\0")
 
 
 def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
@@ -158,7 +159,7 @@ def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
 def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
     system, data = kept()
     with pytest.raises(StateError):
-        unpacked(system, header_replaced(data, old, new))
+        snapshot.load(system, header_replaced(data, old, new))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -167,7 +168,7 @@ def test_numbers_that_are_not_finite_are_refused(value: float) -> None:
     state = begin(system)
     state.rows[0, 3] = value
     with pytest.raises(StateError, match="no state has"):
-        unpacked(system, packed(system, state))
+        snapshot.load(system, snapshot.dump(system, state))
 
 
 def test_a_mode_that_does_not_exist_is_refused() -> None:
@@ -175,7 +176,7 @@ def test_a_mode_that_does_not_exist_is_refused() -> None:
     state = begin(system)
     state.modes[5] = len(Mode)
     with pytest.raises(StateError, match="no state has"):
-        unpacked(system, packed(system, state))
+        snapshot.load(system, snapshot.dump(system, state))
 
 
 def test_a_cell_that_is_gathered_twice_is_refused() -> None:
@@ -184,7 +185,7 @@ def test_a_cell_that_is_gathered_twice_is_refused() -> None:
     cells = state.gathered.cells
     cells[1] = cells[0]
     with pytest.raises(StateError, match="no state has"):
-        unpacked(system, packed(system, state))
+        snapshot.load(system, snapshot.dump(system, state))
 
 
 @pytest.mark.parametrize(
@@ -206,7 +207,7 @@ def test_numbers_no_device_can_have_are_refused(row: str, value: float, gathered
     index = {"height": 0, "opening": lag, "command": rows.command, "force": rows.force}[row]
     (state.gathered.block if gathered else state.rows)[index, 1] = value
     with pytest.raises(StateError, match="no state has"):
-        unpacked(system, packed(system, state))
+        snapshot.load(system, snapshot.dump(system, state))
 
 
 def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
@@ -214,7 +215,7 @@ def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
     state = run(system, begin(system), 70)
     state.rows[0, :2] = 0.0, system.cell.actuator.stroke
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
-    assert same(unpacked(system, packed(system, state)), state)
+    assert same(snapshot.load(system, snapshot.dump(system, state)), state)
 
 
 @pytest.mark.parametrize(
@@ -227,9 +228,9 @@ def test_pins_at_their_ends_and_valves_fully_open_are_taken_up() -> None:
 )
 def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None:
     system, data = kept()
-    before = unpacked(system, data).row(0)
+    before = snapshot.load(system, data).row(0)
     other = assemble(resolve({"layout": SIZES, **tables}))
-    state = carried(other, data)
+    state = snapshot.transfer_heights(other, data)
     assert np.array_equal(state.row(0), before)
     # Nothing calls the pins back: without a finger they stay where they are.
     *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
@@ -239,13 +240,13 @@ def test_heights_are_carried_over_to_other_parts(tables: dict[str, Any]) -> None
 def test_carried_heights_stay_within_the_stroke() -> None:
     _, data = kept()
     low = assemble(resolve({"layout": SIZES, "actuator": {"stroke": "38 mm", "rest_height": "20 mm"}}))
-    assert carried(low, data).row(0).max() == 38e-3
+    assert snapshot.transfer_heights(low, data).row(0).max() == 38e-3
 
 
 def test_heights_are_not_carried_over_to_another_number_of_cells() -> None:
     _, data = kept()
     with pytest.raises(StateError, match="number of cells"):
-        carried(assemble(resolve({})), data)
+        snapshot.transfer_heights(assemble(resolve({})), data)
 
 
 def test_every_field_of_a_state_is_kept() -> None:

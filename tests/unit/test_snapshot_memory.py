@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from digiclay.core.base.errors import StateError
-from digiclay.core.session.snapshot_memory import rebuilt, written
+from digiclay.core.session.snapshot_memory import flatten, rebuild
 from numpy.typing import NDArray
 
 
@@ -39,8 +39,8 @@ class Outer(NamedTuple):
 def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
     memory = Outer(Colour.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
     arrays: list[NDArray[Any]] = []
-    text = written(memory, arrays)
-    back = rebuilt(Outer(Colour.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
+    text = flatten(memory, arrays)
+    back = rebuild(Outer(Colour.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
     assert back.table.tolist() == [[0.1, 2.0]]
     assert [*back[:2], back.count] == [Colour.BLUE, Inner(-math.inf, True), 7]
     assert [type(item) for item in (back.colour, back.inner.edge, back.inner.felt, back.count)] == [
@@ -56,13 +56,13 @@ def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
 )  # fmt: skip
 def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
     with pytest.raises(StateError, match="memory of the controller must be a Inner"):
-        rebuilt(Inner(), kept_memory, [])
+        rebuild(Inner(), kept_memory, [])
 
 
 @pytest.mark.parametrize("count", [-1, 2**53 + 1, 1e30, -math.inf, 10**400])
 def test_a_memory_with_a_count_that_is_none_is_refused(count: Any) -> None:
     arrays = [np.zeros((0, 2))]
     template = Outer(Colour.RED, Inner(), arrays[0])
-    assert rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
+    assert rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
     with pytest.raises(StateError, match="memory of the controller must be a Outer"):
-        rebuilt(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)
+        rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)
