@@ -94,10 +94,10 @@ class Scalar:
         self.area, self.m = cell.actuator.area, contact.exponent
         self.unit = contact.stiffness / contact.exponent
         self.share = contact.share
-        lost, lost_now = pulp.lost(step)
+        lost, lost_now = pulp.mean_loss_map(step)
         self.speeds, self.weights = pulp.rates[:, 0].tolist(), pulp.shares.tolist()
         self.lost = [*(lost[:-1] / self.unit / (1.0 - lost_now)), lost[-1] / (1.0 - lost_now)]
-        self.transition = pulp.transition(step).tolist()
+        self.transition = pulp.propagator(step).tolist()
         self.stiff = contact.share * contact.stiffness / self.area * (1.0 - lost_now)
 
     def underside(self, pose: tuple[float, float, float], x: float, y: float) -> float:

@@ -38,10 +38,8 @@ PARTS = {
 #: for its file's part; what functions of other files take (numpy's, small helpers) counts for who calls them.
 FILES = {
     "model/trajectory": "contact", "model/touch": "contact", "model/fingertip": "contact",
-    "control/": "control",
-    "steppers/": "integrate", "model/physics": "integrate", "model/valve": "integrate",
-    "model/lag": "integrate", "model/conduit": "integrate", "model/contact": "integrate",
-    "model/relaxation": "integrate",
+    "control/": "control", "model/sensors": "control",
+    "steppers/": "integrate", "model/": "integrate",
     "scene/recorder": "observe",
     "engine/": "the rest",
 }  # fmt: skip

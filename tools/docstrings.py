@@ -28,23 +28,20 @@ BLENDERS = dict.fromkeys(("invoke", "modal"), ("context", "event"))
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def public_functions(
-    tree: ast.Module | ast.ClassDef, prefix: str = ""
-) -> Iterator[tuple[str, Function, bool]]:
-    """Give each public function with its name, and whether it is a method of a Protocol.
+def public_functions(tree: ast.Module | ast.ClassDef, owner: str = "") -> Iterator[tuple[str, str, Function]]:
+    """Give each public function with its class, empty where there is none, and its name.
 
     Parameters
     ----------
     tree : ast.Module or ast.ClassDef
-    prefix : str
-        Of the names: the classes around, each with a dot.
+    owner : str
+        Its name where it is a class.
     """
-    protocol = any("Protocol" in ast.unparse(base) for base in getattr(tree, "bases", ()))
     for node in tree.body:
         if isinstance(node, Function) and not node.name.startswith("_"):
-            yield prefix + node.name, node, protocol
+            yield owner, node.name, node
         elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-            yield from public_functions(node, f"{prefix}{node.name}.")
+            yield from public_functions(node, node.name)
 
 
 def parameters(function: Function) -> tuple[str, ...]:
@@ -66,23 +63,26 @@ def documented(function: Function) -> set[str]:
 def lacking(root: Path = ROOT) -> set[tuple[str, str]]:
     """Return file and name of each function without the section.
 
-    A method that a Protocol declares is documented there: it needs no section of its own.
+    A method that a base class or a Protocol declares is documented there: it needs no section of its own.
     """
-    needed: dict[tuple[str, str], tuple[str, ...]] = {}
-    declared: set[tuple[str, tuple[str, ...]]] = set()
+    found: list[tuple[str, str, str, Function]] = []
+    bases: set[str] = set()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
-            for name, function, protocol in public_functions(ast.parse(path.read_text(encoding="utf-8"))):
-                own = parameters(function)
-                if len(own) > 1 and documented(function) != set(own):
-                    needed[path.relative_to(root).as_posix(), name] = own
-                elif protocol:
-                    declared.add((function.name, own))
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            found += [(path.relative_to(root).as_posix(), *one) for one in public_functions(tree)]
+            for node in ast.walk(tree):
+                if isinstance(node, ast.ClassDef):
+                    names = {ast.unparse(base).split("[")[0].split(".")[-1] for base in node.bases}
+                    bases |= names | ({node.name} if "Protocol" in names else set())
+    right = {one for one in found if documented(one[-1]) == set(parameters(one[-1]))}
+    declared = {(name, parameters(function)) for _, owner, name, function in right if owner in bases}
     return {
-        (file, name)
-        for (file, name), own in needed.items()
-        if not ("." in name and (name.split(".")[-1], own) in declared)
-        and BLENDERS.get(name.split(".")[-1]) != own
+        (file, f"{owner}.{name}" if owner else name)
+        for file, owner, name, function in set(found) - right
+        if len(own := parameters(function)) > 1
+        and not (owner and (name, own) in declared)
+        and BLENDERS.get(name) != own
     }
 
 

@@ -117,9 +117,9 @@ def test_a_length_typed_in_mm_is_that_length_exactly(typed: float, meant: float)
 def test_a_part_that_is_switched_off_is_left_out(section: str) -> None:
     bed = thing()
     setattr(bed.digiclay, f"use_{section}", False)
-    assert getattr(properties.scene_of(bed), section) is None
+    assert properties.scene_of(bed).section(section) is None
     setattr(bed.digiclay, f"use_{section}", True)
-    assert getattr(properties.scene_of(bed), section) is not None
+    assert properties.scene_of(bed).section(section) is not None
 
 
 @pytest.mark.parametrize("preset", PRESETS)

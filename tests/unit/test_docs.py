@@ -42,9 +42,6 @@ TIMING = re.compile(r"\d x real time|\d (?:s|ms|min|minutes) of (?:CPU|processor
 COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
 
 
-#: Pages that are being rewritten: their links and commands are checked, their language is not yet.
-DRAFTS = {"architecture.md"}
-READ = [page for page in PAGES if page.name not in DRAFTS]
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 
@@ -94,12 +91,12 @@ def _refused(program: str, arguments: str) -> bool:
     return False
 
 
-@pytest.mark.parametrize("page", READ, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_heading_is_a_noun_phrase(page: Path) -> None:
     assert [heading for heading in _headings(page) if "?" in heading or SENTENCE.search(heading)] == []
 
 
-@pytest.mark.parametrize("page", READ, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_no_page_personifies_a_thing(page: Path) -> None:
     assert [(n, m.group()) for n, line in _prose(page) for m in BANNED.finditer(line)] == []
 

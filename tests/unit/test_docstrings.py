@@ -50,12 +50,21 @@ def test_what_follows_the_section_is_no_part_of_it() -> None:
     assert documented(function) == {"angle", "speed"}
 
 
-def test_a_method_that_a_protocol_declares_is_documented_there(tmp_path: Path) -> None:
-    declared = f"class Turns(Protocol):\n  def turn(self, angle, speed):\n    {GOOD}\n"
-    own = "class Wheel:\n  def turn(self, angle, speed):\n    pass\n"
+@pytest.mark.parametrize("bases", [("Protocol", "Turns"), ("Protocol", ""), ("", "Turns")])
+def test_a_method_that_a_base_class_declares_is_documented_there(
+    bases: tuple[str, str], tmp_path: Path
+) -> None:
+    declared = f"class Turns({bases[0]}):\n  def turn(self, angle, speed):\n    {GOOD}\n"
+    own = f"class Wheel({bases[1]}):\n  def turn(self, angle, speed):\n    pass\n"
     assert lacking(checkout(tmp_path, own)) == {("benchmarks/wheel.py", "Wheel.turn")}
     (tmp_path / "benchmarks" / "wheel.py").write_text(declared + own, encoding="utf-8")
     assert lacking(tmp_path) == set()
+
+
+def test_a_class_that_is_no_base_declares_nothing(tmp_path: Path) -> None:
+    other = f"class Turns:\n  def turn(self, angle, speed):\n    {GOOD}\n"
+    own = "class Wheel:\n  def turn(self, angle, speed):\n    pass\n"
+    assert lacking(checkout(tmp_path, other + own)) == {("benchmarks/wheel.py", "Wheel.turn")}
 
 
 def test_the_list_follows_a_file_and_takes_no_new_function() -> None:

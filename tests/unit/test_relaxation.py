@@ -40,7 +40,7 @@ def convolved(depth: Callable[[float], float], speed: Callable[[float], float], 
 
 def filtered(own: np.ndarray, first: float, last: float, step: float) -> np.ndarray:
     """Return the filters after a step in which the tension goes linearly from `first` to `last`."""
-    return Relaxation().transition(step) @ np.array([*own, first, 0.5 * (first + last), last])
+    return Relaxation().propagator(step) @ np.array([*own, first, 0.5 * (first + last), last])
 
 
 def test_relaxation_begins_at_one() -> None:
@@ -123,7 +123,7 @@ def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step: float
         now = first + (last - first) * time / step
         return float(Relaxation().relaxed(filtered(own, first, now, time)))
 
-    weights, share = Relaxation().lost(step)
+    weights, share = Relaxation().mean_loss_map(step)
     foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
     # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
     assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
@@ -132,7 +132,7 @@ def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step: float
 def test_what_relaxes_quicker_than_the_step_is_a_share_of_the_tension() -> None:
     # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
     quick = Relaxation(times=(1e-9, 1e-9, 1e-9))
-    weights, share = quick.lost(5e-3)
+    weights, share = quick.mean_loss_map(5e-3)
     assert share == pytest.approx(float(quick.shares.sum()), rel=1e-6)
     assert np.all(np.abs(weights) < 1e-6)
 

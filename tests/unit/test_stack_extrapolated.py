@@ -1,40 +1,29 @@
-"""Richardson's form for a stack keeps to what a cell can be."""
+"""Richardson's extrapolation keeps to what a cell can be."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
-from digiclay.core.batch.alike import Extrapolated
 from digiclay.core.batch.broadcasting import Floats
 from digiclay.core.model.physics import speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
+from digiclay.core.steppers.richardson import extrapolate
 
 CELL = assemble(load(find("tap"))).cell
 
 
-@dataclass(frozen=True)
-class Set:
-    """A movement that sets all rows of all cells to one value."""
-
-    value: float
-
-    def advance(self, driven: Floats, under: Floats) -> None:
-        """Set them."""
-        driven[:] = self.value
-
-
 def extrapolated(coarse: float, fine: float, period: float = 10.0, under: float = 1.0) -> Floats:
-    """Return the rows of a cell in one run, a pin 40 mm high, that two movements set to these come to.
+    """Return the rows of a cell in one run, a pin 40 mm high, that whole and halved steps take to these.
 
     In a period as long as this a valve lets a pin go anywhere.
     """
-    driven = np.full((CELL.rows + 1, 1, 1), 40e-3)
-    unders, periods = np.full((3, 1, 1), under), np.array([period])
-    Extrapolated(CELL, Set(coarse), Set(fine), speeds(CELL), periods).advance(driven, unders)
-    return driven[:, 0, 0]
+    height, unders = np.full((1, 1), 40e-3), np.full((3, 1, 1), under)
+    reach = speeds(CELL).reach(height, unders, np.array([period]))
+    fines, coarses = (np.full((CELL.rows + 1, 1, 1), value) for value in (fine, coarse))
+    extrapolate(CELL, fines, coarses, reach)
+    rows: Floats = fines[:, 0, 0]
+    return rows
 
 
 def test_a_third_of_what_the_halves_changed_is_added() -> None:

@@ -29,7 +29,14 @@ class Help(argparse.RawDescriptionHelpFormatter):
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
-    """Add SCENE, or --scene where there is a default, and the options that change it."""
+    """Add SCENE, or --scene where there is a default, and the options that change it.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    default : str
+        The scene where none is given; empty: one must be given.
+    """
     said = "a .toml file, a sample's name, or the folder of a run"
     if default:
         parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{said}; default {default}")
@@ -73,7 +80,19 @@ def settings_of(arguments: argparse.Namespace) -> list[Setting]:
 
 
 def add_command(commands: Any, name: str, help: str, epilog: str, said: str = "") -> argparse.ArgumentParser:
-    """Add a command; its own help begins with `said`, or with `help` as a sentence."""
+    """Add a command; its own help begins with `said`, or with `help` as a sentence.
+
+    Parameters
+    ----------
+    commands : argparse's subparsers
+    name : str
+    help : str
+        In the list of commands.
+    epilog : str
+        Examples.
+    said : str
+        Beginning of the command's own help.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=help, description=said or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
         formatter_class=Help, allow_abbrev=False,
@@ -82,7 +101,17 @@ def add_command(commands: Any, name: str, help: str, epilog: str, said: str = ""
 
 
 def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.ArgumentParser:
-    """Add a command that works on a finished run."""
+    """Add a command that works on a finished run.
+
+    Parameters
+    ----------
+    commands : argparse's subparsers
+    name : str
+    help : str
+        In the list of commands.
+    epilog : str
+        Examples.
+    """
     parser = add_command(commands, name, help, epilog)
     parser.add_argument("run", metavar="RUN", type=Path, help="run folder of 'digiclay run'")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
@@ -91,7 +120,15 @@ def add_run(commands: Any, name: str, help: str, epilog: str) -> argparse.Argume
 
 @contextmanager
 def told_as_options(*owners: str, **names: str) -> Iterator[None]:
-    """Rename parameters of some owners to their options in an error, by equal name or `names`."""
+    """Rename parameters of some owners to their options in an error, by equal name or `names`.
+
+    Parameters
+    ----------
+    *owners : str
+        Classes of parameters.
+    **names : str
+        Option of a field where it has another name.
+    """
     try:
         yield
     except ParameterError as error:

@@ -17,7 +17,16 @@ __all__ = ["noted", "report", "within"]
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
-    """Leave out of a scene what a budget of height error, m, allows; print what that is."""
+    """Leave out of a scene what a budget of height error, m, allows; print what that is.
+
+    Parameters
+    ----------
+    scene : Scene
+    budget : float
+        m.
+    quiet : bool
+        Print nothing.
+    """
     with Line(sys.stderr) as line:
         told = None if quiet else lambda said: line.draw(f"trying: {said}")
         with told_as_options("run"):

@@ -67,7 +67,15 @@ def formats(text: str) -> list[str]:
 
 
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
-    """Return the names of the files of a kind of mesh in several formats."""
+    """Return the names of the files of a kind of mesh in several formats.
+
+    Parameters
+    ----------
+    kinds : iterable of str
+        File formats.
+    kind : str
+        Of the mesh.
+    """
     return [f"{STEMS[kind]}{suffix(one)}" for one in kinds]
 
 
@@ -79,7 +87,20 @@ def exported(
     folder: Path,
     model: Model | None = None,
 ) -> list[Path]:
-    """Write one row of a history in several formats, as the solid unless told otherwise; return the files."""
+    """Write one row of a history in several formats, as the solid unless told otherwise; return the files.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    row : int
+        Negative rows count from the last one.
+    kinds : iterable of str
+        File formats.
+    folder : Path
+    model : Model, optional
+        By default the solid.
+    """
     made = model or Model(cap=scene.actuator.bore / 2.0)
     parts = bodies(of_history(history, row), made, Finding())
     known = list(kinds)

@@ -61,7 +61,15 @@ class Card:
 
 
 def page(title: str, summary: str, cards: Sequence[Card]) -> str:
-    """Return the page of a batch."""
+    """Return the page of a batch.
+
+    Parameters
+    ----------
+    title : str
+    summary : str
+    cards : sequence of Card
+        One a job.
+    """
     return "\n".join(
         [
             "<!doctype html>",

@@ -149,14 +149,36 @@ def picture(
     height: int = 1000,
     engine: str = "cycles",
 ) -> Path:
-    """Draw one row of a history."""
+    """Draw one row of a history.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    row : int
+        Of the history.
+    out : Path
+    width, height : int
+        Pixels.
+    engine : str
+    """
     return draw_still(scene, history, Still(width=width, height=height, engine=engine), out, row)
 
 
 def draw_still(
     scene: Scene, history: Mapping[str, NDArray[Any]], looks: Still, out: Path, row: int | None = None
 ) -> Path:
-    """Draw an instant, or one row of a history; Blender is imported only now."""
+    """Draw an instant, or one row of a history; Blender is imported only now.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    looks : Still
+    out : Path
+    row : int, optional
+        Of the history; by default the instant of `looks`.
+    """
     from ..device.instant import Instant
     from ..pictures.still import render_still
 
@@ -174,7 +196,21 @@ def draw_turntable(
     stopped: Callable[[], bool] | None = None,
     row: int | None = None,
 ) -> Path | None:
-    """Draw an instant, or one row of a history, turning once; None when it was stopped."""
+    """Draw an instant, or one row of a history, turning once; None when it was stopped.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    looks : Turntable
+    out : Path
+    progress : callable, optional
+        Told of frames done, and of all.
+    stopped : callable, optional
+        Whether to stop; asked before each frame.
+    row : int, optional
+        Of the history; by default the instant of `looks`.
+    """
     from ..device.instant import Instant
     from ..pictures.film import turntable
 
@@ -190,7 +226,19 @@ def draw_film(
     progress: Callable[[int, int], None] | None = None,
     stopped: Callable[[], bool] | None = None,
 ) -> Path | None:
-    """Draw a session; None when it was stopped."""
+    """Draw a session; None when it was stopped.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    looks : Film
+    out : Path
+    progress : callable, optional
+        Told of frames done, and of all.
+    stopped : callable, optional
+        Whether to stop; asked before each frame.
+    """
     from ..pictures.film import film
 
     told = {"progress": progress, "stopped": stopped}

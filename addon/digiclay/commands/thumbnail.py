@@ -20,7 +20,14 @@ WIDTH = 320
 
 
 def of_picture(still: Path, folder: Path) -> Path:
-    """Make one of a picture that Blender has drawn."""
+    """Make one of a picture that Blender has drawn.
+
+    Parameters
+    ----------
+    still : Path
+    folder : Path
+        Of the thumbnail.
+    """
     from ..compat import bpy, scratch
 
     out = folder / NAMES[0]
@@ -37,7 +44,17 @@ def of_picture(still: Path, folder: Path) -> Path:
 
 
 def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Path) -> Path:
-    """Make one of heights (n,), seen from above."""
+    """Make one of heights (n,), seen from above.
+
+    Parameters
+    ----------
+    height : ndarray (n,)
+        m.
+    rows, columns : int
+        Of the bed.
+    folder : Path
+        Of the thumbnail.
+    """
     out = folder / NAMES[1]
     write_whole(out, png(height_map(height.reshape(rows, columns))))
     return out

@@ -141,8 +141,10 @@ def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[Non
     Parameters
     ----------
     path : Path
-    refusal, patience
-        As `hold_lock` has them.
+    refusal : str
+        What is said when another process holds it.
+    patience : float
+        How long to wait for it, s.
     """
     if _wait_for(lambda: _record(path), patience) is None:
         owner = _read_owner(path)

@@ -16,7 +16,16 @@ Part = TypeVar("Part", bound=Parameters)
 
 
 def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
-    """Refuse keys that mean nothing."""
+    """Refuse keys that mean nothing.
+
+    Parameters
+    ----------
+    section : str
+        What the message calls it.
+    table : mapping
+    names : sequence of str
+        Known keys.
+    """
     for key, value in table.items():
         if key in names:
             continue
@@ -28,7 +37,19 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 
 
 def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-    """Build a part from its section."""
+    """Build a part from its section.
+
+    Parameters
+    ----------
+    section : str
+        What messages call it.
+    kind : type
+        Class of the part.
+    defaults : mapping
+        Values that differ from the class's own.
+    own : mapping
+        What the section says.
+    """
     known = quantities(kind)
     refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
     given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}

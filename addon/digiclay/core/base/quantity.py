@@ -99,7 +99,15 @@ class Quantity:
 
 
 def quantity(default: Any, doc: str, **known: Any) -> Any:
-    """Declare a dataclass field together with its `Quantity`."""
+    """Declare a dataclass field together with its `Quantity`.
+
+    Parameters
+    ----------
+    default : object
+    doc : str
+    **known
+        The other fields of `Quantity`.
+    """
     return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **known)})
 
 
@@ -188,5 +196,13 @@ def parse(text: str, unit: str) -> float:
 
 
 def nearest(name: str, known: list[str], alike: float = 0.5) -> str:
-    """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common."""
+    """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common.
+
+    Parameters
+    ----------
+    name : str
+    known : list of str
+    alike : float
+        0 to 1.
+    """
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")

@@ -13,7 +13,14 @@ __all__ = ["found", "named"]
 
 
 def named(folder: Path, *kinds: str) -> dict[str, Path]:
-    """Return the samples of a folder by their names: its files that end with one of `kinds`."""
+    """Return the samples of a folder by their names: its files that end with one of `kinds`.
+
+    Parameters
+    ----------
+    folder : Path
+    *kinds : str
+        Endings of names, with the dot.
+    """
     return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
 
 

@@ -16,10 +16,10 @@ from ..engine.state import Rows
 from ..engine.system import System
 from ..model.interfaces import Measurement
 from . import beds
-from .alike import Movement, Touches
 from .beds import NO_DISC, Beds, Disc, Gathered
 from .broadcasting import Floats, numbers
 from .fingers import Fingers, undersides
+from .movement import BatchMovement
 from .padding import Gathering, taken_along, taking_part
 from .run_by_run import join_discs
 
@@ -35,21 +35,17 @@ class Stack:
     systems : tuple of System
         Those of the runs.
     rows : Rows
-    touch : Touches or None
-    pulp_rows : slice
-        The rows that the relaxation owns.
-    controller : object
-        From `stack.control`; None: every valve stays shut.
-    movement : Movement
+    controller : StackedController or None
+        None: every valve stays shut.
+    plan : object
+        Of the steppers; the first run's own where the cells of all runs are alike.
     gathering : Gathering
     """
 
     systems: tuple[System, ...]
     rows: Rows
-    touch: Touches | None
-    pulp_rows: slice
     controller: Any
-    movement: Movement
+    plan: Any
     gathering: Gathering
 
 
@@ -81,19 +77,21 @@ def advance(stack: Stack, state: Beds, coming: Fingers | None) -> Beds:
 
 def _move(stack: Stack, held: Gathered, coming: Fingers | None, period: int) -> None:
     """Move the gathered cells on by a control period, and work out the forces at its end."""
-    count, driven = held.near, held.block[stack.rows.driven]
+    count = held.near
     none = np.empty((stack.systems[0].instants.size, 0, held.cells.shape[1]))
     under = undersides(coming, period, held.place[:, :count]) if coming and count else none
-    # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
-    valves = driven[stack.systems[0].cell.lag_rows.start :, count:]
-    awake = np.einsum("rwb,rwb->w", valves, valves)
-    chosen = np.concatenate([np.arange(count), count + np.flatnonzero(awake)])
-    moved = driven.take(chosen, axis=1)
-    stack.movement.advance(moved, under)
-    driven[:, chosen] = moved
-    if stack.touch and count:
-        near = held.block[:, :count]
-        near[stack.rows.force] = stack.touch.force(near[0], under[-1], near[stack.pulp_rows])
+    held.block[stack.rows.force, :count] = _movement(stack, held)(under)
+
+
+def _movement(stack: Stack, held: Gathered) -> BatchMovement:
+    """Return what moves the gathered cells: prepared once for each set."""
+    known: BatchMovement | None = held.ready.get(stack.plan)
+    if known is None:
+        first, driven = stack.systems[0], held.block[stack.rows.driven]
+        alike, valve = stack.plan is first.plan, first.cell.lag_rows.start
+        known = BatchMovement(first.stepper, stack.plan, alike, driven, held.near, valve)
+        held.ready[stack.plan] = known
+    return known
 
 
 def follow(stack: Stack, state: Beds, coming: Fingers | None, leader: Beds) -> Beds:

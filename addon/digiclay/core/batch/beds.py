@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,11 @@ class Gathered:
         """Numbers of the cells among all cells of all beds, shape (w, b)."""
         runs = self.cells.shape[1]
         return self.cells * runs + np.arange(runs)
+
+    @cached_property
+    def ready(self) -> dict[Any, Any]:
+        """What moves just these cells, by the stepper's plan; made when first needed."""
+        return {}
 
 
 @dataclass(frozen=True, eq=False)

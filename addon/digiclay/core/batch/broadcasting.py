@@ -1,7 +1,8 @@
-"""Parts of a batch as one part, with one value a run; and linear maps likewise."""
+"""Parts of many runs as one part, whose numbers are arrays: one value a run."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
@@ -9,14 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "kind", "mapped", "numbers", "together"]
+__all__ = ["Floats", "kind", "numbers", "together"]
 
 Part = TypeVar("Part")
 Floats = NDArray[np.float64]
-
-#: Multiplications of a matrix product that the linear algebra library does on one core: waking another one
-#: takes longer than the product, and it stays awake for a while.
-PRODUCT = 2**17
 
 
 def kind(value: Any) -> Any:
@@ -35,19 +32,22 @@ def kind(value: Any) -> Any:
 
 
 def together(parts: Sequence[Part]) -> Part:
-    """Return a part that stands for those of all runs.
+    """Return a part that stands for those of all runs; the first one itself where all are alike.
 
     Parameters
     ----------
     parts : sequence of dataclass
-        Of one `kind`. A number that is the same in all of them stays a number, others become an
-        array (b,), and arrays get the runs as their last axis; parts within the parts likewise.
-        The rules of parameters are not checked again.
+        Of one `kind`. What is the same in all of them stays as it is; a number that is not becomes an
+        array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
+        parameters are not checked again.
     """
     first: Any = parts[0]
+    own = {field.name: _one([getattr(one, field.name) for one in parts]) for field in fields(first)}
+    if all(value is getattr(first, name) for name, value in own.items()):
+        return parts[0]
     part: Any = object.__new__(type(first))
-    for field in fields(first):
-        object.__setattr__(part, field.name, _one([getattr(one, field.name) for one in parts]))
+    for name, value in own.items():
+        object.__setattr__(part, name, value)
     stands_for_all: Part = part
     return stands_for_all
 
@@ -56,27 +56,16 @@ def _one(values: list[Any]) -> Any:
     """Return what stands for a value in all runs."""
     first = values[0]
     if isinstance(first, np.ndarray):
-        return first if all(np.array_equal(value, first) for value in values) else np.stack(values, axis=-1)
-    if all(value is first or value == first for value in values):
-        return first
-    return together(values) if is_dataclass(first) else numbers(values)
+        alike = all(value is first or np.array_equal(value, first) for value in values)
+        return first if alike else np.stack(values, axis=-1)
+    if is_dataclass(first):
+        return together(values)
+    if isinstance(first, tuple):
+        own = tuple(_one(list(several)) for several in zip(*values, strict=True))
+        return first if all(map(operator.is_, own, first)) else own
+    return first if all(value is first or value == first for value in values) else numbers(values)
 
 
 def numbers(values: Sequence[float]) -> Floats:
     """Return a number of each run, shape (b,)."""
     return np.array(values, dtype=np.float64)
-
-
-def mapped(maps: Floats, rows: Floats) -> Floats:
-    """Return rows (o, n, b) that a linear map, (o, i) or one a run (o, i, b), makes of rows (i, n, b)."""
-    made: Floats = np.empty((len(maps), *rows.shape[1:]))
-    if maps.ndim == 3:
-        # Row by row: over all of them at once numpy takes four times as long.
-        for row, out in zip(maps, made, strict=True):
-            np.einsum("ib,inb->nb", row, rows, out=out)
-        return made
-    flat, given = made.reshape(len(maps), -1), rows.reshape(len(rows), -1)
-    step = max(1, PRODUCT // max(1, maps.size))
-    for first in range(0, flat.shape[1], step):
-        np.matmul(maps, given[:, first : first + step], flat[:, first : first + step])
-    return made

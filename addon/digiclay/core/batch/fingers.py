@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import apply_map
 from ..engine.system import System
 from ..model.layout import Grid
 from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
-from .broadcasting import Floats, mapped
+from .broadcasting import Floats
 
 __all__ = ["Fingers", "Way", "fingers", "still_coming", "undersides", "way_over"]
 
@@ -105,7 +106,7 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     place : ndarray (6, k, b)
     """
     forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
-    rows = mapped(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
+    rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
     under: Floats = rows[: len(least)]
     np.maximum(under, least, out=under)
     np.sqrt(under, under)

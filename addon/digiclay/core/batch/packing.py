@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ..engine.system import System
-from ..model.physics import Cell, Speeds, speeds
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Stack
-from .alike import Alike, Extrapolated, Movement, cell_of_all, touches
-from .broadcasting import kind, numbers
+from .broadcasting import kind, numbers, together
 from .padding import Gathering
 from .run_by_run import join_controllers
 
@@ -85,44 +81,13 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
 
 def put_together(systems: Sequence[System]) -> Stack:
     """Put systems of one structure together."""
-    first, cell = systems[0], cell_of_all([system.cell for system in systems])
+    first, cell = systems[0], together([system.cell for system in systems])
     period = numbers([system.period for system in systems])
     rise = period * numbers([system.fastest for system in systems])
-    parts = [system.cell.touch for system in systems if system.cell.touch]
-    touch = touches(parts) if parts else None
     return Stack(
         tuple(systems),
         first.rows,
-        touch,
-        cell.pulp_rows,
         join_controllers([system.controller for system in systems]) if first.controller else None,
-        _movement(systems, cell),
-        Gathering(first.grid, first.rows, cell, touch, period, rise),
+        together([system.plan for system in systems]),
+        Gathering(first.grid, first.rows, cell, period, rise),
     )
-
-
-def _movement(systems: Sequence[System], cell: Cell) -> Movement:
-    """Return how the cells of all runs are moved."""
-    first = systems[0]
-    plans = tuple(zip(*(_plans(system) for system in systems), strict=True))
-    if not plans or (len(plans) == 1 and all(_as(first, system) for system in systems)):
-        return Alike(first.stepper, first.plan)
-    from .unlike import unlike
-
-    movements = [unlike(cell, of_all) for of_all in plans]
-    if len(movements) == 1:
-        return movements[0]
-    alone = [speeds(system.cell) for system in systems]
-    of_all_runs = Speeds(numbers([one.fall for one in alone]), numbers([one.rise for one in alone]))
-    coarse, fine = movements
-    return Extrapolated(cell, coarse, fine, of_all_runs, numbers([system.period for system in systems]))
-
-
-def _as(first: System, system: System) -> bool:
-    """Return whether a run's cells move as those of the first one; how its finger is made does not matter."""
-    own, other = system.cell, first.cell
-    if own.touch and other.touch:
-        own = replace(own, touch=replace(own.touch, fingertip=other.touch.fingertip))
-    alike = own == other and system.period == first.period
-    plans = zip(_plans(system), _plans(first), strict=True)
-    return alike and all(np.array_equal(one.response, another.response) for one, another in plans)

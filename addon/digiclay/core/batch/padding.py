@@ -14,7 +14,6 @@ from ..base.modes import Mode
 from ..engine.state import Rows
 from ..model.layout import Grid
 from ..model.physics import Cell
-from .alike import Touches
 from .beds import NO_DISC, Beds, Cells, Disc, Gathered
 from .broadcasting import Floats
 
@@ -36,7 +35,6 @@ class Gathering:
     grid : Grid
     rows : Rows
     cell : Cell
-    touch : Touches or None
     period : ndarray (b,)
         Control period, s.
     rise : ndarray (b,)
@@ -46,7 +44,6 @@ class Gathering:
     grid: Grid
     rows: Rows
     cell: Cell
-    touch: Touches | None
     period: Floats
     rise: Floats
 
@@ -111,9 +108,9 @@ def _taken(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
     near, taken = chosen.near, chosen.flat
     block = beds.rows.reshape(known.rows.count, -1).take(taken, axis=1)
     block[known.rows.force, near:] = 0.0
-    if near and known.touch:
+    if near and known.cell.touch:
         waited = beds.period * known.period - beds.aged.take(taken[:near])
-        known.touch.age(block[known.cell.pulp_rows, :near], waited)
+        known.cell.touch.pulp.age(block[known.cell.pulp_rows, :near], waited)
     return replace(chosen, block=block, mode=beds.modes.take(taken))
 
 

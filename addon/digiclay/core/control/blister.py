@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import constants
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from .runs import fill
 
 __all__ = ["Blister"]
 
@@ -49,11 +50,16 @@ class Blister(Parameters):
         if self.profile == "gaussian":
             bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
             return bell
-        rim, slope, most = fill((self.radius, 1.0 / (self.radius - self.flat_radius), 1.0), distance)
+        rim, slope, most = constants(self._cone, distance.shape)
         cone: Floats = rim - distance
         cone *= slope
         np.minimum(cone, most, out=cone)
         return cone
+
+    @cached_property
+    def _cone(self) -> tuple[Any, Any, float]:
+        """The cone's radius, m, its slope, 1/m, and its top."""
+        return self.radius, 1.0 / (self.radius - self.flat_radius), 1.0
 
     def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
         """Return heights ``edge + p(r) (top - edge)``, m.

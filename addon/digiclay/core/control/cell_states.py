@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.counting import some
+from ..base.arrays import any_true
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -152,7 +152,7 @@ class CellStatesControl:
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
         """Find where the finger presses, and how far its blister can reach; see `interfaces.Controller`."""
         pressed = touched.force > self._least(touched.mode)
-        if not some(pressed):
+        if not any_true(pressed):
             return memory, None
         force, place = touched.force[pressed], touched.place[:, pressed]
         total, x, y = np.dot(place[:3], force).tolist()
@@ -173,7 +173,7 @@ class CellStatesControl:
         under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
-        if some(under):
+        if any_true(under):
             memory, mode, target = self._around(memory, seen, mode, under, target)
             memory = memory._replace(felt=True)
         else:

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
-
-__all__ = ["BatchControl", "fill", "sum_weighted", "take_cells"]
+__all__ = ["BatchControl", "sum_weighted", "take_cells"]
 
 Floats = NDArray[np.float64]
 
@@ -54,19 +52,6 @@ class BatchControl:
         """Return the numbers that a rule finds in a memory; in a stack arrays (b,); see `decide`."""
         found = self.decide(rule, memory)
         return tuple(np.array(column) for column in zip(*found, strict=True)) if self.runs else found
-
-
-def fill(numbers: tuple[Any, ...], like: NDArray[Any], kind: type = np.float64) -> tuple[Any, ...]:
-    """Return numbers to be put against an array: for one run as arrays (m,), for a stack as they are.
-
-    Parameters
-    ----------
-    numbers : tuple of float or ndarray (b,)
-    like : ndarray (m,) or (m, b)
-    kind : type
-        Of the arrays.
-    """
-    return filled(numbers, like.size, kind) if like.ndim == 1 else numbers
 
 
 def take_cells(values: NDArray[Any], cells: NDArray[np.intp]) -> NDArray[Any]:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.counting import some
+from ..base.arrays import any_true, constants
 from ..base.quantity import quantity
 from .methods import ControlParameters
-from .runs import fill
 
 __all__ = ["Tracking", "declare_dead_band", "lock_overloaded"]
 
@@ -50,7 +49,7 @@ class Tracking(ControlParameters):
             Commanded and measured, m.
         """
         numbers = (self.position_gain, self.dead_band, 1.0, -1.0, 0.0)
-        gain, band, most, least, none = fill(numbers, target)
+        gain, band, most, least, none = constants(numbers, target.shape)
         error = target - height
         command: Floats = error * gain
         np.minimum(command, most, out=command)
@@ -73,9 +72,9 @@ def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:
     limit : float or ndarray (b,)
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
-    limit, shut = fill((limit, 0.0), force)
+    limit, shut = constants((limit, 0.0), force.shape)
     overload = force >= limit
-    if some(overload):
+    if any_true(overload):
         overload &= command > shut
         np.putmask(command, overload, shut)
     return command

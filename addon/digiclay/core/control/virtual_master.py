@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.counting import how_many, some
+from ..base.arrays import any_true, constants, count_true
 from ..base.modes import Mode
 from ..model.interfaces import Measurement, Orders
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster
 from .master_cell import make_master_cell
-from .runs import fill, sum_weighted
+from .runs import sum_weighted
 from .servo import lock_overloaded
 from .travel import ABEAM, measure_excess, measure_offsets
 
@@ -73,11 +73,11 @@ class VirtualMasterControl(MasterControl):
         place, force = touched.place, touched.force
         if self._noisy:
             force = suppress_noise(force, self.floor)
-        (none,) = fill((0.0,), force)
+        (none,) = constants((0.0,), force.shape)
         total, x, y, *_ = near = sum_weighted(place, force).tolist()
         far = self._measure_excess(memory, place) > none
         far &= force != none
-        if some(far):
+        if any_true(far):
             near = sum_weighted(place, np.where(far, none, force)).tolist()
         return total, x, y, *near[:3], sum_weighted(touched.height, force).tolist()
 
@@ -111,7 +111,7 @@ class VirtualMasterControl(MasterControl):
 
     def _find_formed(self, target: Floats) -> NDArray[np.int8]:
         """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        rest, band = fill(self._limits, target)[-2:]
+        rest, band = constants(self._limits, target.shape)[-2:]
         off = target - rest
         np.abs(off, off)
         # False and True are the codes of these two modes.
@@ -120,8 +120,9 @@ class VirtualMasterControl(MasterControl):
 
     def _create_blister(self, memory: Any, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        edge_mode, formed, froze = fill(CODES, seen.target, np.int8)
-        abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = fill(self._limits, seen.target)
+        shape = seen.target.shape
+        edge_mode, formed, froze = constants(CODES, shape, np.int8)
+        abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = constants(self._limits, shape)
         x, y, toward_x, toward_y = self.gather(MasterControl.get_pose, memory)
         distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.place)
         inside = distance <= radius
@@ -131,7 +132,7 @@ class VirtualMasterControl(MasterControl):
         facing = ahead >= abeam
         facing &= ring
         level = sum_weighted(seen.height, facing.astype(float)).tolist()
-        memory = self.decide(MasterControl.set_edge, memory, level, how_many(facing))
+        memory = self.decide(MasterControl.set_edge, memory, level, count_true(facing))
         edge, top, kind = self.gather(MasterControl.get_heights, memory)
         profile = self.blister.interpolate(distance, edge, top)
         frozen = ahead < behind * distance
@@ -139,7 +140,7 @@ class VirtualMasterControl(MasterControl):
         frozen |= seen.mode == froze
         frozen &= inside
         frozen &= seen.force < release
-        if some(frozen):
+        if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
             kept = seen.target > profile
             kept ^= top < edge

@@ -116,7 +116,7 @@ def _ready(system: System, held: Gathered) -> _Ready:
             )
             for part in (held.touched, held.all)
         )
-        movement = system.stepper.bind(system.plan, held.driven, held.near)
+        movement = system.stepper.prepare(system.plan, held.driven, held.near)
         known = held.ready[system.plan] = _Ready(touched, everything, movement)
     return known
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
+from ..base.arrays import constants
 from ..base.quantity import Parameters, quantity
 
 __all__ = ["Contact"]
@@ -38,7 +38,7 @@ class Contact(Parameters):
         depth : ndarray (..., n)
             Indentation x, m; negative where there is a gap.
         """
-        m, offset, none, most, unit = filled(self.numbers, depth.shape[-1])
+        m, offset, none, most, unit = constants(self.numbers, depth.shape)
         exponent: Floats = depth * m
         exponent -= offset
         np.maximum(exponent, none, out=exponent)

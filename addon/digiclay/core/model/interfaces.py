@@ -31,7 +31,8 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 #: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
-#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N.
+#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
+#: the cells of b runs all arrays have one axis more, the last.
 Movement = Callable[[Floats], Floats]
 
 
@@ -79,9 +80,9 @@ class Pulp(Protocol):
 
     def rate(self, own: Floats, tension: Floats) -> Floats: ...
 
-    def lost(self, step: float) -> tuple[Floats, float]: ...
+    def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
 
-    def transition(self, step: float) -> Floats: ...
+    def propagator(self, step: float) -> Floats: ...
 
     def age(self, own: Floats, time: Floats) -> None: ...
 
@@ -145,14 +146,14 @@ class Stepper(Protocol):
         """Work out once what all periods share."""
         ...
 
-    def bind(self, plan: Any, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on, as often as its set of cells serves.
+    def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
+        """Prepare to move a block of cells on, as often as its set of cells serves.
 
         Parameters
         ----------
         plan : object
-            From `plan`.
-        driven : ndarray (r + q, n)
+            From `plan`; with the numbers of all runs for cells of many.
+        rows : ndarray (r + q, n) or (r + q, n, b)
             State rows, see `physics.Cell`, then the commands of the queue, oldest first.
         near : int
             Number k of cells, the first, that the finger may touch.

@@ -130,13 +130,27 @@ class Grid:
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
+        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too.
+
+        Parameters
+        ----------
+        x, y : float
+            Its centre, m.
+        radius : float
+            m.
+        """
         cells = self.within(self.bounds(x, y, radius))
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
 
     def at(self, x: Floats, y: Floats) -> Cells:
-        """Return the cells nearest to some places, m, shape (k,)."""
+        """Return the cells nearest to some places, m, shape (k,).
+
+        Parameters
+        ----------
+        x, y : ndarray (k,)
+            m.
+        """
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
         column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)

@@ -51,11 +51,11 @@ class Unrelaxed:
         """Return no rows."""
         return own
 
-    def lost(self, step: float) -> tuple[Floats, float]:
+    def mean_loss_map(self, step: float) -> tuple[Floats, float]:
         """Return the map to no loss of force, shape (1,), and no share."""
         return np.zeros(1), 0.0
 
-    def transition(self, step: float) -> Floats:
+    def propagator(self, step: float) -> Floats:
         """Return the map to no rows, shape (0, 3)."""
         return np.empty((0, 3))
 

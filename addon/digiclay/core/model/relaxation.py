@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import apply_map, per_row
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
@@ -50,14 +51,14 @@ class Relaxation(Parameters):
 
     @cached_property
     def rates(self) -> Floats:
-        """Relaxation rates ν_i, shape (k, 1), 1/s."""
-        return 1.0 / np.array(self.times)[:, None]
+        """Relaxation rates ν_i, shape (k, 1), or (k, b) where runs differ, 1/s."""
+        return 1.0 / per_row(np.stack(np.broadcast_arrays(*self.times)), 2)
 
     @cached_property
     def shares(self) -> Floats:
-        """Shares ĉ_i of the filters, shape (k,)."""
-        weights = np.array(self.weights)
-        return np.asarray(weights[1:] / weights.sum())
+        """Shares ĉ_i of the filters, shape (k,), or (k, b) where runs differ."""
+        weights = np.stack(np.broadcast_arrays(*self.weights))
+        return np.asarray(weights[1:] / weights.sum(axis=0))
 
     def reduced(self, time: Floats) -> Floats:
         """Return G(t) (equation 12); G(0) = 1."""
@@ -65,15 +66,15 @@ class Relaxation(Parameters):
         return np.asarray(1.0 - self.shares.sum() + decay @ self.shares)
 
     def relaxed(self, own: Floats) -> Floats:
-        """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n,), of filters z (k, n)."""
-        relaxed: Floats = self.shares.dot(own)
+        """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n[, b]), of filters z (k, n[, b])."""
+        relaxed: Floats = apply_map(self.shares[None], own)[0]
         return relaxed
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
         return self.rates * (tension - own)
 
-    def lost(self, step: float) -> tuple[Floats, float]:
+    def mean_loss_map(self, step: float) -> tuple[Floats, float]:
         """Return the force lost over a step, on average, as a map of (z, T at the start), and a share of T.
 
         ``S = map . (z, T_0) + share T``, T the tension that there is: exact for a mean over the
@@ -93,7 +94,7 @@ class Relaxation(Parameters):
         share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - kept) / turns))
         return np.append(self.shares * kept, self.shares @ (1.0 - kept) - share), share
 
-    def transition(self, step: float) -> Floats:
+    def propagator(self, step: float) -> Floats:
         """Return the map from (z; T at the start, on average, at the end of a step) to the new z.
 
         Exact for a tension linear in time.
@@ -108,5 +109,5 @@ class Relaxation(Parameters):
         return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Let filters decay without contact for `time` seconds, shape (n,), in place; exact."""
-        own *= np.exp(-self.rates * time)
+        """Let filters decay without contact for `time` seconds, shape (n[, b]), in place; exact."""
+        own *= np.exp(-per_row(self.rates, own.ndim) * time)

@@ -46,5 +46,12 @@ class SetPoint:
 
 
 def asked(set_point: SetPoint | None, following: ArrayLike) -> Floats:
-    """Return the `SetPoint.total`, N; NaN throughout for a method without a set point."""
+    """Return the `SetPoint.total`, N; NaN throughout for a method without a set point.
+
+    Parameters
+    ----------
+    set_point : SetPoint or None
+    following : array_like of int
+        Numbers of cells in the mode `FORCE_FOLLOW`.
+    """
     return np.full(np.shape(following), np.nan) if set_point is None else set_point.total(following)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
+from ..base.arrays import constants
 from .contact import Contact
 from .fingertip import Fingertip, forms, reach, reaches, underside
 from .interfaces import Pulp
@@ -134,7 +134,7 @@ def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Float
     filters : ndarray (r, k)
         The relaxation's state rows z_i, N.
     """
-    none, share = filled((0.0, touch.contact.share), height.size)
+    none, share = constants((0.0, touch.contact.share), height.shape)
     tension = touch.contact.tension(height - under)
     tension -= touch.pulp.relaxed(filters)
     np.maximum(tension, none, out=tension)

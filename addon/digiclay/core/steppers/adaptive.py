@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.counting import some
+from ..base.arrays import any_true
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, felt, speeds
@@ -93,50 +93,50 @@ class Adaptive:
         period = sum(part.length for part in segments)
         return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed, speeds(cell), period)
 
-    def bind(self, plan: AdaptivePlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
+    def prepare(self, plan: AdaptivePlan, rows: Floats, near: int) -> Movement:
+        """Prepare to move a block of cells; see `interfaces.Stepper`."""
         # Every period is done at these two levels, by all cells.
-        coarse, fine = (_bound(plan, level, driven.shape, near) for level in (0, 1))
-        return partial(self._advance, plan, driven, coarse, fine)
+        coarse, fine = (_prepare(plan, level, rows.shape, near) for level in (0, 1))
+        return partial(self._advance, plan, rows, coarse, fine)
 
     def _advance(
-        self, plan: AdaptivePlan, driven: Floats, whole: Bound, halves: Bound, under: Floats
+        self, plan: AdaptivePlan, rows: Floats, whole: Bound, halves: Bound, under: Floats
     ) -> Floats:
         """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
         cell, k = plan.levels[0].cell, under.shape[1]
-        start, share = driven.copy(), np.full(driven.shape[1], FREE)
+        start, share = rows.copy(), np.full(rows.shape[1], FREE)
         share[:k][start[0, :k] > under.min(axis=0)] = PRESSED
-        coarse = _done(whole, start, under)
-        open_cells = np.arange(driven.shape[1])
+        coarse = _advance_copy(whole, start, under)
+        open_cells = np.arange(rows.shape[1])
         for level in range(1, FINEST + 1):
             near = open_cells[open_cells < k]
             if level > 1:
-                halves = _bound(plan, level, (len(driven), open_cells.size), near.size)
-            fine = _done(halves, start[:, open_cells], under[:, near])
+                halves = _prepare(plan, level, (len(rows), open_cells.size), near.size)
+            fine = _advance_copy(halves, start[:, open_cells], under[:, near])
             # Extrapolation holds where the error is of second order; a free cell's is of fourth.
             gain = (fine[: cell.rows] - coarse[: cell.rows]) / 3.0
-            driven[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
+            rows[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
             off = np.abs(fine - coarse)
             wide = off[0] > plan.allowed * share[open_cells]
             wide |= (off[cell.pulp_rows] > plan.allowed_tension * PRESSED).any(axis=0)
-            if not some(wide):
+            if not any_true(wide):
                 break
             open_cells, coarse = open_cells[wide], fine[:, wide]
         # Where the finest two still have little in common the extrapolation lies beyond what there can be.
-        np.clip(driven[0], *plan.speeds.reach(start[0], under, plan.period), out=driven[0])
-        np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
-        pulp = driven[cell.pulp_rows]
+        np.clip(rows[0], *plan.speeds.reach(start[0], under, plan.period), out=rows[0])
+        np.clip(rows[0], 0.0, cell.actuator.stroke, out=rows[0])
+        pulp = rows[cell.pulp_rows]
         np.maximum(pulp, 0.0, out=pulp)
-        return felt(cell, driven, under[-1])
+        return felt(cell, rows, under[-1])
 
 
-def _bound(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:
+def _prepare(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:
     """Return what moves a block of some shape with the steps of a level."""
     block = np.empty(shape)
-    return block, plan.between[level], BernoulliExponential().bind(plan.levels[level], block, near)
+    return block, plan.between[level], BernoulliExponential().prepare(plan.levels[level], block, near)
 
 
-def _done(bound: Bound, start: Floats, under: Floats) -> Floats:
+def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
     """Return rows moved on by one control period, in the arrays of `bound`."""
     block, between, advance = bound
     block[:] = start

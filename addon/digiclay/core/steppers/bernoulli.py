@@ -4,7 +4,7 @@ The valve's opening is known in closed form all through a period. Over a physics
 conductance, the force lost to relaxation and the finger's speed are frozen at their means, and
 what remains is solved exactly (`closed_form`). The step is therefore stable at any length and
 stiffness, without iteration, and second order. What the frozen speeds leave out most of, that
-free pin and finger go bent ways, is put back by its mean, the bow. A valve that changes
+free pin and finger go bent paths, is put back by its mean, the chord deviation. A valve that changes
 reservoir within a step needs no care (conductance and drive are averaged at Gauss points of the
 exact opening), and a cell that meets or leaves the finger does so at the exact instant.
 """
@@ -16,16 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.constants import filled
-from ..base.counting import some
+from ..base.arrays import any_true, apply_map, constants, per_row, prepare_map
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
 from .bernoulli_plan import BernoulliPlan, bernoulli_plan
 from .closed_form import crossed, pressed
-from .near_overflow import Strain, Way, loaded_way
+from .near_overflow import LoadedPath, StepStart, loaded_path
 
-__all__ = ["BernoulliExponential", "BernoulliPlan", "Block"]
+__all__ = ["BernoulliExponential", "BernoulliPlan", "StepWorkspace"]
 
 Floats = NDArray[np.float64]
 
@@ -43,78 +42,83 @@ class BernoulliExponential:
         """Work out once what all periods share."""
         return bernoulli_plan(cell, queue, segments)
 
-    def bind(self, plan: BernoulliPlan, driven: Floats, near: int) -> Block:
-        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
-        return Block(plan, driven, near)
+    def prepare(self, plan: BernoulliPlan, rows: Floats, near: int) -> StepWorkspace:
+        """Prepare to move a block of cells; see `interfaces.Stepper`."""
+        return StepWorkspace(plan, rows, near)
 
 
-class Block:
-    """Block of cells for integration over many periods: its rows, and work arrays.
+class StepWorkspace:
+    """A block of cells, prepared to be moved period by period: its rows, and the arrays to work in.
 
-    What is in the arrays before a period does not count. Numpy takes two operands of one shape
-    twice as fast as an array and a number, so constants are arrays as well.
+    The cells are those of one run, (n,), or of b runs, (n, b), and then the plan's numbers and maps may
+    be each run's own. What is in the arrays before a period does not count. Linear maps are bound to
+    the arrays they lead from and to.
 
     Parameters
     ----------
-    plan, driven, near
-        See `interfaces.Stepper.bind`; k is short for `near` here.
+    plan, rows, near
+        See `interfaces.Stepper.prepare`; k is short for `near` here.
     """
 
-    def __init__(self, plan: BernoulliPlan, driven: Floats, near: int) -> None:
-        cell, count, k = plan.cell, driven.shape[1], near
-        gauss, instants = len(plan.weights), plan.path.shape[1]
+    def __init__(self, plan: BernoulliPlan, rows: Floats, near: int) -> None:
+        cell, k = plan.cell, near
+        every, touched = rows.shape[1:], (k, *rows.shape[2:])
+        gauss, instants, steps = len(plan.weights), plan.path.shape[1], len(plan.segments)
 
-        def empty(*shape: int) -> Floats:
-            return np.empty_like(driven, shape=shape)
+        def empty(count: int, cells: tuple[int, ...]) -> Floats:
+            return np.empty_like(rows, shape=(count, *cells))
 
-        self.plan, self.height, self.near = plan, driven[0], driven[0, :k]
-        self.pulp, self.lag = driven[cell.pulp_rows, :k], driven[cell.lag_rows]
-        self.opened_by = driven[cell.lag_rows.start :]
-        self.openings = empty(len(plan.response), count)
-        self.opening = self.openings[:gauss]
-        self.opening_after = self.openings[len(self.openings) - len(self.lag) :]
+        self.plan, self.height, self.near = plan, rows[0], rows[0, :k]
+        self.pulp, self.lag = rows[cell.pulp_rows, :k], rows[cell.lag_rows]
+        openings = empty(len(plan.response), every)
+        self.opening, self.opening_after = openings[:gauss], openings[len(openings) - len(self.lag) :]
+        self.open_valves = prepare_map(plan.response, rows[cell.lag_rows.start :], openings)
         # The valves' conductances, the same with the signs of the openings, underside, and ones.
-        inputs = empty(2 * gauss + instants + 1, count)
+        inputs = empty(2 * gauss + instants + 1, every)
         inputs[-1] = 1.0
-        self.conductances, self.inputs = inputs[: 2 * gauss], inputs[:, :k]
         self.size, self.signed = inputs[:gauss], inputs[gauss : 2 * gauss]
         self.under = inputs[2 * gauss : -1, :k]
         # What the maps make of them: see `BernoulliPlan.moves`, of which the first rows, and `loaded`.
-        self.rises = plan.moves[: len(plan.segments)]
-        self.free, self.loaded = empty(len(self.rises), count), empty(len(plan.loaded), k)
+        self.free, loaded = empty(steps, every), empty(len(plan.loaded), touched)
+        self.rise_freely = prepare_map(plan.moves[:steps], inputs[: 2 * gauss], self.free)
+        self.meet_finger = prepare_map(plan.loaded, inputs[:, :k], loaded)
+        self.start = loaded[0]
+        begins = empty(2, touched)
+        self.lost, self.relaxed = begins
+        # What `BernoulliPlan.mean_loss` and `propagator` are maps of.
+        work = empty(len(self.pulp) + 5, touched)
+        work[-5], work[-4] = 0.0, 1.0
+        self.filters: Floats = work[:-5]
+        self.force: Floats = work[-5]
+        self.moved, (self.first, self.mean, self.last) = work[:-4], work[-3:]
+        self.propagated = empty(len(self.moved), touched)
         self.steps = tuple(
-            (rise, rise[:k], *self.loaded[at : at + 3])
-            for rise, at in zip(self.free, range(1, len(self.loaded), 3), strict=True)
+            (
+                rise,
+                rise[:k],
+                *loaded[1 + 3 * s : 4 + 3 * s],
+                prepare_map(plan.mean_loss[s], work[:-2], begins),
+                prepare_map(plan.propagator[s], work, self.propagated),
+            )
+            for s, rise in enumerate(self.free)
         )
-        self.start = self.loaded[0]
-        self.begins = empty(2, k)
-        self.lost, self.relaxed = self.begins
-        # What `BernoulliPlan.begin` and `finish` are maps of.
-        self.work = empty(len(self.pulp) + 5, k)
-        self.work[-5], self.work[-4] = 0.0, 1.0
-        self.filters = self.work[:-5]
-        self.force: Floats = self.work[-5]
-        self.begun, self.moved = self.work[:-2], self.work[:-4]
-        self.first, self.mean, self.last = self.work[-3:]
-        self.constants, self.none = filled(plan.numbers, k), np.zeros_like(self.moved)
+        self.constants, self.none = constants(plan.numbers, touched), np.zeros_like(self.moved)
         # What `pressed` is not for from the limits on.
-        self.guarded, self.limits = empty(5, k), np.array(filled(plan.limits, k))
-        self.exponent, self.end, self.bent, self.growth, self.bow = self.guarded
-        self.stops = filled((0.0, cell.actuator.stroke), count)
+        self.guarded, self.limits = empty(5, touched), empty(5, touched)
+        self.limits[:] = per_row(plan.limits, rows.ndim)
+        self.exponent, self.end, self.bent, self.growth, self.deviation = self.guarded
+        self.stops = constants((0.0, cell.actuator.stroke), every)
 
     def __call__(self, under: Floats) -> Floats:
         """Move the block on by one control period, in place; see `interfaces.Movement`."""
-        plan = self.plan
-        plan.response.dot(self.opened_by, self.openings)
+        self.open_valves()
         self.lag[:] = self.opening_after
-        plan.unloaded(self.opening, self.size)
-        # The sign picks the reservoir.
-        np.copysign(self.size, self.opening, self.signed)
-        self.rises.dot(self.conductances, self.free)
+        self._conduct()
+        self.rise_freely()
         if under.shape[1]:
             self.under[:] = under
-            plan.loaded.dot(self.inputs, self.loaded)
-            self._under_finger()
+            self.meet_finger()
+            self._press()
             return self.force
         height, (lowest, highest) = self.height, self.stops
         for rise in self.free:
@@ -123,9 +127,18 @@ class Block:
             np.minimum(height, highest, out=height)
         return self.force
 
-    def _under_finger(self) -> None:
+    def _conduct(self) -> None:
+        """Work out the conductances of the valves without load; the sign picks the reservoir."""
+        cell, opening, size = self.plan.cell, self.opening, self.size
+        if self.plan.laminar:
+            cell.flow.laminar_conductance(opening, size)
+        else:
+            size[:] = cell.flow.conductance(opening, cell.supply.pressure(opening))
+        np.copysign(size, opening, self.signed)
+
+    def _press(self) -> None:
         """Move the block on step by step, its first k cells under the finger, and their pulp with them."""
-        plan, height, near = self.plan, self.height, self.near
+        height, near = self.height, self.near
         first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
         m, offset, per_m, most, zero, one, half, tiny = self.constants
         guarded, exponent, growth = self.guarded, self.exponent, self.growth
@@ -135,11 +148,11 @@ class Block:
         exponent -= self.start
         _tension(exponent, zero, most, first)
         end: Floats = exponent
-        for s, (rise, risen, slip, bow, decay) in enumerate(self.steps):
+        for s, (rise, risen, slip, deviation, decay, lose, propagate) in enumerate(self.steps):
             if s:
                 first[:] = last
                 exponent[:] = end
-            plan.begin[s].dot(self.begun, self.begins)
+            lose()
             idle = first <= lost
             stiffness = decay.copy()
             np.putmask(stiffness, idle, tiny)
@@ -147,10 +160,10 @@ class Block:
             np.add(push, slip, growth)
             growth += tiny
             end = np.add(exponent, slip, self.end)
-            bent = np.add(exponent, bow, self.bent)
-            self.bow[:] = bow
-            if some(guarded >= self.limits):
-                risen[:], end, mean[:] = self._strained(s, exponent, bow, idle)
+            bent = np.add(exponent, deviation, self.bent)
+            self.deviation[:] = deviation
+            if any_true(guarded >= self.limits):
+                risen[:], end, mean[:] = self._move_near_overflow(s, exponent, deviation, idle)
                 _tension(end, zero, most, last)
                 rise += height
             else:
@@ -162,8 +175,8 @@ class Block:
                 _tension(end, zero, most, last)
                 crossing = last <= lost
                 crossing ^= idle
-                if some(crossing):
-                    parts = (values[crossing] for values in (exponent, bow, slip, decay, relaxed))
+                if any_true(crossing):
+                    parts = (values[crossing] for values in (exponent, deviation, slip, decay, relaxed))
                     push[crossing], mean[crossing] = crossed(*parts)
                     end = exponent + slip + push
                     _tension(end, zero, most, last)
@@ -173,27 +186,43 @@ class Block:
             np.maximum(rise, lowest, out=height)
             np.minimum(height, highest, out=height)
             stopped = risen != near
-            if some(stopped):
+            if any_true(stopped):
                 # The mean found above is that of a pin that no end stop holds.
-                end = near * m - offset - plan.path[2 * len(self.steps) + s + 1].dot(self.under)
+                end = near * m - offset - self._seen(2 * len(self.steps) + s + 1)
                 _tension(end, zero, most, last)
                 np.putmask(mean, stopped, half * (first + last))
             # Where the finger is not touched all through the step the mean is that of no tension.
             np.maximum(mean, zero, out=mean)
             # Of a tension that falls steeply a straight line would make a filter that pulls.
-            np.maximum(plan.finish[s].dot(self.work), self.none, out=self.moved)
+            propagate()
+            np.maximum(self.propagated, self.none, out=self.moved)
         self.pulp[:] = self.filters
 
-    def _strained(self, s: int, exponent: Floats, bow: Floats, idle: NDArray[np.bool_]) -> Way:
-        """Return the way of step s, some of whose cells `pressed` is not for."""
-        plan, under, nodes = self.plan, self.under, self.plan.nodes[s]
-        # Their way bends with the load, not as it would without; or so much that its mean says nothing.
-        bow[(self.guarded >= self.limits).any(axis=0)] = 0.0
-        weights, count = plan.weights[nodes, None] / plan.cell.actuator.area, len(self.steps)
-        finger_bow, lift = plan.path[count + s].dot(under), plan.path[s].dot(under)
-        openings = self.opening[nodes, : self.near.size]
-        seen = Strain(openings, weights, exponent, bow, finger_bow, lift, self.relaxed, idle)
-        return loaded_way(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], seen)
+    def _seen(self, row: int) -> Floats:
+        """Return what one row of the plan's `path` makes of the finger's underside."""
+        seen: Floats = apply_map(self.plan.path[row : row + 1], self.under)[0]
+        return seen
+
+    def _move_near_overflow(
+        self, s: int, exponent: Floats, deviation: Floats, idle: NDArray[np.bool_]
+    ) -> LoadedPath:
+        """Return the paths over step s, some of whose cells `pressed` is not for."""
+        plan, nodes, count = self.plan, self.plan.nodes[s], len(self.steps)
+        # Their path bends with the load, not as it would without; or so much that its mean says nothing.
+        deviation[(self.guarded >= self.limits).any(axis=0)] = 0.0
+        openings = self.opening[nodes, : len(self.near)]
+        weights = per_row(plan.weights[nodes], openings.ndim) / plan.cell.actuator.area
+        start = StepStart(
+            openings,
+            weights,
+            exponent,
+            deviation,
+            finger_deviation=self._seen(count + s),
+            lift=self._seen(s),
+            relaxed=self.relaxed,
+            idle=idle,
+        )
+        return loaded_path(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], start)
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -33,10 +32,10 @@ def _legendre(count: int) -> tuple[tuple[float, float], ...]:
 #: may go all its way, within a short piece it goes less of it.
 POINTS = ((0.3, _legendre(2)), (0.6, _legendre(3)), (1.0, _legendre(4)))
 
-#: Largest bow, in 1/m, whose step may be taken for a straight one that lies higher by so much. Out of touch
-#: at the start, in the middle and at the end it then leaves no tension on average, as it should: that comes
-#: out as at most exp(b) (1 - exp(-3 b)) / (3 b) - 1 of a bow b, which is above 0 from 1.54 on.
-MOST_BOW = 1.5
+#: Largest chord deviation, in 1/m, whose step may be taken for a straight one that lies higher by so much.
+#: Out of touch at the start, in the middle and at the end it then leaves no tension on average, as it should:
+#: that comes out as at most exp(b) (1 - exp(-3 b)) / (3 b) - 1 of a deviation b, above 0 from 1.54 on.
+LARGEST_DEVIATION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,37 +51,33 @@ class BernoulliPlan:
         From opening and queued commands to the openings at all g Gauss points, and at the end.
     moves : ndarray (4 s, 2 g)
         From conductances at the Gauss points, and the same with the signs of the openings, to
-        what each step has: free rise, m; the same and its `bow`, in 1/m; decay, see `closed_form`.
+        what each step has: free rise, m; the same and its chord deviation, in 1/m; decay, see `closed_form`.
     path : ndarray (3 s + 1, p)
         From the finger's underside at the period's instants to what each step has, in 1/m: rise
-        and its bow; underside at the start, and at the end of the last.
+        and its chord deviation; underside at the start, and at the end of the last.
     loaded : ndarray (1 + 3 s, 2 g + p + 1)
         Both together: from conductances, underside and a row of ones to the exponent less m H at the
-        start, with its sign changed; then what each step has: slip, bow and decay.
+        start, with its sign changed; then what each step has: slip, chord deviation
+        and decay.
     nodes : tuple of slice
         The Gauss points of each step.
     weights : ndarray (g,)
         Their weights, s.
-    lost, transition : tuple of ndarray
-        The relaxation's maps, one a step: to the tension at which the pulp begins to push, and
-        to the filters and the force at its end, N.
-    begin : tuple of ndarray (2, r + 3)
-        `lost` as a block uses it: from filters, force (which does not count), ones, and tension, to the
-        same, and to one more.
-    finish : tuple of ndarray (r + 1, r + 5)
-        `transition` as a block uses it: from these, and the tension on average and at the end.
+    mean_loss : tuple of ndarray (2, r + 3)
+        The relaxation's maps, one a step: from filters, N, force (which does not count), ones, and tension,
+        to the tension at which the pulp begins to push, and to one more.
+    propagator : tuple of ndarray (r + 1, r + 5)
+        From these, and the tension on average and at the end, to the filters and the force at its end, N.
     shares : tuple of float
         Share of the tension that does push, one a step: the rest is lost within it.
-    unloaded : callable
-        Works out the conductance of valves without load, m³/(s Pa), from their openings, into an array.
+    laminar : bool
+        No valve without load is turbulent.
     numbers : tuple of float
         The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`.
-    limits : tuple of float
+    limits : ndarray (5,)
         What `closed_form.pressed` is for lies below all of them: the exponent at the start of a step, at its
-        end and with the bow, where every flow is laminar; the growth, where nothing overflows and what does
-        not push moves no pin; and the bow, see `MOST_BOW`.
-    unit : float
-        b/m, N.
+        end and with the chord deviation, where every flow is laminar; the growth, where nothing overflows
+        and what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`.
     to_load : float
         Pressure that a unit of tension makes, Pa.
     """
@@ -95,15 +90,12 @@ class BernoulliPlan:
     loaded: Floats
     nodes: tuple[slice, ...]
     weights: Floats
-    lost: tuple[Floats, ...]
-    transition: tuple[Floats, ...]
-    begin: tuple[Floats, ...]
-    finish: tuple[Floats, ...]
+    mean_loss: tuple[Floats, ...]
+    propagator: tuple[Floats, ...]
     shares: tuple[float, ...]
-    unloaded: Callable[[Floats, Floats], Floats]
+    laminar: bool
     numbers: tuple[float, ...]
-    limits: tuple[float, ...]
-    unit: float
+    limits: Floats
     to_load: float
 
 
@@ -115,24 +107,18 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
     to_decay = contact.share * contact.stiffness / cell.actuator.area
     m, supply = contact.exponent, cell.supply
     to_load, unit = to_decay / m, contact.stiffness / m
-    shares = tuple(1.0 - pulp.lost(part.length)[1] for part in segments)
-    steps, bows = np.zeros((2, len(nodes), len(times)))
+    shares = tuple(1.0 - pulp.mean_loss_map(part.length)[1] for part in segments)
+    steps, deviations = np.zeros((2, len(nodes), len(times)))
     for s, part in enumerate(segments):
         own = nodes[s]
         steps[s, own] = weights[own] / cell.actuator.area
-        bows[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
+        deviations[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
 
     widest = float(cell.flow.laminar_conductance(1.0))
     hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
 
-    def under_supply(opening: Floats, out: Floats) -> Floats:
-        out[:] = cell.flow.conductance(opening, supply.pressure(opening))
-        return out
-
-    moves = _moves(supply, steps, m * bows, to_decay * np.array(shares)[:, None] * steps, m)
+    moves = _moves(supply, steps, m * deviations, to_decay * np.array(shares)[:, None] * steps, m)
     path = m * _path(segments)
-    lost = tuple(_lost(pulp, part.length, unit) for part in segments)
-    transition = tuple(_transition(pulp, part.length, unit, contact.share) for part in segments)
     return BernoulliPlan(
         cell,
         segments,
@@ -142,15 +128,12 @@ def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> B
         _loaded(moves, path, m * contact.offset),
         nodes,
         weights,
-        lost,
-        transition,
-        tuple(_begin(one) for one in lost),
-        tuple(_finish(one) for one in transition),
+        tuple(_mean_loss(pulp, part.length, unit) for part in segments),
+        tuple(_propagator(pulp, part.length, unit, contact.share) for part in segments),
         shares,
-        cell.flow.laminar_conductance if cell.flow.knee > supply.largest else under_supply,
+        cell.flow.knee > supply.largest,
         (m, m * contact.offset, 1.0 / m, LARGEST_EXPONENT, 0.0, 1.0, 0.5, TINY),
-        (hard, hard, hard, 0.5 * LARGE, MOST_BOW),
-        unit,
+        np.array([hard, hard, hard, 0.5 * LARGE, LARGEST_DEVIATION]),
         to_load,
     )
 
@@ -173,10 +156,10 @@ def _hard(cell: Cell, to_load: float, steepest: float) -> float:
     return min(0.5 * LARGE, math.log1p(spare / to_load), math.log(0.5 * LARGE / max(steepest, TINY)))
 
 
-def _moves(supply: Supply, steps: Floats, bows: Floats, decay: Floats, exponent: float) -> Floats:
-    """Return `BernoulliPlan.moves` from the weights (s, g) of free rise, its bow and the decay."""
+def _moves(supply: Supply, steps: Floats, deviations: Floats, decay: Floats, exponent: float) -> Floats:
+    """Return `BernoulliPlan.moves` from the weights (s, g) of free rise, chord deviation and decay."""
     middle, half = 0.5 * (supply.high + supply.low), 0.5 * (supply.high - supply.low)
-    rows = [[middle * part, half * part] for part in (steps, exponent * steps, bows)]
+    rows = [[middle * part, half * part] for part in (steps, exponent * steps, deviations)]
     return np.block([*rows, [decay, np.zeros_like(decay)]])
 
 
@@ -186,9 +169,9 @@ def _loaded(moves: Floats, path: Floats, offset: float) -> Floats:
     loaded = np.zeros((1 + 3 * count, inputs + instants + 1))
     loaded[0, inputs:] = *path[2 * count], offset
     for s in range(count):
-        slip, bow, decay = loaded[1 + 3 * s : 4 + 3 * s]
+        slip, deviation, decay = loaded[1 + 3 * s : 4 + 3 * s]
         slip[:-1] = *moves[count + s], *-path[s]
-        bow[:-1] = *moves[2 * count + s], *-path[count + s]
+        deviation[:-1] = *moves[2 * count + s], *-path[count + s]
         decay[:inputs], decay[-1] = moves[3 * count + s], TINY
     return loaded
 
@@ -196,7 +179,7 @@ def _loaded(moves: Floats, path: Floats, offset: float) -> Floats:
 def _path(segments: tuple[Segment, ...]) -> Floats:
     """Return `BernoulliPlan.path`, in m.
 
-    The bow of a way is its mean above the straight line between its ends, here of the parabola
+    The chord deviation of a path is its mean above the straight line between its ends, here of the parabola
     through start, middle and end.
     """
     count = len(segments)
@@ -230,30 +213,21 @@ def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, 
     return np.array(times), np.array(weights), tuple(nodes)
 
 
-def _lost(pulp: Pulp, step: float, unit: float) -> Floats:
-    """Return the map from filters, N, and tension, units, to the tension at which the pulp begins to push."""
-    lost, share = pulp.lost(step)
-    lost[:-1] /= unit
-    lost /= 1.0 - share
-    return lost
+def _mean_loss(pulp: Pulp, step: float, unit: float) -> Floats:
+    """Return an entry of `BernoulliPlan.mean_loss`."""
+    loss, share = pulp.mean_loss_map(step)
+    loss[:-1] /= unit
+    loss /= 1.0 - share
+    both = np.tile([*loss[:-1], 0.0, 0.0, loss[-1]], (2, 1))
+    both[1, -2] = 1.0
+    return both
 
 
-def _transition(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
-    """Return the map from filters, N, and tensions, units, see `Pulp.transition`, to filters and force, N."""
-    transition = pulp.transition(step)
-    transition[:, -3:] *= unit
-    last = np.zeros(transition.shape[1])
+def _propagator(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
+    """Return an entry of `BernoulliPlan.propagator`; see also `Pulp.propagator`."""
+    filters = pulp.propagator(step)
+    filters[:, -3:] *= unit
+    last = np.zeros(filters.shape[1])
     last[-1] = unit
-    return np.vstack([transition, share * (last - pulp.relaxed(transition))])
-
-
-def _begin(lost: Floats) -> Floats:
-    """Return an entry of `BernoulliPlan.begin`."""
-    begin = np.tile([*lost[:-1], 0.0, 0.0, lost[-1]], (2, 1))
-    begin[1, -2] = 1.0
-    return begin
-
-
-def _finish(transition: Floats) -> Floats:
-    """Return an entry of `BernoulliPlan.finish`."""
-    return np.insert(transition, [-3, -3], 0.0, axis=1)
+    both = np.vstack([filters, share * (last - pulp.relaxed(filters))])
+    return np.insert(both, [-3, -3], 0.0, axis=1)

@@ -91,7 +91,7 @@ def careful(
 
 
 def crossed(
-    exponent: Floats, bow: Floats, slip: Floats, decay: Floats, pulp: Floats
+    exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
     """Solve for cells that meet or leave the finger within the step.
 
@@ -99,8 +99,8 @@ def crossed(
     ----------
     exponent, slip, decay, pulp : ndarray (k,)
         See the module. Below ``log(pulp)`` at the start means meeting, above it leaving.
-    bow : ndarray (k,)
-        How far the way without load runs, on average, above the straight line between its ends.
+    deviation : ndarray (k,)
+        Chord deviation of the path without load: its mean above the straight line between its ends.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def crossed(
     threshold = np.log(pulp)
     share = _loaded_share(threshold - exponent, slip, growth)
     # A parabola's mean height over the loaded part, from its mean over all of it.
-    exponent = exponent + bow * share * (3.0 - 2.0 * share)
+    exponent = exponent + deviation * share * (3.0 - 2.0 * share)
     share = _loaded_share(threshold - exponent, slip, growth)
     start = np.maximum(exponent, threshold)
     few = np.maximum(share * decay, TINY)

@@ -64,15 +64,15 @@ class Explicit:
         """Return how far the rows go in one step, s long."""
         raise NotImplementedError
 
-    def bind(self, plan: ExplicitPlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
-        return partial(self.advance, plan, driven)
+    def prepare(self, plan: ExplicitPlan, rows: Floats, near: int) -> Movement:
+        """Prepare to move a block of cells; see `interfaces.Stepper`."""
+        return partial(self.advance, plan, rows)
 
-    def advance(self, plan: ExplicitPlan, driven: Floats, under: Floats) -> Floats:
+    def advance(self, plan: ExplicitPlan, rows: Floats, under: Floats) -> Floats:
         """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
-        y, commands = driven[: cell.rows], driven[cell.rows :]
-        thrown = np.zeros(y.shape[1], np.bool_)
+        y, commands = rows[: cell.rows], rows[cell.rows :]
+        thrown = np.zeros(y.shape[1:], np.bool_)
         for part in plan.segments:
             command, instants = commands[plan.queue.seen(part.start)], under.take(part.nodes, axis=0)
 

@@ -18,13 +18,13 @@ from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
 from .closed_form import TINY, careful, crossed, not_zero
 
-__all__ = ["Strain", "Way", "loaded_way"]
+__all__ = ["LoadedPath", "StepStart", "loaded_path"]
 
 Floats = NDArray[np.float64]
 
 
-class Strain(NamedTuple):
-    """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b).
+class StepStart(NamedTuple):
+    """What a step starts from, for k cells, (k,), or for k cells of b runs, (k, b).
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Strain(NamedTuple):
         Of these points, over the piston's area, s/m².
     exponent : ndarray
         At the start of the step, see `closed_form`.
-    bow : ndarray
-        How far the way without load runs above a straight line on average, see `closed_form.crossed`.
-    finger_bow : ndarray
+    deviation : ndarray
+        Chord deviation of the path without load, see `closed_form.crossed`.
+    finger_deviation : ndarray
         The finger's part in it, with its sign changed.
     lift : ndarray
         Rise of the finger, in 1/m.
@@ -49,15 +49,15 @@ class Strain(NamedTuple):
     openings: Floats
     weights: Floats
     exponent: Floats
-    bow: Floats
-    finger_bow: Floats
+    deviation: Floats
+    finger_deviation: Floats
     lift: Floats
     relaxed: Floats
     idle: NDArray[np.bool_]
 
 
-class Way(NamedTuple):
-    """Result of a step.
+class LoadedPath(NamedTuple):
+    """What comes of a step.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class _Valve:
     ----------
     cell : Cell
     openings, weights : ndarray
-        See `Strain`.
+        See `StepStart`.
     pressure : ndarray
         At the far side of the valve, Pa.
     """
@@ -96,15 +96,17 @@ class _Valve:
         """Return the secant conductance under a load, Pa, at each Gauss point."""
         return self.cell.flow.conductance(self.openings, self.pressure - load)
 
-    def ways(self, load: Floats | float) -> Floats:
-        """Return what flows through each Gauss point's share of the step under a load, Pa, as a way, m."""
+    def rises(self, load: Floats | float) -> Floats:
+        """Return what flows through each Gauss point's share of the step under a load, Pa, as a rise, m."""
         drop = self.pressure - load
-        ways: Floats = self.weights * (self.cell.flow.conductance(self.openings, drop) * drop)
-        return ways
+        rises: Floats = self.weights * (self.cell.flow.conductance(self.openings, drop) * drop)
+        return rises
 
 
-def loaded_way(cell: Cell, m: Floats | float, to_load: Floats | float, share: float, seen: Strain) -> Way:
-    """Return the way of cells over a step in which some of them are strained.
+def loaded_path(
+    cell: Cell, m: Floats | float, to_load: Floats | float, share: float, start: StepStart
+) -> LoadedPath:
+    """Return the paths of cells over a step in which some of them are near overflow.
 
     Parameters
     ----------
@@ -115,66 +117,68 @@ def loaded_way(cell: Cell, m: Floats | float, to_load: Floats | float, share: fl
         Pressure that a unit of tension makes, Pa.
     share : float or ndarray (b,)
         Share of the tension that pushes, the rest being lost to relaxation within the step.
-    seen : Strain
+    start : StepStart
     """
-    valve = _Valve(cell, seen.openings, seen.weights, cell.supply.pressure(seen.openings))
-    decay, free = _mid_load(valve, m, to_load * share, seen)
-    slip = m * free - seen.lift
-    exponent, idle = seen.exponent, seen.idle
-    bent = exponent + seen.bow
-    push, mean = _pressed(bent, slip, np.where(idle, TINY, decay), seen.relaxed)
+    valve = _Valve(cell, start.openings, start.weights, cell.supply.pressure(start.openings))
+    decay, free = _mid_load(valve, m, to_load * share, start)
+    slip = m * free - start.lift
+    exponent, idle = start.exponent, start.idle
+    bent = exponent + start.deviation
+    push, mean = _press(bent, slip, np.where(idle, TINY, decay), start.relaxed)
     push[idle] = 0.0
     mean -= 1.0
-    crossing = (_grown(exponent + slip + push) <= seen.relaxed) != idle
+    crossing = (_exponential(exponent + slip + push) <= start.relaxed) != idle
     if crossing.any():
-        parts = (values[crossing] for values in (exponent, seen.bow, slip, decay, seen.relaxed))
+        parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed))
         push[crossing], mean[crossing] = crossed(*parts)
-    rise = _within(valve, m, to_load, seen, free + push / m)
-    return Way(rise, exponent + (m * rise - seen.lift), mean)
+    rise = _limit(valve, m, to_load, start, free + push / m)
+    return LoadedPath(rise, exponent + (m * rise - start.lift), mean)
 
 
 def _mid_load(
-    valve: _Valve, m: Floats | float, to_load: Floats | float, seen: Strain
+    valve: _Valve, m: Floats | float, to_load: Floats | float, start: StepStart
 ) -> tuple[Floats, Floats]:
     """Return decay and free rise, m, with the secant conductance at the load of mid step.
 
     It is predicted with the one at the start: second order, like the rest.
     """
-    grown = middle = _grown(seen.exponent)
+    grown = middle = _exponential(start.exponent)
     for _ in range(2):
-        conductance = valve.conductance(to_load * np.maximum(middle - seen.relaxed, 0.0))
+        conductance = valve.conductance(to_load * np.maximum(middle - start.relaxed, 0.0))
         decay = m * to_load * (valve.weights * conductance).sum(axis=0) + TINY
         free = (valve.weights * (conductance * valve.pressure)).sum(axis=0)
-        slip = m * free - seen.lift
-        push, _ = _pressed(seen.exponent, slip, decay, seen.relaxed)
-        way = np.where(grown > seen.relaxed, slip + push, slip)
-        middle = 0.5 * (grown + _grown(seen.exponent + way))
+        slip = m * free - start.lift
+        push, _ = _press(start.exponent, slip, decay, start.relaxed)
+        way = np.where(grown > start.relaxed, slip + push, slip)
+        middle = 0.5 * (grown + _exponential(start.exponent + way))
     return decay, free
 
 
-def _pressed(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
+def _press(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
     """Return the load's part of the way, and the mean of exp(e), of cells that stay under load."""
     return careful(exponent, not_zero(slip + decay * relaxed), slip, decay, relaxed)
 
 
-def _within(valve: _Valve, m: Floats | float, to_load: Floats | float, seen: Strain, rise: Floats) -> Floats:
+def _limit(
+    valve: _Valve, m: Floats | float, to_load: Floats | float, start: StepStart, rise: Floats
+) -> Floats:
     """Return a rise, m, held within what the valve can do.
 
     Upwards that is the flow without load. Downwards it is the flow under the largest load there is; and no
     finger pushes a pin deeper than it comes, what the pin falls by itself aside.
     """
-    alone = valve.ways(0.0)
+    alone = valve.rises(0.0)
     highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)
     # Along the parabola of the finger's way, at its middle and its end.
-    middle = 0.5 * seen.lift + 1.5 * seen.finger_bow
-    deepest = np.maximum(seen.exponent - np.minimum(np.minimum(middle, seen.lift), 0.0), 0.0)
-    most = _grown(deepest + m * highest)
-    pushed = np.minimum(valve.ways(to_load * (most - 1.0)), 0.0).sum(axis=0)
+    middle = 0.5 * start.lift + 1.5 * start.finger_deviation
+    deepest = np.maximum(start.exponent - np.minimum(np.minimum(middle, start.lift), 0.0), 0.0)
+    most = _exponential(deepest + m * highest)
+    pushed = np.minimum(valve.rises(to_load * (most - 1.0)), 0.0).sum(axis=0)
     lowest = np.maximum(pushed, fall - deepest / m)
     return np.minimum(np.maximum(rise, lowest), highest)
 
 
-def _grown(exponent: Floats) -> Floats:
+def _exponential(exponent: Floats) -> Floats:
     """Return exp(e), 1 where there is a gap."""
     grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
     return grown

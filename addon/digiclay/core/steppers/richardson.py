@@ -17,7 +17,7 @@ from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, felt, speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
-__all__ = ["Richardson", "RichardsonPlan", "halved"]
+__all__ = ["Richardson", "RichardsonPlan", "extrapolate", "halved"]
 
 Floats = NDArray[np.float64]
 
@@ -61,28 +61,41 @@ class Richardson:
             sum(part.length for part in segments),
         )
 
-    def bind(self, plan: RichardsonPlan, driven: Floats, near: int) -> Movement:
-        """Make ready to move a block of cells on; see `interfaces.Stepper`."""
+    def prepare(self, plan: RichardsonPlan, rows: Floats, near: int) -> Movement:
+        """Prepare to move a block of cells; see `interfaces.Stepper`."""
         closed_form, cell = BernoulliExponential(), plan.coarse.cell
-        coarse = np.empty_like(driven)
-        once = closed_form.bind(plan.coarse, coarse, near)
-        twice = closed_form.bind(plan.fine, driven, near)
-        fine_rows, coarse_rows = driven[: cell.rows], coarse[: cell.rows]
-        pulp = driven[cell.pulp_rows]
+        coarse = np.empty_like(rows)
+        once = closed_form.prepare(plan.coarse, coarse, near)
+        twice = closed_form.prepare(plan.fine, rows, near)
 
         def advance(under: Floats) -> Floats:
-            coarse[:] = driven
-            lowest, highest = plan.speeds.reach(driven[0], under, plan.period)
+            coarse[:] = rows
+            reach = plan.speeds.reach(rows[0], under, plan.period)
             once(under)
             twice(under)
-            np.add(fine_rows, (fine_rows - coarse_rows) / 3.0, out=fine_rows)
-            # Where the two have little in common the extrapolation lies beyond what there can be.
-            np.clip(driven[0], lowest, highest, out=driven[0])
-            np.clip(driven[0], 0.0, cell.actuator.stroke, out=driven[0])
-            np.maximum(pulp, 0.0, out=pulp)
-            return felt(cell, driven, under[-1])
+            extrapolate(cell, rows, coarse, reach)
+            return felt(cell, rows, under[-1])
 
         return advance
+
+
+def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, Floats]) -> None:
+    """Take the leading term of the error out of rows, in place, and keep them within what there can be.
+
+    Parameters
+    ----------
+    cell : Cell
+    fine, coarse : ndarray (r, n) or (r, n, b)
+        Rows moved by halved steps and by whole ones, from the same start.
+    reach : (ndarray, ndarray)
+        The lowest and the highest that the pins can be, m; see `physics.Speeds.reach`.
+    """
+    own, pulp = fine[: cell.rows], fine[cell.pulp_rows]
+    np.add(own, (own - coarse[: cell.rows]) / 3.0, out=own)
+    # Where the two have little in common the extrapolation lies beyond what there can be.
+    np.clip(fine[0], *reach, out=fine[0])
+    np.clip(fine[0], 0.0, cell.actuator.stroke, out=fine[0])
+    np.maximum(pulp, 0.0, out=pulp)
 
 
 def halved(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:

@@ -116,7 +116,14 @@ class Fitted:
 
 
 def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
-    """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
+    """Give what a scene could do without: parts, physics steps, and cells that creep to their height.
+
+    Parameters
+    ----------
+    scene : Scene
+    budget : float
+        Error of height, m.
+    """
     simulation = scene.simulation
     steps = simulation.steps
     for fewer in range(1, steps):

@@ -78,7 +78,15 @@ class Drag(Parameters):
     length: float = quantity(42e-3, "how far it drags", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
+        """Return the finger's path, and when it starts and ends to drag, s, for a surface at `rest`, m.
+
+        Parameters
+        ----------
+        speed : float
+            Of the drag, m/s.
+        rest : float
+            Height of the surface, m.
+        """
         left, right, down, level = (
             -0.5 * self.length,
             0.5 * self.length,
@@ -107,7 +115,15 @@ class Lift(Parameters):
     rise: float = quantity(18e-3, "how far it lifts", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
+        """Return the finger's path, and when it starts and ends to lift, s, for a surface at `rest`, m.
+
+        Parameters
+        ----------
+        speed : float
+            The greatest on the way, m/s.
+        rest : float
+            Height of the surface, m.
+        """
         down, start = rest - self.press, 2.0
         # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
         end = start + 1.5 * self.rise / speed
@@ -127,7 +143,16 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
 
 
 def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Trial]:
-    """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it."""
+    """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its device and method; its trajectory is left aside.
+    way : Drag or Lift
+    speed : float
+        m/s.
+    """
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)

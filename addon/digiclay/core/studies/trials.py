@@ -63,7 +63,13 @@ class Trial:
         }
 
     def between(self, start: float, end: float) -> dict[str, NDArray[Any]]:
-        """Return the history's rows from one time to another, s."""
+        """Return the history's rows from one time to another, s.
+
+        Parameters
+        ----------
+        start, end : float
+            s.
+        """
         moments = self.history["time"]
         rows = (moments >= start - 1e-9) & (moments <= end + 1e-9)
         return {name: array if name == "position" else array[rows] for name, array in self.history.items()}
