@@ -38,7 +38,16 @@ ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np
 
 
 def mesh(name: str, shape: Shape, smooth_below: float = 0.6) -> Any:
-    """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad."""
+    """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad.
+
+    Parameters
+    ----------
+    name : str
+    shape : Shape
+        Lengths in Blender units.
+    smooth_below : float
+        rad.
+    """
     vertices, faces = shape
     made = bpy.data.meshes.new(name)
     made.from_pydata(vertices.tolist(), [], faces)
@@ -48,7 +57,13 @@ def mesh(name: str, shape: Shape, smooth_below: float = 0.6) -> Any:
 
 
 def points(name: str, count: int) -> Any:
-    """Make a mesh of `count` loose vertices with the attributes of a bed."""
+    """Make a mesh of `count` loose vertices with the attributes of a bed.
+
+    Parameters
+    ----------
+    name : str
+    count : int
+    """
     made = bpy.data.meshes.new(name)
     made.vertices.add(count)
     for attribute, (kind, _, _) in ATTRIBUTES.items():
@@ -113,7 +128,14 @@ def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
 
 
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
-    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it."""
+    """Give the ellipsoid in a fingertip the finger's semi-axes, and the empty a size to be seen about it.
+
+    Parameters
+    ----------
+    tip : bpy.types.Object
+        The empty.
+    finger : Fingertip
+    """
     axes = np.array([finger.length, finger.width, finger.height])
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
@@ -181,7 +203,15 @@ def uniform(bed: Any) -> float:
 
 
 def linear(colour: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
-    """Return an sRGB colour in the linear light of Blender's materials."""
+    """Return an sRGB colour in the linear light of Blender's materials.
+
+    Parameters
+    ----------
+    colour : (float, float, float)
+        sRGB, 0 to 1.
+    alpha : float
+        0 to 1.
+    """
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
     return r, g, b, alpha
 

@@ -43,7 +43,14 @@ def shader_nodes(owner: Any) -> Any:
 
 
 def node_setting(modifier: Any, name: str) -> Any:
-    """Return what a geometry nodes modifier sets an input of its tree to."""
+    """Return what a geometry nodes modifier sets an input of its tree to.
+
+    Parameters
+    ----------
+    modifier : bpy.types.NodesModifier
+    name : str
+        Of the input.
+    """
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
         return getattr(modifier.properties.inputs, identifier).value
@@ -51,7 +58,16 @@ def node_setting(modifier: Any, name: str) -> Any:
 
 
 def set_node_setting(modifier: Any, name: str, value: Any) -> None:
-    """Set an input of a geometry nodes modifier's tree, for the object that has the modifier."""
+    """Set an input of a geometry nodes modifier's tree, for the object that has the modifier.
+
+    Parameters
+    ----------
+    modifier : bpy.types.NodesModifier
+    name : str
+        Of the input.
+    value : object
+        Of the input's kind.
+    """
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).value = value
@@ -61,7 +77,15 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
 
 
 def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
-    """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value."""
+    """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value.
+
+    Parameters
+    ----------
+    modifier : bpy.types.NodesModifier
+    name : str
+        Of the input.
+    frame : int
+    """
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).keyframe_insert("value", frame=frame)

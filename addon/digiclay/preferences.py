@@ -30,7 +30,13 @@ class Choices:
 
 
 def take_palette(preferences: Any, context: Any) -> None:
-    """Recolour the beds of the open file."""
+    """Recolour the beds of the open file.
+
+    Parameters
+    ----------
+    preferences : bpy.types.AddonPreferences
+    context : bpy.types.Context
+    """
     palettes.wear(preferences.palette)
 
 

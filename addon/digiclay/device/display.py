@@ -38,6 +38,11 @@ def picked(bed: Any) -> tuple[int, ...]:
 def pick(bed: Any, pins: Iterable[int]) -> None:
     """Choose the pins whose heights the overlay shows.
 
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    pins : iterable of int
+
     Raises
     ------
     DigiclayError

@@ -105,7 +105,16 @@ class Instant:
     def at_rest(
         cls, layout: Layout, actuator: Actuator | None = None, finger: Fingertip | None = None
     ) -> Instant:
-        """Return a bed nobody has touched yet, the fingertip above its centre."""
+        """Return a bed nobody has touched yet, the fingertip above its centre.
+
+        Parameters
+        ----------
+        layout : Layout
+        actuator : Actuator, optional
+            By default `Actuator()`.
+        finger : Fingertip, optional
+            By default `Fingertip()`.
+        """
         actuator, finger = actuator or Actuator(), finger or Fingertip()
         bed = grid(layout)
         rest = actuator.rest_height

@@ -31,7 +31,15 @@ HEAD = 0.36
 
 
 def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None = None) -> Any:
-    """Make an object of data (None: an empty), marked with its role."""
+    """Make an object of data (None: an empty), marked with its role.
+
+    Parameters
+    ----------
+    data : bpy.types.ID or None
+    name, role : str
+    collection : bpy.types.Collection
+    parent : bpy.types.Object, optional
+    """
     made = bpy.data.objects.new(name, data)
     made[ROLE] = role
     made.parent = parent
@@ -40,7 +48,16 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
 
 
 def material(name: str, colour: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
-    """Return the material of a part, as the user may have changed it, or make it."""
+    """Return the material of a part, as the user may have changed it, or make it.
+
+    Parameters
+    ----------
+    name : str
+    colour : (float, float, float)
+        sRGB, 0 to 1.
+    roughness, alpha : float
+        0 to 1.
+    """
     found = next((m for m in bpy.data.materials if m.get(ROLE) == name), None)
     if found is not None:
         return found
@@ -73,7 +90,14 @@ class Sources(NamedTuple):
 
 
 def sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
-    """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m."""
+    """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m.
+
+    Parameters
+    ----------
+    instant : Instant
+    length, deck, rim : float
+        Length of the pins, floor and upper edge of the housing, m.
+    """
     segments = 28 if len(instant.height) <= MANY else 12
     shape = primitives.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
@@ -115,6 +139,12 @@ def fingertip(collection: Any, bed: Any) -> Any:
 
     The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
     of the device, kept in the ellipsoid's scale.
+
+    Parameters
+    ----------
+    collection : bpy.types.Collection
+    bed : bpy.types.Object
+        Its parent.
     """
     made = marked(None, "Digital Clay Fingertip", FINGERTIP, collection, parent=bed)
     bed[FINGER] = made

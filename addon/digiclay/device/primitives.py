@@ -76,7 +76,15 @@ def ball(segments: int = 64) -> Shape:
 
 
 def arrow(radius: float, segments: int = 16) -> Shape:
-    """Return an arrow of length 1 that points down and ends at the origin, its head of a radius."""
+    """Return an arrow of length 1 that points down and ends at the origin, its head of a radius.
+
+    Parameters
+    ----------
+    radius : float
+        Of its head.
+    segments : int
+        Around it.
+    """
     shaft = 0.4 * radius
     return _revolve([(0.0, 0.0), (radius, 0.3), (shaft, 0.3), (shaft, 1.0), (0.0, 1.0)], segments)
 

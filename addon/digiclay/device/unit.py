@@ -97,7 +97,13 @@ def mend(found: Faults) -> None:
 
 
 def give_fingertip(bed: Any, scene: Scene) -> str:
-    """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
+    """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    scene : Scene
+    """
     if view.fingertip_of(bed) is not None:
         return ""
     tip = bed.get(FINGER)

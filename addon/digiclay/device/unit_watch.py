@@ -73,7 +73,13 @@ def _gone_on(came: str) -> bool:
 
 @bpy.app.handlers.persistent
 def changed(scene: Any, graph: Any = None) -> None:
-    """Look soon: objects, or what is shown of them, may have come or gone."""
+    """Look soon: objects, or what is shown of them, may have come or gone.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    graph : bpy.types.Depsgraph, optional
+    """
     if graph is None or graph.id_type_updated("SCENE"):
         _look_soon()
 

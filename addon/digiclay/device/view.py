@@ -70,7 +70,14 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
 
 
 def tree_of(instant: Instant, lowest: float | None = None) -> Any:
-    """Make the geometry nodes that draw pins and housing of a bed; see `build`."""
+    """Make the geometry nodes that draw pins and housing of a bed; see `build`.
+
+    Parameters
+    ----------
+    instant : Instant
+    lowest : float, optional
+        Lowest pin top the housing must have room for, m; by default the instant's own.
+    """
     lowest = float(instant.height.min()) if lowest is None else lowest
     # The rim stays below most tops, so that the surface and little of the rods is seen over it.
     rim = float(np.median(instant.height)) - 1.2 * instant.pitch
@@ -82,7 +89,13 @@ def tree_of(instant: Instant, lowest: float | None = None) -> Any:
 
 
 def dress(bed: Any, instant: Instant) -> None:
-    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
+    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    instant : Instant
+    """
     _modifier(bed).node_group = tree_of(instant, 0.0)
 
 
@@ -98,7 +111,14 @@ def guard(bed: Any) -> None:
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included."""
+    """Show another instant of the same bed, its fingertip's pose included.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    instant : Instant
+        Of the same bed.
+    """
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 
@@ -107,6 +127,12 @@ def show_state(bed: Any, system: System, state: State) -> None:
     """Show the pins of a running session; the fingertip is the user's and stays where it is.
 
     Forces are gathered and written only while something drawn tells them.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    system : System
+    state : State
     """
     shown = {"mode": state.mode()}
     if wants_force(bed):
@@ -116,6 +142,11 @@ def show_state(bed: Any, system: System, state: State) -> None:
 
 def colour_by(bed: Any, what: str) -> None:
     """Colour the pins by what they do ("mode") or by the force on them ("force").
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    what : str
 
     Raises
     ------
@@ -143,12 +174,25 @@ def shows_force(bed: Any) -> bool:
 
 
 def scale_colours(bed: Any, top: float) -> None:
-    """Set the force from which on a pin has the last colour, N."""
+    """Set the force from which on a pin has the last colour, N.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    top : float
+        N.
+    """
     set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
-    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
+    """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    on : bool
+    """
     set_node_setting(_modifier(bed), ARROWS, bool(on))
     tip = fingertip_of(bed)
     ball = parts.ellipsoid(tip) if tip is not None else None
@@ -167,7 +211,14 @@ def arrow_length(bed: Any) -> float:
 
 
 def scale_arrows(bed: Any, length: float) -> None:
-    """Set the length of the arrow of 1 N, m of the device."""
+    """Set the length of the arrow of 1 N, m of the device.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    length : float
+        m.
+    """
     set_node_setting(_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
 
 

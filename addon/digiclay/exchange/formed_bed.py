@@ -69,7 +69,14 @@ def forget(bed: Any) -> None:
 
 
 def model(bed: Any, **told: Any) -> Model:
-    """Return what is to be made of a bed; the flat ends of its pins are those of its device."""
+    """Return what is to be made of a bed; the flat ends of its pins are those of its device.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    **told
+        Fields of `Model`.
+    """
     return Model(cap=_scene(bed).actuator.bore / 2.0, **told)
 
 

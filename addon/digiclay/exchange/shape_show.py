@@ -76,13 +76,27 @@ def relief_of(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
 
 
 def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
-    """Display a shape on a bed; return how it was fitted, and what the display is off by, m."""
+    """Display a shape on a bed; return how it was fitted, and what the display is off by, m.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    relief : Relief
+    shape : Shape
+        How it is fitted.
+    """
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fitted(shape, relief, grid(scene.layout), scene.actuator))
 
 
 def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
-    """Display the shape a file or sample holds on a bed; see `show_relief`."""
+    """Display the shape a file or sample holds on a bed; see `show_relief`.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    shape : Shape
+    """
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fitted_to(shape, grid(scene.layout), scene.actuator))
 

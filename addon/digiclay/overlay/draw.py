@@ -23,7 +23,14 @@ FONT = 0
 
 
 def draw(picture: Picture, width: float, height: float) -> None:
-    """Draw a picture into a region of a size in pixels."""
+    """Draw a picture into a region of a size in pixels.
+
+    Parameters
+    ----------
+    picture : Picture
+    width, height : float
+        Of the region, pixels.
+    """
     gpu.state.blend_set("ALPHA")
     try:
         for box in picture.boxes:

@@ -64,13 +64,27 @@ def look(back: Colour, ink: Colour) -> Look:
 
 
 def contrast(one: Colour, other: Colour) -> float:
-    """Return the contrast of two colours as the guidelines define it, 1 to 21."""
+    """Return the contrast of two colours as the guidelines define it, 1 to 21.
+
+    Parameters
+    ----------
+    one, other : (float, float, float)
+        Colours.
+    """
     low, high = sorted((_luminance(one), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
 
 def legible(colour: Colour, back: Colour, least: float) -> Colour:
-    """Return a colour, mixed with as much black or white as it needs for a contrast to what is behind it."""
+    """Return a colour, mixed with as much black or white as it needs for a contrast to what is behind it.
+
+    Parameters
+    ----------
+    colour, back : (float, float, float)
+        The colour, and what is behind it.
+    least : float
+        Contrast, 1 to 21.
+    """
     end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
     for share in np.linspace(0.0, 1.0, 41):
         mixed = _mixed(colour, end, float(share))

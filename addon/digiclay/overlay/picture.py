@@ -73,6 +73,10 @@ def axis(low: float, high: float) -> tuple[float, float]:
 
     Steps are 1, 2 or 5 times a power of ten, and at most ten of them make the axis, so that
     the ends do not jump about with every value.
+
+    Parameters
+    ----------
+    low, high : float
     """
     span = high - low
     step = 10.0 ** np.floor(np.log10(span))

@@ -93,7 +93,16 @@ class Pen:
     scale: float
 
     def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
-        """Write a row, one text to the left and one to the right; return where the next one begins."""
+        """Write a row, one text to the left and one to the right; return where the next one begins.
+
+        Parameters
+        ----------
+        top : float
+            Pixels.
+        left, right : str
+        small : bool
+            In small letters.
+        """
         size = (SMALL if small else LETTERS) * self.scale
         colour = self.look.faint if small else self.look.ink
         y = top - 0.75 * ROW * self.scale
@@ -103,7 +112,15 @@ class Pen:
         return top - ROW * self.scale
 
     def frame(self, top: float, low: str, high: str) -> Box:
-        """Draw the frame of a plot with the ends of its axis; return the box the curves go into."""
+        """Draw the frame of a plot with the ends of its axis; return the box the curves go into.
+
+        Parameters
+        ----------
+        top : float
+            Pixels.
+        low, high : str
+            Ends of the axis.
+        """
         box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
         for y, label, lift in ((box.y, low, step), (top, high, -size)):
@@ -113,7 +130,19 @@ class Pen:
         return box
 
     def curve(self, told: Told, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1) -> None:
-        """Draw a curve into the frame of a plot: that of a pin, or the force."""
+        """Draw a curve into the frame of a plot: that of a pin, or the force.
+
+        Parameters
+        ----------
+        told : Told
+        value : ndarray (t,)
+        ends : (float, float)
+            Of the axis, in the unit of the values.
+        box : Box
+            From `frame`.
+        pin : int
+            Which pin of the plot; below 0: the force.
+        """
         colour = self.look.force if pin < 0 else self.look.pins[pin]
         points = scaled(told.time, value, told.window, ends, box)
         if len(points) > 1:
@@ -140,7 +169,15 @@ def head_height(told: Told) -> float:
 
 
 def head(told: Told, pen: Pen, top: float) -> None:
-    """Name the bed, the method and how well the simulation keeps up."""
+    """Name the bed, the method and how well the simulation keeps up.
+
+    Parameters
+    ----------
+    told : Told
+    pen : Pen
+    top : float
+        Pixels.
+    """
     speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
     top = pen.row(top, told.name, "paused" if told.paused else speed)
     top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
@@ -153,7 +190,15 @@ def force_height(told: Told) -> float:
 
 
 def force(told: Told, pen: Pen, top: float) -> None:
-    """Draw the total force over the last seconds, its set point dashed."""
+    """Draw the total force over the last seconds, its set point dashed.
+
+    Parameters
+    ----------
+    told : Told
+    pen : Pen
+    top : float
+        Pixels.
+    """
     now = force_words(float(told.force[-1])) if told.force.size else ""
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
     top = pen.row(top, f"Total force  {now}", asked)
@@ -179,7 +224,15 @@ def heights_height(told: Told) -> float:
 
 
 def heights(told: Told, pen: Pen, top: float) -> None:
-    """Draw the heights of the picked pins over the last seconds."""
+    """Draw the heights of the picked pins over the last seconds.
+
+    Parameters
+    ----------
+    told : Told
+    pen : Pen
+    top : float
+        Pixels.
+    """
     if not told.pins:
         pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
         return
@@ -206,7 +259,15 @@ def scale_height(told: Told) -> float:
 
 
 def scale(told: Told, pen: Pen, top: float) -> None:
-    """Draw the colours of the force on a pin."""
+    """Draw the colours of the force on a pin.
+
+    Parameters
+    ----------
+    told : Told
+    pen : Pen
+    top : float
+        Pixels.
+    """
     if told.top is None:
         return
     top = pen.row(top, "Force on a pin")
@@ -222,7 +283,15 @@ def modes_height(told: Told) -> float:
 
 
 def modes(told: Told, pen: Pen, top: float) -> None:
-    """List how many pins are in each mode that occurs, with its colour."""
+    """List how many pins are in each mode that occurs, with its colour.
+
+    Parameters
+    ----------
+    told : Told
+    pen : Pen
+    top : float
+        Pixels.
+    """
     top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):
         x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale

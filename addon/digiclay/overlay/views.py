@@ -70,7 +70,14 @@ def _again() -> float:
 
 
 def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:
-    """Return the content of the overlay for a bed and its session."""
+    """Return the content of the overlay for a bed and its session.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    session : Running
+    colours : dict of Mode to (float, float, float)
+    """
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else asked(scene.set_point, 0))
     errors = session.errors

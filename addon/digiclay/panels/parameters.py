@@ -164,7 +164,14 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
 
 
 def in_use(settings: Any, section: str) -> bool:
-    """Return whether a part is simulated: neither it nor the one it belongs to is switched off."""
+    """Return whether a part is simulated: neither it nor the one it belongs to is switched off.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+    section : str
+        Of the scene file.
+    """
     needed = NEEDS.get(section)
     switches = [name for name in (section, needed) if name in OPTIONAL]
     return all(getattr(settings, f"use_{name}") for name in switches)

@@ -32,7 +32,15 @@ def frames_beside(out: Path) -> Iterator[Path]:
 
 
 def encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
-    """Make a film of pictures that lie in one folder."""
+    """Make a film of pictures that lie in one folder.
+
+    Parameters
+    ----------
+    frames : list of Path
+        Pictures, in their order.
+    out : Path
+    looks : Moving
+    """
     scene = bpy.data.scenes.new("Digital Clay Frames")
     scene.view_settings.view_transform = "Standard"
     scene.frame_start, scene.frame_end = 1, len(frames)

@@ -52,7 +52,15 @@ class Strip:
     per_second: float
 
     def show(self, time: float, force: float) -> None:
-        """Show an instant: its time, s, and the total force then, N."""
+        """Show an instant: its time, s, and the total force then, N.
+
+        Parameters
+        ----------
+        time : float
+            s.
+        force : float
+            N.
+        """
         now = (time - self.first) * self.per_second
         place = np.minimum(self.place, now)
         # Columns still to come are drawn together at the cursor, as a face of no width.
@@ -104,7 +112,17 @@ def strip(front: Front, time: Floats, force: Floats, set_point: float | None) ->
 
 
 def columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
-    """Return times and forces of at most so many columns: rows that share one give it their largest force."""
+    """Return times and forces of at most so many columns: rows that share one give it their largest force.
+
+    Parameters
+    ----------
+    time : ndarray (t,)
+        s.
+    force : ndarray (t,)
+        N.
+    most : int
+        Columns.
+    """
     count = len(time)
     starts = np.unique(np.linspace(0, count, min(count, most), endpoint=False).astype(np.intp))
     return time[starts], np.maximum.reduceat(force, starts)

@@ -56,7 +56,15 @@ class Front:
 
     @classmethod
     def before(cls, scene: Any, camera: Any, half: tuple[float, float]) -> Front:
-        """Return the plane of a camera; `half` of the frame's width and height at depth 1."""
+        """Return the plane of a camera; `half` of the frame's width and height at depth 1.
+
+        Parameters
+        ----------
+        scene : bpy.types.Scene
+        camera : bpy.types.Object
+        half : (float, float)
+            Half of the frame's width and height at depth 1.
+        """
         depth = camera.data.clip_start * 20.0
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
 
@@ -86,7 +94,17 @@ class Front:
         return self.note >= READ_NOTE * self.pixel
 
     def put(self, part: Any, x: float, y: float, colour: Colour, layer: int = 0) -> Any:
-        """Hang an object at a place of the plane; layers with a higher number lie behind."""
+        """Hang an object at a place of the plane; layers with a higher number lie behind.
+
+        Parameters
+        ----------
+        part : bpy.types.Object
+        x, y : float
+            Place in the plane.
+        colour : (float, float, float)
+        layer : int
+            Higher numbers lie behind.
+        """
         behind = 1.0 + LAYER * layer
         part.parent = self.camera
         part.location = (x * behind, y * behind, -self.depth * behind)
@@ -98,7 +116,17 @@ class Front:
         return part
 
     def write(self, body: str, size: float, x: float, y: float, colour: Colour, align: str = "LEFT") -> Any:
-        """Write a text; return the object, whose `data.body` may be changed."""
+        """Write a text; return the object, whose `data.body` may be changed.
+
+        Parameters
+        ----------
+        body : str
+        size, x, y : float
+            Size of the letters and place, in the plane.
+        colour : (float, float, float)
+        align : str
+            Blender's word for the side that stands at x.
+        """
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
         return self.put(bpy.data.objects.new(body, text), x, y, colour)
@@ -106,7 +134,17 @@ class Front:
     def box(
         self, name: str, low: tuple[float, float], high: tuple[float, float], colour: Colour, layer: int
     ) -> Any:
-        """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left."""
+        """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left.
+
+        Parameters
+        ----------
+        name : str
+        low, high : (float, float)
+            Lower left and upper right corner.
+        colour : (float, float, float)
+        layer : int
+            Higher numbers lie behind.
+        """
         width, height = high[0] - low[0], high[1] - low[1]
         corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
         part = bpy.data.objects.new(name, bridge.mesh(name, (corners, [(0, 1, 2, 3)])))
@@ -114,7 +152,13 @@ class Front:
 
 
 def of_modes(front: Front, modes: Sequence[Mode]) -> None:
-    """List modes down the picture's left side, each with a dot of its colour; small pictures explain none."""
+    """List modes down the picture's left side, each with a dot of its colour; small pictures explain none.
+
+    Parameters
+    ----------
+    front : Front
+    modes : sequence of Mode
+    """
     size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
     disc = primitives.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
@@ -155,7 +199,13 @@ def of_forces(front: Front) -> None:
 
 
 def flat(name: str, colour: Colour) -> Any:
-    """Make a material of one colour that no light changes."""
+    """Make a material of one colour that no light changes.
+
+    Parameters
+    ----------
+    name : str
+    colour : (float, float, float)
+    """
     material = bpy.data.materials.new(name)
     *light, alpha = linear(colour)
     # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue allows.

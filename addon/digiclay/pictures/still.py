@@ -87,7 +87,13 @@ def render_still(
 
 
 def dress(bed: Any, looks: Picture) -> None:
-    """Colour the pins as asked, and show arrows or not."""
+    """Colour the pins as asked, and show arrows or not.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    looks : Picture
+    """
     view.colour_by(bed, looks.colour)
     view.show_arrows(bed, looks.arrows)
 
@@ -133,7 +139,15 @@ def why_not(path: Path) -> str:
 
 
 def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
-    """Add a scene with all that decides a picture besides the scene's contents."""
+    """Add a scene with all that decides a picture besides the scene's contents.
+
+    Parameters
+    ----------
+    name : str
+    looks : Picture
+    denoise : bool
+        Of Cycles.
+    """
     scene = bpy.data.scenes.new(name)
     render, engine = scene.render, looks.engine
     render.engine = ENGINES[engine]

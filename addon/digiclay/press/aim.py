@@ -53,6 +53,12 @@ def target(context: Any, xy: tuple[float, float]) -> Target | None:
 
     A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
     through; pressing on it says why.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    xy : (float, float)
+        Pixels in the region.
     """
     found, nearest = None, np.inf
     for bed in context.visible_objects:
@@ -89,6 +95,16 @@ def surface(bed: Any) -> tuple[Grid, Floats]:
 def meets(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
     """Return where the ray through a pixel meets a bed's pins (3,), m; None when it passes by.
 
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    cells : Grid
+    height : ndarray (n,)
+        Pin tops, m.
+    xy : (float, float)
+        Pixels in the region.
+
     Raises
     ------
     DigiclayError
@@ -99,7 +115,15 @@ def meets(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, 
 
 
 def on_screen(context: Any, bed: Any, points: Floats) -> Floats:
-    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
+    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    points : ndarray (k, 3)
+        m.
+    """
     to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
     clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]

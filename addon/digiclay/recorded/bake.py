@@ -57,7 +57,14 @@ class Moments:
 
 
 def frames_in(take: Take, rate: float) -> NDArray[np.intp]:
-    """Return the control period, 0 to t, that each frame of a take shows: the nearest one."""
+    """Return the control period, 0 to t, that each frame of a take shows: the nearest one.
+
+    Parameters
+    ----------
+    take : Take
+    rate : float
+        Frames a second.
+    """
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
     return np.minimum(np.rint(np.arange(count) / (rate * period)).astype(np.intp), take.periods)

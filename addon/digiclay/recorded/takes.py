@@ -85,7 +85,14 @@ def recorded(session: Running) -> Take | None:
 
 
 def keep(bed: Any, take: Take, name: str = "") -> Entry:
-    """Add a take to a bed; without a name it gets its number."""
+    """Add a take to a bed; without a name it gets its number.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    take : Take
+    name : str
+    """
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
     held = bed[PROPERTY]
@@ -95,7 +102,13 @@ def keep(bed: Any, take: Take, name: str = "") -> Entry:
 
 
 def keep_recorded(bed: Any, session: Running) -> str:
-    """Keep what a session has recorded before its recording ends; return words about it, empty without."""
+    """Keep what a session has recorded before its recording ends; return words about it, empty without.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    session : Running
+    """
     take = recorded(session)
     if take is None:
         return ""
@@ -105,6 +118,12 @@ def keep_recorded(bed: Any, session: Running) -> str:
 
 def read(bed: Any, number: str = "") -> Take:
     """Return a take of a bed; see `find`.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    number : str
+        As `find` takes it.
 
     Raises
     ------
@@ -116,6 +135,11 @@ def read(bed: Any, number: str = "") -> Take:
 
 def remove(bed: Any, number: str) -> None:
     """Take a take away for good.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    number : str
 
     Raises
     ------

@@ -80,7 +80,15 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
 
 
 def listed(values: tuple[float, ...], power: int) -> str:
-    """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``."""
+    """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``.
+
+    Parameters
+    ----------
+    values : tuple of float
+        SI.
+    power : int
+        Of ten, shown units per SI unit.
+    """
     return ", ".join(repr(shown(value, power)).removesuffix(".0") for value in values)
 
 

@@ -44,7 +44,13 @@ def device(preset: str, layout: Layout, method: str) -> Scene:
 
 
 def laid_out(scene: Scene, layout: Layout) -> Scene:
-    """Return a scene with another plan of the bed; a blister wider than the bed is made to fit."""
+    """Return a scene with another plan of the bed; a blister wider than the bed is made to fit.
+
+    Parameters
+    ----------
+    scene : Scene
+    layout : Layout
+    """
     return replace(scene, layout=layout, blister=_fitted(scene.blister, layout))
 
 

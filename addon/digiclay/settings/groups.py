@@ -28,7 +28,13 @@ PRESET_WORDS = {
 
 
 def take_preset(settings: Any, context: Any) -> None:
-    """Set what the chosen preset, or another one, changes of the defaults."""
+    """Set what the chosen preset, or another one, changes of the defaults.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+    context : bpy.types.Context
+    """
     changed = {
         (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
     }
@@ -42,7 +48,13 @@ def take_preset(settings: Any, context: Any) -> None:
 
 
 def take_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen method is made for."""
+    """Set the blister the chosen method is made for.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+    context : bpy.types.Context
+    """
     values = METHODS[settings.method].blister
     if values is None:
         return
@@ -55,7 +67,13 @@ def take_method(settings: Any, context: Any) -> None:
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
-    """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
+    """Set the share of the contact law a cell carries, which depends on how close the cells stand.
+
+    Parameters
+    ----------
+    layout : bpy.types.PropertyGroup
+    context : bpy.types.Context
+    """
     settings = layout.id_data.digiclay
     kind = parameters("contact", settings.method)
     if layout.arrangement == "hexagonal":
@@ -65,7 +83,13 @@ def take_arrangement(layout: Any, context: Any) -> None:
 
 
 def take_size(fingertip: Any, context: Any) -> None:
-    """Show the fingertip in its new size."""
+    """Show the fingertip in its new size.
+
+    Parameters
+    ----------
+    fingertip : bpy.types.PropertyGroup
+    context : bpy.types.Context
+    """
     bed = fingertip.id_data
     tip = view.fingertip_of(bed)
     kind = parameters("fingertip", bed.digiclay.method)
@@ -104,7 +128,15 @@ def use_properties() -> dict[str, Any]:
 
 
 def made(name: str, words: str, properties: dict[str, Any]) -> type:
-    """Make a property group of properties."""
+    """Make a property group of properties.
+
+    Parameters
+    ----------
+    name, words : str
+        Of the class, and its docstring.
+    properties : dict
+        By name.
+    """
     content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 

@@ -54,6 +54,11 @@ def path(name: str) -> Path:
 def save(name: str, scene: Scene) -> Path:
     """Save a scene as a preset, in place of one of the same name.
 
+    Parameters
+    ----------
+    name : str
+    scene : Scene
+
     Raises
     ------
     OutputError

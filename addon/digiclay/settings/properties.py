@@ -109,7 +109,14 @@ def stale(bed: Any) -> str:
 
 
 def part_group(settings: Any, section: str) -> Any:
-    """Return the property group of a section; that of the control is its method's."""
+    """Return the property group of a section; that of the control is its method's.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+    section : str
+        Of the scene file.
+    """
     if section == "control":
         return getattr(settings.control, settings.method)
     return getattr(settings, section)

@@ -43,7 +43,15 @@ def unit_of(unit: str, default: object) -> tuple[str, int]:
 
 
 def shown(value: float, power: int) -> float:
-    """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm."""
+    """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm.
+
+    Parameters
+    ----------
+    value : float
+        SI.
+    power : int
+        Of ten, shown units per SI unit.
+    """
     return float(Decimal(repr(value)).scaleb(power))
 
 
@@ -52,6 +60,13 @@ def si(value: float, power: int) -> float:
 
     The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
     Whatever is not finite is handed on, for the part's own rules to refuse.
+
+    Parameters
+    ----------
+    value : float
+        In the shown unit.
+    power : int
+        Of ten, shown units per SI unit.
     """
     if not math.isfinite(value):
         return value

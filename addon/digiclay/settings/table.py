@@ -22,7 +22,13 @@ Notes = dict[str, tuple[Any, Any]]
 
 
 def write(group: Any, part: Parameters) -> Notes:
-    """Write a part's parameters into its property group; return what the properties cannot hold."""
+    """Write a part's parameters into its property group; return what the properties cannot hold.
+
+    Parameters
+    ----------
+    group : bpy.types.PropertyGroup
+    part : Parameters
+    """
     notes: Notes = {}
     for name, field in _fields(type(part)).items():
         value = getattr(part, name)
@@ -34,7 +40,18 @@ def write(group: Any, part: Parameters) -> Notes:
 
 
 def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
-    """Write one parameter, in SI, into its property."""
+    """Write one parameter, in SI, into its property.
+
+    Parameters
+    ----------
+    group : bpy.types.PropertyGroup
+    kind : type
+        Class of the part.
+    name : str
+        Of the parameter.
+    value : object
+        SI.
+    """
     power = _power(_fields(kind)[name])
     if isinstance(value, tuple):
         value = listed(value, power)
@@ -46,7 +63,16 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
 
 
 def reset(group: Any, kind: type[Parameters], name: str) -> None:
-    """Write one parameter's default into its property."""
+    """Write one parameter's default into its property.
+
+    Parameters
+    ----------
+    group : bpy.types.PropertyGroup
+    kind : type
+        Class of the part.
+    name : str
+        Of the parameter.
+    """
     assign(group, kind, name, _fields(kind)[name].default)
 
 
