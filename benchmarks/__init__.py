@@ -1,1 +1,1 @@
-"""What a session costs, how exact it is, and what it withstands: `python -m benchmarks`, from a checkout."""
+"""Benchmarks of time, error and stability: `python -m benchmarks`, in a checkout."""

@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: what a session costs, how exact it is, and what it withstands."""
+"""Command ``python -m benchmarks``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m benchmarks scale``: the same finger on beds from 625 pins to a million."""
+"""``python -m benchmarks scale``: the same fingertip path on beds from 625 pins to a million."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DURATION = 1.6
 
 @dataclass(frozen=True)
 class Size:
-    """What a bed of one size costs.
+    """Cost of a bed of one size.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The parser of all benchmarks: one file a benchmark; this one only gathers them."""
+"""Parser of all benchmarks."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ __all__ = ["parser"]
 
 EXAMPLES = """\
 examples:
-  python -m benchmarks session        what a control period costs, part by part
-  python -m benchmarks stiff          what the steppers withstand
-  python -m benchmarks precision      error against run time, beside SciPy
-  python -m benchmarks terms tap      what each part of the model costs, and what leaving it out does
+  python -m benchmarks session        time of a control period, part by part
+  python -m benchmarks stiff          errors in stiff and extreme cases
+  python -m benchmarks precision      error over run time, beside SciPy
+  python -m benchmarks terms tap      cost and effect of each part of the model
   python -m benchmarks scale          a control period from 625 pins to a million
-  python -m benchmarks stack          sessions a second, one at a time and many in one call
-  python -m benchmarks export         writing a bed as a mesh, from 625 pins to a million
+  python -m benchmarks stack          sessions a second, alone and in a batch
+  python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
 """
 

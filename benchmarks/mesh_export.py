@@ -1,4 +1,4 @@
-"""``python -m benchmarks export``: what it takes to write a bed as a mesh, up to a million pins."""
+"""``python -m benchmarks export``: time and memory of mesh files of up to a million pins."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WHAT = (*(("solid", name) for name in FORMATS), ("surface", "stl"), ("pins", "st
 
 @dataclass(frozen=True)
 class Export:
-    """What an export costs.
+    """Cost of an export.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Counting numpy's calls: arrays that take down what is done with them.
+"""Counter of numpy calls: arrays that record their operations.
 
 A control period's cost is the number of numpy calls in it, and not seconds on a shared
 machine: the count is the same wherever it is taken.

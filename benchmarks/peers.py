@@ -1,4 +1,4 @@
-"""The same problems by SciPy: what our steppers are measured by.
+"""Peers of the steppers: the same problems, solved by SciPy.
 
 The peers get every advantage: rates with few numpy calls, only the cells that take part by the
 problem's sets, the banded Jacobian where a solver knows one, and a solver's own Fortran loop where

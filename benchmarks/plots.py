@@ -1,4 +1,4 @@
-"""The style of the pictures of the benchmarks, and the work-precision plot.
+"""Style of the benchmark plots, and the work-precision plot.
 
 Colours are Okabe and Ito's palette; markers and line styles say the same once more.
 """

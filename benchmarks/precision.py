@@ -52,7 +52,7 @@ def add(kinds: Any) -> None:
     parser.add_argument(
         "--whole-bed",
         action="store_true",
-        help="then also peers that are not told which cells take part, on the paper's bed (11 minutes more)",
+        help="also peers that integrate all cells, on the paper's bed (11 minutes more)",
     )
     parser.set_defaults(carry_out=carry_out)
 

@@ -1,4 +1,4 @@
-"""The problems whose integration is judged: a scene, the commands recorded for it, and the exact solution."""
+"""Problems of the precision benchmark: scene, recorded commands, and reference solution."""
 
 from __future__ import annotations
 

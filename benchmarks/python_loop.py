@@ -1,4 +1,4 @@
-"""The closed-form step in a Python loop over the cells: what a plain program would take."""
+"""Closed-form step in a Python loop over the cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the benchmarks share: options, progress, and results kept in a folder."""
+"""Common parts of the benchmarks: options, progress, and results in a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m benchmarks stack``: sessions a second, one at a time and many in one call."""
+"""``python -m benchmarks stack``: sessions a second, alone and in a batch."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ STUDIES: dict[str, tuple[str, str, float, float]] = {
 
 @dataclass(frozen=True)
 class Size:
-    """What so many runs cost, each: CPU time of a run, one at a time and in one call, s.
+    """CPU time of a run, alone and in a batch of one size, s.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""``python -m benchmarks session``: what a session costs, as a whole and by part."""
+"""``python -m benchmarks session``: time of a session and of its parts."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ examples:
 
 
 class Took(NamedTuple):
-    """What a session took, s: time gone by, and processor time, which other processes hardly add to."""
+    """Elapsed time and processor time of a session, s; other processes hardly affect the latter."""
 
     gone: float
     used: float
@@ -67,9 +67,15 @@ def add(kinds: Any) -> None:
     )  # fmt: skip
     add_scene(session, default="ridge_mound_valley")
     session.add_argument(
-        "--repeats", metavar="N", type=_repeats, default=3, help="the median counts; default 3"
+        "--repeats",
+        metavar="N",
+        type=_repeats,
+        default=3,
+        help="number of runs, of which the median counts; default: 3",
     )
-    session.add_argument("--calls", action="store_true", help="count numpy's calls, and what they alone cost")
+    session.add_argument(
+        "--calls", action="store_true", help="count numpy's calls, and measure their time alone"
+    )
     session.add_argument("--quiet", action="store_true", help="no progress")
     session.set_defaults(carry_out=carry_out)
 

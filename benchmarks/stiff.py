@@ -37,7 +37,7 @@ __all__ = ["add"]
 def add(kinds: Any) -> None:
     """Add the benchmark."""
     examples = "  python -m benchmarks stiff\n  python -m benchmarks stiff --full --out results\n"
-    parser = add_kind(kinds, "stiff", "what the steppers withstand: stiff and extreme cases", examples)
+    parser = add_kind(kinds, "stiff", "errors of the steppers in stiff and extreme cases", examples)
     parser.add_argument(
         "--full", action="store_true", help="also the adaptive stepper, which takes longer than all others"
     )

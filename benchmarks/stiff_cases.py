@@ -1,4 +1,4 @@
-"""The stiff and extreme cases: what each changes of an easy press on a small bed."""
+"""Stiff and extreme cases: changes to an easy press on a small bed."""
 
 from __future__ import annotations
 

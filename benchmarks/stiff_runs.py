@@ -1,4 +1,4 @@
-"""Running the stiff cases: recorded commands, references, and judging what comes of a run."""
+"""Runs of the stiff cases: recorded commands, references, and evaluation."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ WRONG = 1e-4
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run.
+    """Result of a run.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""``python -m benchmarks terms``: what each part of the model costs, and what leaving it out does."""
+"""``python -m benchmarks terms``: cost and effect of each part of the model."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ALL = "all of these"
 
 @dataclass(frozen=True)
 class Effect:
-    """What a scene costs, and how far it is from the full one; SI units.
+    """Cost of a scene, and its difference from the full one; SI units.
 
     Attributes
     ----------
@@ -132,9 +132,7 @@ def add(kinds: Any) -> None:
     examples = (
         "  python -m benchmarks terms tap\n  python -m benchmarks terms ridge_mound_valley --out results\n"
     )
-    parser = add_kind(
-        kinds, "terms", "what each part of the model costs, and what leaving it out does", examples
-    )
+    parser = add_kind(kinds, "terms", "cost and effect of each part of the model", examples)
     add_scene(parser)
     parser.set_defaults(carry_out=carry_out)
 

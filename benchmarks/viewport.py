@@ -1,4 +1,4 @@
-"""``python -m benchmarks viewport``: what a tick of a live session costs in Blender."""
+"""``python -m benchmarks viewport``: time of a tick of a live session in Blender."""
 
 from __future__ import annotations
 

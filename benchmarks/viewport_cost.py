@@ -1,4 +1,4 @@
-"""What a tick of a live session costs in Blender, part by part: the very functions a session calls."""
+"""Time of the parts of a tick in Blender, measured on the functions of the session itself."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LOOKS = 6
 
 @dataclass(frozen=True)
 class Cost:
-    """What ticks of one bed take.
+    """Cost of the ticks of one bed.
 
     Attributes
     ----------

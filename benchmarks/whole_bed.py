@@ -1,4 +1,4 @@
-"""The precision problems on the paper's bed, by peers that are not told which cells take part.
+"""Precision problems on the paper's bed, with peers that integrate all cells.
 
 Finding those cells is a part of what a period of ours does. Here the same solvers, in the same form, and
 the same Python loop go through every cell of the bed instead; nothing else is taken from them.

@@ -1,4 +1,4 @@
-"""What a run costs and how exact it is: the points of the work-precision plot, and their tables."""
+"""Points of the work-precision plot, run time and error, and their tables."""
 
 from __future__ import annotations
 

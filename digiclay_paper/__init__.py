@@ -1,1 +1,1 @@
-"""The counterparts of the paper's Figs. 3 to 10, and its claims set beside what is measured."""
+"""Reproduction of the paper: counterparts of its Figs. 3 to 10, and its claims beside measurements."""

@@ -1,4 +1,4 @@
-"""One claim of the paper, and what the modules of claims share."""
+"""Claim of the paper, and common parts of the modules of claims."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HOLDS, PARTLY, DIFFERS = "holds", "holds in part", "differs"
 
 
 class Claim(NamedTuple):
-    """One row of the page: what the paper says, what was measured, whether it holds, and why if not."""
+    """Row of the page: claim, measurement, result, and the reason of a failure."""
 
     printed: str
     measured: str

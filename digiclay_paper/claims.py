@@ -1,4 +1,4 @@
-"""The paper's claims beside what was measured; every number comes from the results."""
+"""Claims of the paper beside measurements, with numbers from the results alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claims on how fast a finger is followed."""
+"""Claims on the tracking speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The claim on what the session leaves behind, judged by the shape of its sections."""
+"""Claim on the relief of the session, evaluated by the shape of its sections."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claims that take a run with one thing changed: no rise, other gains, noise, another bed or profile."""
+"""Claims on runs with one change: no rise, other gains, noise, another bed or profile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The limits: oscillation against gain (Fig. 9), and how fast a finger is followed."""
+"""Limits: oscillation over gain (Fig. 9), and tracking speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's session: heights and force (Fig. 8), a detail (Fig. 9), the final surfaces (Fig. 10)."""
+"""Session of the paper: heights and force (Fig. 8), a detail (Fig. 9), the final surfaces (Fig. 10)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What changes when one thing is changed: no rise, the cells ahead, Method II's gain, the search radius."""
+"""Effects of one change: no rise, cells ahead, Method II's gain, search radius."""
 
 from __future__ import annotations
 

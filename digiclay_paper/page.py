@@ -1,4 +1,4 @@
-"""``paper.md``: the figures, the claims, and Method II's arrows as a table."""
+"""``paper.md``: figures, claims, and Method II's transitions as a table."""
 
 from __future__ import annotations
 

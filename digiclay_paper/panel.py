@@ -1,4 +1,4 @@
-"""What every figure of the page has: lettered panels, and its curves as a table."""
+"""Common parts of the figures: lettered panels, and curves as a table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The relief the session asks for, and how far the one that was formed is from it, section by section.
+"""Intended relief of the session, and the deviation of the formed one, section by section.
 
 Asked for is what the method's own blister, carried along the finger's path, leaves behind:
 ``H_j = H_rest + max_t p(d_j(t)) (z(t) - H_rest)`` for a boss, with the least instead of the
@@ -40,7 +40,7 @@ ON = 1e-6
 
 
 class Limits(NamedTuple):
-    """How far a section may be from what is asked for, and still be that shape.
+    """Largest deviations of a section of the intended shape.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""``digiclay paper``: the counterparts of the paper's figures, and its claims beside what is measured."""
+"""``digiclay paper``: counterparts of the paper's figures, and its claims beside measurements."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 class Stages(Line):
-    """Tells on a terminal what is being done, on one line; elsewhere nothing. Stops when asked to.
+    """Progress line on a terminal, with stop by a signal.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What `digiclay paper` measures, as one value that the figures and the claims are made from."""
+"""Measurements of `digiclay paper` as one value, for figures and claims."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SUSTAINED = 0.01
 
 @dataclass(frozen=True)
 class Extent:
-    """How much is simulated.
+    """Extent of the simulations.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ QUICK = Extent(
 
 
 class Swing(NamedTuple):
-    """What a hold after a quick press came to, at one pair of gains.
+    """Result of a hold after a quick press, at one pair of gains.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Swing(NamedTuple):
 
 
 class Dragged(NamedTuple):
-    """What a straight level drag came to.
+    """Result of a straight level drag.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Dragged(NamedTuple):
 
 
 class Located(NamedTuple):
-    """How well Method I locates a finger that is held still, with noisy force sensors.
+    """Error of Method I's position of a fingertip at rest, with noisy force sensors.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Located(NamedTuple):
 
 
 class Session(NamedTuple):
-    """A session boiled down to what is drawn and judged.
+    """Quantities of a session for figures and claims.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ class Session(NamedTuple):
 
 @dataclass
 class Results:
-    """What was simulated, by method where methods are set beside each other.
+    """All results, by method where methods are compared.
 
     Attributes
     ----------

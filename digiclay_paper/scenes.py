@@ -1,4 +1,4 @@
-"""The short sessions the paper's results are measured on."""
+"""Short sessions of the paper's results."""
 
 from __future__ import annotations
 

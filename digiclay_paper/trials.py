@@ -1,4 +1,4 @@
-"""Everything `digiclay paper` simulates."""
+"""All simulations of `digiclay paper`."""
 
 from __future__ import annotations
 

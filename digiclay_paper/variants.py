@@ -1,4 +1,4 @@
-"""The simulations in which one thing is changed: no rise, a staggered bed, a Gaussian, noise, gains."""
+"""Simulations with one change: no rise, a staggered bed, a Gaussian, noise, gains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the simulations to the folder: figures, page, and the measured numbers."""
+"""Steps from the simulations to the folder: figures, page, and measured numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check that every public function of two or more parameters says in its docstring what they are.
+"""Check of docstrings: every public function of two or more parameters describes them.
 
 usage: python tools/docstrings.py [--write]
 

@@ -1,4 +1,4 @@
-"""Scenes and kept states made to break the program: all of them are taken, or refused in one line.
+"""Fuzz test of scenes and snapshots: each is accepted, or refused in one line.
 
 usage: python tools/fuzz.py {scenes,states} [--count 100000] [--seed 0] [--first 0]
 

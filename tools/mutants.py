@@ -1,4 +1,4 @@
-"""Change the core's physics and control in one place at a time, and see whether the tests notice.
+"""Mutation test: one change at a time in the core's physics and control, under its tests.
 
 cosmic-ray makes the mutants. Its own runner writes each one into the source file and starts a Python for it;
 here each is loaded in a fork of one process that has numpy, SciPy and pytest imported already. No file is
@@ -81,7 +81,7 @@ def play(mutant: Mutant | None, tests: Sequence[str]) -> int:
 
 @dataclass
 class Run:
-    """A process that judges."""
+    """Process that runs the tests of mutants."""
 
     mutant: Mutant | None
     judge: str

@@ -1,4 +1,4 @@
-"""What mutants there are of a module of the core: one change each, made by cosmic-ray's operators."""
+"""Mutants of a module of the core: one change each, by cosmic-ray's operators."""
 
 from __future__ import annotations
 

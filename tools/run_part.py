@@ -1,4 +1,4 @@
-"""Run one part of the tests under a time limit and judge it by what it did.
+"""Run of one part of the tests under a time limit, evaluated by its output.
 
 A part has passed when pytest ended with status 0 and at least one test passed: nothing
 collected, everything skipped, a crash or a hang after the summary are all failures. Its

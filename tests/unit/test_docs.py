@@ -21,6 +21,7 @@ PAGES = sorted(
         *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
     ]
 )
+PACKAGES = ("addon", "benchmarks", "digiclay_paper", "tools")
 #: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(
     r"^(what|how|why|where|when|who|which|whether)\b"
@@ -144,8 +145,9 @@ def test_the_pages_have_commands_to_check() -> None:
 
 
 def _first_lines() -> Iterator[tuple[str, str]]:
-    """Yield name and first line of the docstrings of all modules and classes of the package."""
-    for path in sorted((ROOT / "addon").rglob("*.py")):
+    """Yield name and first line of the docstrings of all modules and classes."""
+    files = [path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")]
+    for path in sorted(files):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Module | ast.ClassDef) and (text := ast.get_docstring(node)):
                 yield f"{path.relative_to(ROOT)}: {getattr(node, 'name', '')}", text.splitlines()[0]

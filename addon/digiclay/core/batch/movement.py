@@ -1,4 +1,4 @@
-"""How a stepper moves the cells of many runs."""
+"""Movement of the cells of a batch by a stepper."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Viscous(TouchParameters):
 
 @dataclass(frozen=True)
 class Exchange:
-    """How neighbours even out in one control period.
+    """Exchange between neighbours in one control period.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 class StepStart(NamedTuple):
-    """What a step starts from, for k cells, (k,), or for k cells of b runs, (k, b).
+    """Conditions at the start of a step, for k cells, (k,), or for k cells of b runs, (k, b).
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class StepStart(NamedTuple):
 
 
 class LoadedPath(NamedTuple):
-    """What comes of a step.
+    """Result of a step.
 
     Attributes
     ----------
