@@ -18,9 +18,9 @@ from digiclay.commands.arguments import add_scene, scene_of
 from digiclay.commands.progress import Bar
 from digiclay.core.engine import simulation
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.recorder import Recorder, Recording
+from digiclay.core.scene.recorder import Recorder, RunRecording
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_scene import fits
+from digiclay.core.session.memory_limit import check_memory
 
 from .report import made_with
 
@@ -90,7 +90,7 @@ def _repeats(text: str) -> int:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Time the session and print the table."""
     scene, _ = scene_of(arguments)
-    fits(scene, assemble(scene))
+    check_memory(scene, assemble(scene).rows)
     plain: list[Took] = []
     split: list[dict[str, float]] = []
     with Bar(sys.stderr, "repeats", 1.0) as bar:
@@ -138,7 +138,7 @@ def measured(scene: Scene, profile: cProfile.Profile | None = None) -> Took:
     """
     system, trajectories = assemble(scene), scene.trajectories()
     state = simulation.begin(system)
-    observe = Recording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
+    observe = RunRecording(scene.recorder or Recorder(), system.rows, state, scene.periods).observe
     with profile or nullcontext():
         started = perf_counter(), process_time()
         for reached in simulation.periods(system, trajectories, state, scene.periods):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.modes import Mode
-from digiclay.core.studies.trials import Trial
+from digiclay.core.session.run_scene import Result
 from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 
 from .results import Results
@@ -46,7 +46,7 @@ def blisters(results: Results) -> Any:
     return figure
 
 
-def _section(axes: Any, done: Trial, look: tuple[str, str, float], name: str) -> None:
+def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -> None:
     """Draw the heights of the middle row; cells that feel the finger are filled."""
     place, height, force = (done.history[key] for key in ("position", "height", "force"))
     row = np.abs(place[:, 1]) < 1e-6
@@ -56,7 +56,7 @@ def _section(axes: Any, done: Trial, look: tuple[str, str, float], name: str) ->
     axes.plot(across[felt], top[felt], marker, color=colour, markersize=size)
 
 
-def _finger(axes: Any, done: Trial, row: int) -> None:
+def _finger(axes: Any, done: Result, row: int) -> None:
     """Draw the fingertip's outline in the section."""
     tip, x, z = done.scene.section("fingertip"), *(done.history["fingertip"][row, [0, 2]] * MM)
     if tip is None:

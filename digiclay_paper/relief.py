@@ -18,7 +18,7 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.metrics.summary import cell_area, in_contact
 from digiclay.core.scene.schema import Scene
-from digiclay.core.studies.trials import Trial
+from digiclay.core.session.run_scene import Result
 from numpy.typing import NDArray
 
 from .results import Session
@@ -179,7 +179,7 @@ def sections(session: Session) -> Iterator[Section]:
             yield Section(name, part, where[cells], found[cells], drawn, high - wanted, wanted, rim)
 
 
-def blister_section(done: Trial) -> Section:
+def blister_section(done: Result) -> Section:
     """Return the section along x through a blister under a finger in the middle of the bed."""
     history, scene = done.history, done.scene
     assert scene.blister is not None  # both methods have one

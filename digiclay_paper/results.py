@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.speed_limits import Criterion, Drag, Follows
-from digiclay.core.studies.trials import Trial
 from numpy.typing import NDArray
 
 from .scenes import SINK, TALL
@@ -170,7 +170,7 @@ class Session(NamedTuple):
     detail : dict of ndarray
         Every row of time and height in the first seconds.
     metrics : dict
-        As `Trial.metrics`.
+        As `Result.figures`.
     lost : list of float
         When the finger was lost though it rose no faster than a pin can, s.
     followers : float
@@ -207,8 +207,8 @@ class Results:
     """
 
     criterion: Criterion = field(default_factory=Criterion)
-    blisters: dict[tuple[str, str, str], Trial] = field(default_factory=dict)
-    drags: dict[str, tuple[Trial, float, float]] = field(default_factory=dict)
+    blisters: dict[tuple[str, str, str], Result] = field(default_factory=dict)
+    drags: dict[str, tuple[Result, float, float]] = field(default_factory=dict)
     printed: dict[str, Session] = field(default_factory=dict)
     session: dict[str, Session] = field(default_factory=dict)
     slow: float = 1.0
@@ -217,7 +217,7 @@ class Results:
     fastest: dict[str, float | None] = field(default_factory=dict)
     lifting: dict[str, float | None] = field(default_factory=dict)
     swings: list[Swing] = field(default_factory=list)
-    details: dict[tuple[float, float], tuple[Trial, float]] = field(default_factory=dict)
+    details: dict[tuple[float, float], tuple[Result, float]] = field(default_factory=dict)
     quicker: list[Swing] = field(default_factory=list)
     quicker_speed: float = 0.0
     wild: Session | None = None

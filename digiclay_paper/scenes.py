@@ -12,7 +12,7 @@ from digiclay.core.model.trajectory import Path
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.studies.trials import Trial
+from digiclay.core.session.run_scene import Result
 
 __all__ = [
     "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "at_rest", "blister", "fastest_lift",
@@ -144,7 +144,7 @@ def fastest_lift(session: Scene) -> float:
     return highest
 
 
-def unintended(done: Trial) -> list[float]:
+def unintended(done: Result) -> list[float]:
     """Return when the finger was lost though it rose no faster than a pin can, s."""
     limit, moments = free_speed(done.scene), done.history["time"]
     rise = np.gradient(done.history["fingertip"][:, 2], moments)

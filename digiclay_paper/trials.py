@@ -10,9 +10,12 @@ import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.metrics.signal import amplitude, frequency, settling_time
 from digiclay.core.model.set_point import asked
+from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_result import Result, select_rows
+from digiclay.core.session.run_scene import run
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, followed, largest_speed
-from digiclay.core.studies.trials import Trial, trial
 
 from . import scenes
 from .results import AS_IT_IS, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing
@@ -44,7 +47,7 @@ def simulate(extent: Extent, told: Told) -> Results:
         told(f"blisters, {method}")
         for shape, height in (("convex", TALL), ("concave", SINK)):
             for profile in ("cone", "gaussian"):
-                results.blisters[method, shape, profile] = trial(scenes.blister(method, height, profile))
+                results.blisters[method, shape, profile] = _run(scenes.blister(method, height, profile))
     for method in METHODS:
         _track(results, method, extent, told)
     sessions(results, told)
@@ -77,7 +80,7 @@ def _go_wild(results: Results, told: Told) -> None:
         settings = [Setting("control.method", METHODS[0]), Setting("control.force_gain", f"{first!r}")]
         found = load(find(SESSION), settings)
         shorter = replace(found.simulation, duration=DETAIL)
-        results.wild = _boiled_down(trial(replace(found, simulation=shorter)))
+        results.wild = _boiled_down(_run(replace(found, simulation=shorter)))
 
 
 def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
@@ -128,7 +131,7 @@ def sessions(results: Results, told: Told, session: str = SESSION) -> None:
     for method in METHODS:
         told(f"the paper's session, {method}")
         found = load(find(session), [Setting("control.method", method)])
-        results.printed[method] = _boiled_down(trial(found))
+        results.printed[method] = _boiled_down(_run(found))
     results.session = dict(results.printed)
     if not any(done.lost for done in results.printed.values()):
         return
@@ -139,10 +142,15 @@ def sessions(results: Results, told: Told, session: str = SESSION) -> None:
     for method in METHODS:
         told(f"the paper's session, {results.slow:g} times as long, {method}")
         slowly = scenes.slowed(results.printed[method].scene, results.slow)
-        results.session[method] = _boiled_down(trial(slowly))
+        results.session[method] = _boiled_down(_run(slowly))
 
 
-def _boiled_down(done: Trial) -> Session:
+def _run(scene: Scene) -> Result:
+    """Run a scene with a row a control period."""
+    return run(replace(scene, recorder=Recorder()))
+
+
+def _boiled_down(done: Result) -> Session:
     """Return what is drawn and judged of a session: its whole history takes a hundred megabytes."""
     follow = np.sum(done.history["mode"] == Mode.FORCE_FOLLOW, axis=1)
     kept = {
@@ -156,17 +164,17 @@ def _boiled_down(done: Trial) -> Session:
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
-    return Session(done.scene, kept, detail, done.metrics, scenes.unintended(done), followers)
+    return Session(done.scene, kept, detail, done.figures, scenes.unintended(done), followers)
 
 
 def _swing(
     gain: float, position_gain: float, device: Device | None = None, method: str = METHODS[0]
-) -> tuple[Swing, Trial, float]:
+) -> tuple[Swing, Result, float]:
     """Hold still after a quick press, and look whether the force comes to rest; also when it ended, s."""
     case, quick = scenes.held(gain, position_gain, device, method)
-    done = trial(case)
+    done = _run(case)
     end = float(done.history["time"][-1])
-    late, after = done.between(end - WATCHED, end), done.between(quick, end)
+    late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
     wanted = asked(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
     settled = settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     found = Swing(

@@ -12,8 +12,8 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_result import Result, select_rows
 from digiclay.core.studies.speed_limits import Drag, followed
-from digiclay.core.studies.trials import Trial
 
 from . import scenes
 from .results import AHEAD, PAPER_SPEED, SESSION, WAYS, Dragged, Extent, Located, Results
@@ -60,7 +60,7 @@ def vary(results: Results, extent: Extent, told: Told) -> None:
                 results.located.append(located(noise, radius, thresholds=thresholds))
 
 
-def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Trial]:
+def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
     """Run a drag, and return what it came to, and the whole of it.
 
     Parameters
@@ -73,7 +73,7 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
     """
     follows, done = followed(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
-    part = done.between(start, end)
+    part = select_rows(done.history, start, end)
     total, following = part["total_force"], np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
     # The cells in the finger's line, short of the place where it stops.
     place = part["position"]
@@ -84,7 +84,7 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
     over = part["height"][:, line] - scene.actuator.rest_height
     found = Dragged(
         follows, float(total.mean()), float(total.std()), float(following.mean()),
-        done.metrics["ridge_unevenness"], float(over[seen].mean()) if np.any(seen) else None,
+        done.figures["ridge_unevenness"], float(over[seen].mean()) if np.any(seen) else None,
     )  # fmt: skip
     return found, done
 

@@ -105,7 +105,7 @@ def test_beds_whose_rows_are_shifted_are_judged() -> None:
 
 def test_a_run_without_a_history_has_none() -> None:
     (only,) = judged([sample("tap", "simulation.duration=0.05")])
-    assert only.history is None
+    assert only.history == {}
 
 
 def test_a_run_that_diverges_is_told_and_the_others_are_judged() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands.compare import table
-from digiclay.core.studies.trials import TRIAL_METRICS
+from digiclay.core.session.run_result import RUN_METRICS
 from digiclay.plots.comparison import PANELS, comparison
 
 from tests.scene_files import folder_with, scene_text
@@ -28,8 +28,8 @@ def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str
     assert main(["compare", "my.toml"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["metric", "unit", *BOTH]
-    printed = {line.split()[0]: line.split()[-2:] for line in lines[2 : 2 + len(TRIAL_METRICS)]}
-    assert list(printed) == list(TRIAL_METRICS)
+    printed = {line.split()[0]: line.split()[-2:] for line in lines[2 : 2 + len(RUN_METRICS)]}
+    assert list(printed) == list(RUN_METRICS)
     assert [name for name, values in printed.items() if len(values) != 2] == []
     # The finger comes down 5 mm deep: Method I alone presses harder than fingers were measured.
     said = [line for line in lines if "the contact law does not hold" in line]
@@ -37,18 +37,18 @@ def test_both_methods_are_printed_side_by_side(capsys: pytest.CaptureFixture[str
 
 
 def test_the_columns_of_the_table_are_aligned() -> None:
-    found = {name: dict.fromkeys(TRIAL_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
+    found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
     assert len({len(line) for line in table(found)}) == 1
 
 
 def test_lengths_are_printed_in_millimetres() -> None:
-    found = {"one": dict.fromkeys(TRIAL_METRICS) | {"lag_max": 0.0025}}
+    found = {"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}}
     row = next(line for line in table(found) if "lag_max" in line)
     assert row.split() == ["lag_max", "mm", "2.5"]
 
 
 def test_what_was_not_found_is_a_dash() -> None:
-    row = next(line for line in table({"one": dict.fromkeys(TRIAL_METRICS)}) if " rfd " in line)
+    row = next(line for line in table({"one": dict.fromkeys(RUN_METRICS)}) if " rfd " in line)
     assert row.split() == ["rfd", "N", "–"]
 
 
@@ -58,7 +58,7 @@ def test_the_folder_holds_the_picture_and_every_number(here: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == ["compare.png", "metrics.json"]
     known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert list(known["methods"]) == BOTH
-    assert list(known["methods"]["cell_states"]) == list(TRIAL_METRICS)
+    assert list(known["methods"]["cell_states"]) == list(RUN_METRICS)
 
 
 def test_the_methods_see_the_same_input(here: Path) -> None:
@@ -97,7 +97,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
 
 
 def test_every_panel_has_a_bar_for_every_method() -> None:
-    found = {name: dict.fromkeys(TRIAL_METRICS, 1.0) for name in (*BOTH, "third")}
+    found = {name: dict.fromkeys(RUN_METRICS, 1.0) for name in (*BOTH, "third")}
     forces = {name: ([0.0, 1.0], [0.0, 0.4], [np.nan, 0.4]) for name in found}
     figure = comparison(found, forces, "scene")
     panels = {axes.get_label(): axes for axes in figure.axes}

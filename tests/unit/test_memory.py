@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 from digiclay.core.engine.state import Rows
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.recorder import Recorder, bytes_needed
+from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_scene import busy_cells, run
+from digiclay.core.session.memory_limit import bytes_needed, count_busy_cells
+from digiclay.core.session.run_scene import run
 
 #: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.
 SIDES, MORE = (100, 150), 150**2 - 100**2
@@ -24,7 +25,9 @@ def measured_and_estimated(**changes: Any) -> tuple[float, float]:
         bed = {"layout": {"rows": side, "columns": side}, "trajectory": {"waypoints": press}}
         scene = resolve({**bed, "simulation": {"duration": 0.05}, **changes})
         system = assemble(scene)
-        told.append(bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods, busy_cells(scene)))
+        told.append(
+            bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods, count_busy_cells(scene))
+        )
         tracemalloc.start()
         try:
             run(scene)

@@ -9,6 +9,8 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_result import RUN_METRICS, Result, select_rows
+from digiclay.core.session.run_scene import run
 from digiclay.core.studies.speed_limits import (
     Criterion,
     Drag,
@@ -18,7 +20,6 @@ from digiclay.core.studies.speed_limits import (
     largest,
     largest_speed,
 )
-from digiclay.core.studies.trials import TRIAL_METRICS, Trial, trial
 
 
 def device(method: str = "virtual_master", **layout: object) -> Scene:
@@ -109,37 +110,30 @@ def test_both_methods_follow_a_drag_at_15_mm_a_second_and_have_a_limit(method: s
 def test_a_finger_that_is_lost_is_counted_with_its_time() -> None:
     # No pin rises at 40 mm/s; the finger leaves at 2 s and is given up 50 ms later.
     judged, done = followed(device(), Lift(), 40e-3)
-    assert judged.losses == done.losses == 1
+    assert judged.losses == done.metrics["losses"] == 1
     assert done.loss_times is not None
     assert 2.05 < done.loss_times[0] < 2.6
 
 
 @pytest.fixture(scope="module")
-def press() -> Trial:
+def press() -> Result:
     """A press in the middle of a small bed."""
-    return trial(device(rows=11, columns=11))
+    return run(device(rows=11, columns=11))
 
 
-def test_a_trial_gives_every_metric(press: Trial) -> None:
-    assert list(press.metrics) == list(TRIAL_METRICS)
+def test_a_run_gives_every_figure(press: Result) -> None:
+    assert list(press.figures) == list(RUN_METRICS)
+    assert press.figures["duration"] == press.metrics["duration"] > 0.0
 
 
-def test_a_trial_is_the_session_bit_for_bit(press: Trial) -> None:
-    from digiclay.core.session.run_scene import run
-
-    history = run(press.scene).history
-    assert history is not None
-    assert [name for name in history if not np.array_equal(history[name], press.history[name])] == []
-
-
-def test_a_part_of_a_trial_keeps_the_rows_between_two_times(press: Trial) -> None:
-    part = press.between(0.5, 1.0)
+def test_the_rows_between_two_times_are_kept(press: Result) -> None:
+    part = select_rows(press.history, 0.5, 1.0)
     assert (part["time"][0], part["time"][-1], len(part["height"])) == (0.5, 1.0, 101)
 
 
 def test_a_method_that_counts_no_losses_has_none() -> None:
-    bare = trial(resolve({"control": "absent", "layout": {"rows": 5, "columns": 5}}))
-    assert bare.losses is None
+    bare = run(resolve({"control": "absent", "layout": {"rows": 5, "columns": 5}}))
+    assert bare.loss_times is None
     assert bare.metrics["losses"] is None
 
 
@@ -149,10 +143,5 @@ def test_a_bed_that_begins_with_a_shape_counts_what_its_method_counts() -> None:
         "shape": {"file": "crater"},
         "simulation": {"duration": 0.02},
     }
-    assert trial(resolve({**bed, "control": {"method": "elastic"}})).losses is None
-    assert trial(resolve(bed)).losses == 0
-
-
-def test_a_trial_that_is_asked_to_stop_does() -> None:
-    with pytest.raises(KeyboardInterrupt):
-        trial(device(rows=11, columns=11), stopped=lambda: True)
+    assert run(resolve({**bed, "control": {"method": "elastic"}})).metrics["losses"] is None
+    assert run(resolve(bed)).metrics["losses"] == 0

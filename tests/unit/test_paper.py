@@ -10,8 +10,8 @@ from digiclay.core.base.modes import MEANINGS
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.speed_limits import Follows
-from digiclay.core.studies.trials import Trial
 
 from digiclay_paper import scenes
 from digiclay_paper.claim import Claim, verdict
@@ -134,7 +134,7 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
     time = np.linspace(0.0, 1.0, 201)
     tip = np.zeros((201, 7))
     tip[:, 2] = speed * time
-    done = Trial(resolve({}), {"time": time, "fingertip": tip}, np.array([0.5]), 1.0)
+    done = Result(resolve({}), {"time": time, "fingertip": tip}, 200, 1.0, {}, np.array([0.5]))
     assert scenes.unintended(done) == times
 
 

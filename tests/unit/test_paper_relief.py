@@ -8,7 +8,7 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.studies.trials import Trial
+from digiclay.core.session.run_scene import Result
 from numpy.typing import NDArray
 
 from digiclay_paper.claims_relief import relief
@@ -119,7 +119,7 @@ def test_half_the_relief_is_not_the_relief(bare: Session) -> None:
     assert [one.name for one in found if one.meets(LIMITS)] == []
 
 
-def blister(method: str, rim: float, sign: float) -> Trial:
+def blister(method: str, rim: float, sign: float) -> Result:
     """Return a blister 15 mm high or deep under the finger, cells on its flat top `rim` beyond it."""
     scene = resolve({"control": {"method": method}, "layout": {"rows": 17, "columns": 17}})
     place = assemble(scene).grid.positions
@@ -132,7 +132,7 @@ def blister(method: str, rim: float, sign: float) -> Trial:
     over[(away > 2e-3) & (away < 4e-3)] += rim
     tip = np.array([[0.0, 0.0, REST + sign * 13.5e-3, 1.0, 0.0, 0.0, 0.0]])
     history = {"height": (REST + sign * over)[None], "position": place, "fingertip": tip, "mode": mode}
-    return Trial(scene, history, None, 1.0)
+    return Result(scene, history, 1, 1.0, {})
 
 
 @pytest.mark.parametrize("method", METHODS)

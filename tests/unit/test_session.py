@@ -82,7 +82,7 @@ def test_a_thinned_history_has_every_fourth_row(result: Result) -> None:
 
 
 def test_a_session_without_a_recorder_keeps_no_history() -> None:
-    assert run(scene(recorder="absent")).history is None
+    assert run(scene(recorder="absent")).history == {}
 
 
 def test_metrics_are_the_same_numbers_as_in_the_history(result: Result) -> None:

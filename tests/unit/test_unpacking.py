@@ -17,11 +17,11 @@ from digiclay.core.control.named_shapes import from_file
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.recorder import available_memory
 from digiclay.core.scene.scene_source import Setting, find, load, read_table
 from digiclay.core.scene.toml_table import resolve, text
 from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import read_run
+from digiclay.core.session.memory_limit import available_memory
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 from digiclay.core.shapes.heightmap import height_map
 from digiclay.core.shapes.request import Shape

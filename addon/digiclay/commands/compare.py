@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
 from ..core.control.methods import METHODS
 from ..core.metrics.finger_path import sum_cells
-from ..core.model.finger_range import describe_excess, find_largest_indentation
 from ..core.model.set_point import asked
-from ..core.scene.assembly import assemble
+from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
+from ..core.session.run_result import RUN_METRICS, Result
+from ..core.session.run_scene import run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, largest_speed
-from ..core.studies.trials import TRIAL_METRICS, Trial, trial
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
@@ -96,11 +97,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with allow_interrupt(), write_folder(out, overwrite=arguments.overwrite) as folder:
         for method, scene in scenes.items():
             done = _run(scene, method, quiet=arguments.quiet)
-            found[method] = done.metrics | (_speeds(scene) if arguments.speed else {})
+            found[method] = done.figures | (_speeds(scene) if arguments.speed else {})
             wanted = asked(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
-            beyond[method] = _beyond(done)
-        units = {name: unit for name, (unit, _) in {**TRIAL_METRICS, **SPEEDS}.items()}
+            beyond[method] = done.metrics.get("beyond_a_finger", "")
+        units = {name: unit for name, (unit, _) in {**RUN_METRICS, **SPEEDS}.items()}
         known = {"scene": scene.name, "methods": found, "units": units, "beyond_a_finger": beyond}
         said = json.dumps(known, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "metrics.json").write_text(said + "\n", encoding="utf-8")
@@ -119,17 +120,10 @@ def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
     return load(path, [*settings_of(arguments), Setting("control.method", method, "--methods")])
 
 
-def _run(scene: Scene, method: str, *, quiet: bool) -> Trial:
+def _run(scene: Scene, method: str, *, quiet: bool) -> Result:
     """Run one method under a progress bar."""
     with Bar(sys.stderr, method, scene.simulation.control_period) as bar:
-        return trial(scene, progress=None if quiet else bar)
-
-
-def _beyond(done: Trial) -> str:
-    """Say what of a run is beyond a finger."""
-    touch, history = assemble(done.scene).cell.touch, done.history
-    deepest = find_largest_indentation(touch.fingertip, history) if touch else None
-    return describe_excess(float(history["total_force"].max()), deepest)
+        return run(replace(scene, recorder=Recorder()), progress=None if quiet else bar)
 
 
 def _speeds(scene: Scene) -> Metrics:
@@ -145,7 +139,7 @@ def _speeds(scene: Scene) -> Metrics:
 
 def table(found: dict[str, Metrics]) -> Iterator[str]:
     """Give the lines of the table: a metric a line, a method a column, units people read."""
-    known, columns = {**TRIAL_METRICS, **SPEEDS}, list(found)
+    known, columns = {**RUN_METRICS, **SPEEDS}, list(found)
     names = [name for name in known if name in found[columns[0]]]
     rows = []
     for name in names:

@@ -12,9 +12,8 @@ from ..core.base.quantity import Parameters, quantities
 from ..core.control.master_cell import make_master_cell
 from ..core.engine.simulation import System
 from ..core.scene.assembly import assemble
-from ..core.scene.recorder import available_memory, bytes_needed
 from ..core.scene.schema import Scene
-from ..core.session.run_scene import busy_cells
+from ..core.session.memory_limit import available_memory, bytes_needed, count_busy_cells
 from ..core.shapes.source_file import fitted_to
 from .arguments import add_command, add_scene, scene_of
 
@@ -85,7 +84,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     for finger in scene.fingers:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
-    sizes = scene.cells, scene.periods, busy_cells(scene)
+    sizes = scene.cells, scene.periods, count_busy_cells(scene)
     needed, free = bytes_needed(scene.recorder, system.rows, *sizes), available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
     yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"

@@ -178,7 +178,7 @@ def _steps(
 
     def judge() -> bool:
         result = results[-1]
-        if result.history is not None and has_every_command(scene):
+        if has_every_command(scene):
             errors = estimate_errors(scene, result.history, progress=telling("errors"), stopped=stopped)
             if errors is None:
                 return False
@@ -194,7 +194,7 @@ def _steps(
         yield "errors", judge
     yield "save", keep
     history = results[-1].history
-    if history is None:
+    if not history:
         return
     if outputs.export:
         yield "export", lambda: bool(exported(scene, history, -1, outputs.export, out, outputs.mesh))

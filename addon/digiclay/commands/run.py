@@ -141,7 +141,7 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
 
 def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
     """Return the result with its errors, where they can be estimated, and whether a stop left them out."""
-    if result.history is None or result.incomplete or not has_every_command(result.scene):
+    if result.incomplete or not has_every_command(result.scene):
         return result, False
     with Bar(sys.stderr, "errors", result.scene.simulation.control_period) as bar:
         errors = estimate_errors(result.scene, result.history, progress=None if quiet else bar, stopped=stop)
@@ -151,7 +151,7 @@ def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
 def _extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
     """Return what the options ask for besides the session."""
     scene, history = result.scene, result.history
-    if history is None:
+    if not history:
         return []
     wanted = [plan_meshes(scene, history, arguments.export)] if arguments.export else []
     wanted += [plan_plots(scene, history)] if arguments.plots else []

@@ -1,135 +1,164 @@
-"""Histories of a batch.
-
-A history of all cells of all runs would fill the memory long before the stack is large enough: only the
-cells that take part are kept, until a history is asked for.
-"""
+"""Histories of a batch, or the few sums of each row that all metrics need."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine.state import Rows
-from ..scene.recorder import Recorder
-from .beds import Beds, Gathered
+from ..base.modes import Mode
+from ..metrics.finger_path import CellSums
+from ..metrics.summary import compute_metrics_from_sums
+from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
+from ..scene.schema import Scene
+from ..session.run_result import Result, evaluate, report
+from .beds import Gathered
 from .broadcasting import Floats
-from .padding import KEPT
+from .fingers import Way, way_over
+from .play import Instant, Play
 
-__all__ = ["StackRecording"]
+__all__ = ["Histories", "Sums"]
 
-
-@dataclass(eq=False)
-class _Stretch:
-    """The rows of the periods in which the same cells take part.
-
-    Attributes
-    ----------
-    runs : tuple of int
-        Whose the first axis is.
-    held : Gathered
-        Of which only cells and number of the near ones are still true later on.
-    height, command, mode : ndarray (b, t, w)
-    force : ndarray (b, t, k)
-    instants, starts : list of int
-        Which rows of a history height and force, and command and mode, are.
-    """
-
-    runs: tuple[int, ...]
-    held: Gathered
-    height: Floats
-    command: Floats
-    mode: NDArray[np.int8]
-    force: Floats
-    instants: list[int] = field(default_factory=list)
-    starts: list[int] = field(default_factory=list)
+#: A plain number: numpy compares with it ten times as fast.
+FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
 
 
-class StackRecording:
-    """The rows of many sessions; see `recorder.Recording` for what they mean.
+class Histories:
+    """Records runs: stretches are kept, and written into a history when it is asked for.
+
+    A history of all cells of all runs would fill the memory long before the stack is large enough.
 
     Parameters
     ----------
+    scenes : mapping of int to Scene
+        By the numbers of their runs.
     recorder : Recorder
-    rows : Rows
-        Which row of the state holds what.
-    state : Beds
+        Theirs.
+    play : Play
         Before the sessions.
-    runs : tuple of int
-        Whose its last axis is.
     """
 
-    def __init__(self, recorder: Recorder, rows: Rows, state: Beds, runs: tuple[int, ...]) -> None:
-        self._every, self._rows = recorder.every, rows
-        self._first, self._mode, self._runs = state.row(0), state.mode(), runs
-        self._stretches: list[_Stretch] = []
-        self._room: dict[str, NDArray[Any]] = {}
+    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder, play: Play) -> None:
+        self._scenes, self._runs, self._present = scenes, play.runs, play.runs
+        self._first, self._mode = play.state.row(0), play.state.mode()
+        self._stretches: list[tuple[tuple[int, ...], Stretch]] = []
+        self._recording = Recording(recorder, play.stack.rows, self._store)
+        self._history: HistoryWriter | None = None
 
-    def observe(self, state: Beds, runs: tuple[int, ...]) -> None:
-        """Take in the beds after a control period; `runs` says whose the last axis is."""
-        held, started = state.gathered, state.period - 1
-        if not self._stretches or self._stretches[-1].held is not held:
-            self._stretches.append(_stretch(held, runs))
-        now = self._stretches[-1]
-        if started % self._every == 0:
-            now.command[:, len(now.starts)] = held.block[self._rows.command].T
-            now.mode[:, len(now.starts)] = held.mode.T
-            now.starts.append(started // self._every)
-        if state.period % self._every == 0:
-            now.height[:, len(now.instants)] = held.block[0].T
-            now.force[:, len(now.instants)] = held.block[self._rows.force, : held.near].T
-            now.instants.append(state.period // self._every)
+    def _store(self, stretch: Stretch) -> None:
+        """Keep a stretch of the runs that are present."""
+        self._stretches.append((self._present, stretch))
 
-    def arrays(self, run: int, state: Beds, place: int) -> dict[str, NDArray[Any]]:
-        """Return the rows of a run: period (t,), height, force, command, mode (t, n).
+    def observe(self, now: Instant) -> None:
+        """Record a control period."""
+        if now.play.runs is not self._present:
+            self._recording.flush()
+            self._present = now.play.runs
+        self._recording.observe(now.play.state)
 
-        They are valid until those of another run are asked for: new memory for every run would take
-        longer than all that is written into it.
+    def finish(self, now: Instant, place: int) -> Result:
+        """Return the result of a run; its history is valid until another run's is asked for.
+
+        New memory for every run would take longer than all that is written into it.
 
         Parameters
         ----------
-        run : int
-        state : Beds
-            In which the run ended.
+        now : Instant
+            In which it has come to its end.
         place : int
             Where on the last axis the run is.
         """
-        end, force = state.period, self._rows.force
-        count, cells = 1 - (-end // self._every), len(self._first)
-        if not self._room or len(self._room["mode"]) < count:
-            self._room = {name: np.empty((count, cells)) for name in ("height", "force", "command")}
-            self._room["mode"] = np.empty((count, cells), np.int8)
-        rows = {name: room[:count] for name, room in self._room.items()}
-        rows["force"][:] = rows["command"][:] = 0.0
-        rows["period"] = np.minimum(np.arange(count) * self._every, end)
-        column = self._runs.index(run)
-        rows["height"][0], rows["mode"][0] = self._first[:, column], self._mode[:, column]
-        for part in self._stretches:
-            if run in part.runs:
-                _unfold(part, part.runs.index(run), rows)
-        rows["height"][-1], rows["force"][-1] = state.row(0)[:, place], state.row(force)[:, place]
+        self._recording.flush()
+        run, period, every = now.play.runs[place], now.play.state.period, self._recording.every
+        count, column = 1 - (-period // every), self._runs.index(run)
+        if self._history is None or self._history.count < count:
+            self._history = HistoryWriter(count, len(self._first))
+        self._history.begin(self._first[:, column], self._mode[:, column])
+        for runs, stretch in self._stretches:
+            if run in runs:
+                self._history.write(stretch.of(runs.index(run)))
+        rows = self._history.finish(period, every)
+        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(place))
+
+
+class Sums:
+    """Sums what the metrics of runs need over their cells, row by row; there are no histories.
+
+    Parameters
+    ----------
+    scenes : mapping of int to Scene
+        By the numbers of their runs.
+    recorder : Recorder
+        Theirs.
+    play : Play
+        Before the sessions.
+    """
+
+    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder, play: Play) -> None:
+        count = recorder.rows(max(scene.periods for scene in scenes.values()))
+        self._scenes, self._every, self._force = scenes, recorder.every, play.stack.rows.force
+        self._runs, self._present, self._columns = play.runs, play.runs, list(range(len(play.runs)))
+        self._first = play.state.row(0)
+        self._sums = np.zeros((count, 5, len(play.runs)))
+        self._following = np.zeros((count, len(play.runs)), np.intp)
+        self._ways: dict[Any, Way] = {}
+
+    def observe(self, now: Instant) -> None:
+        """Sum a control period up."""
+        if now.play.runs is not self._present:
+            self._present = now.play.runs
+            self._columns = [self._runs.index(run) for run in self._present]
+        held, period = now.play.state.gathered, now.play.state.period
+        if (period - 1) % self._every == 0:
+            self._following[(period - 1) // self._every, self._columns] = _count_following(held)
+        if period % self._every == 0:
+            self._sums[period // self._every, :, self._columns] = self._sum(held).T
+
+    def finish(self, now: Instant, place: int) -> Result:
+        """Return the result of a run, without a history.
+
+        Parameters
+        ----------
+        now : Instant
+            In which it has come to its end.
+        place : int
+            Where on the last axis the run is.
+        """
+        play, run, period = now.play, now.play.runs[place], now.play.state.period
+        scene, column, held = self._scenes[run], self._runs.index(run), play.state.gathered
+        count = 1 - (-period // self._every)
+        rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
-            rows["mode"][-1] = rows["mode"][-2]
-        return rows
+            rows[-1], following[-1] = self._sum(held)[:, place], _count_following(held)[place]
+        # In one piece each: they are gone through many times.
+        total, x, y, height, strongest = np.ascontiguousarray(rows.T)
+        first, last = self._first[:, column], play.state.row(0)[:, place]
+        sums = CellSums(total, x, y, height, strongest, following, first, last)
+        grid, time = play.systems[run].grid, scene.simulation.control_period
+        same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
+        if same not in self._ways:
+            moments = np.minimum(np.arange(count) * self._every, period) * time
+            self._ways[same] = way_over(grid, play.ways[run], moments)
+        way = self._ways[same]
+        found = compute_metrics_from_sums(
+            sums, way.time, way.fingertip, grid.positions, scene.set_point, way.cells
+        )
+        return report(scene, now.ended(place), found)
+
+    def _sum(self, held: Gathered) -> Floats:
+        """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
+        force = held.block[self._force, : held.near]
+        sums = np.empty((5, force.shape[1]))
+        np.add.reduce(force, out=sums[0])
+        for values, found in zip((*held.place[1:3], held.block[0]), sums[1:4], strict=True):
+            np.einsum("kb,kb->b", values[: held.near], force, out=found)
+        np.maximum.reduce(force, out=sums[4], initial=0.0)
+        return sums
 
 
-def _stretch(held: Gathered, runs: tuple[int, ...]) -> _Stretch:
-    """Make room for as many rows as a set of cells is used for."""
-    cells, several = held.cells.shape
-    wide, narrow = (several, KEPT, cells), (several, KEPT, held.near)
-    return _Stretch(runs, held, np.empty(wide), np.empty(wide), np.empty(wide, np.int8), np.empty(narrow))
-
-
-def _unfold(part: _Stretch, place: int, rows: dict[str, NDArray[Any]]) -> None:
-    """Write the rows of a stretch into a history; a cell that takes no part stays as it was."""
-    cells, near = part.held.cells[:, place], part.held.near
-    for names, numbers in ((("height", "force"), part.instants), (("mode", "command"), part.starts)):
-        if not numbers:
-            continue
-        first, last = numbers[0], numbers[-1] + 1
-        kept, loose = names
-        rows[kept][first:last] = rows[kept][max(first - 1, 0)]
-        for name, chosen in ((kept, cells), (loose, cells[:near] if loose == "force" else cells)):
-            rows[name][first:last, chosen] = getattr(part, name)[place, : last - first]
+def _count_following(held: Gathered) -> NDArray[np.intp]:
+    """Return how many cells of each run follow the force, shape (b,)."""
+    count: NDArray[np.intp] = np.count_nonzero(held.mode == FORCE_FOLLOW, axis=0)
+    return count

@@ -32,13 +32,23 @@ def weights(time: ArrayLike) -> Floats:
 
 
 def mean(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted mean, or None when there is nothing to average."""
+    """Return the weighted mean, or None when there is nothing to average.
+
+    Parameters
+    ----------
+    values, weight : ndarray (t,)
+    """
     total = float(np.sum(weight))
     return float(np.sum(weight * values)) / total if total > 0.0 else None
 
 
 def deviation(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted standard deviation about the weighted mean, or None without any rows."""
+    """Return the weighted standard deviation about the weighted mean, or None without any rows.
+
+    Parameters
+    ----------
+    values, weight : ndarray (t,)
+    """
     middle = mean(values, weight)
     if middle is None:
         return None
@@ -99,7 +109,13 @@ def amplitude(values: ArrayLike) -> float:
 
 
 def frequency(time: ArrayLike, values: ArrayLike) -> float | None:
-    """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
+    """Return how often a signal rises through its mean, Hz; None when it does so less than three times.
+
+    Parameters
+    ----------
+    time, values : array_like, shape (t,)
+        s, and the signal.
+    """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
     rises = np.flatnonzero(~above[:-1] & above[1:])

@@ -181,7 +181,14 @@ def reset(monitor: ErrorMonitor) -> ErrorMonitor:
 
 
 def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
-    """Return the monitor with a copy of the session's state, where a stretch is due; else as it is."""
+    """Return the monitor with a copy of the session's state, where a stretch is due; else as it is.
+
+    Parameters
+    ----------
+    monitor : ErrorMonitor
+    state : State
+        The session's, before a control period.
+    """
     if monitor.state is not None or monitor.left > 0:
         return monitor
     return replace(monitor, state=state.copy(), left=STRETCH)

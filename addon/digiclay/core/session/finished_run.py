@@ -15,9 +15,10 @@ from ..base.errors import OutputError
 from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
 from ..base.run_folder import MARK
 from ..base.whole_files import read_json
-from ..scene.recorder import Recorder, available_memory
+from ..scene.recorder import Recorder
 from ..scene.scene_source import load
 from ..scene.schema import Scene
+from .memory_limit import available_memory
 
 __all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "is_whole", "read_run"]
 

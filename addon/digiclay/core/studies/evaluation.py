@@ -184,7 +184,7 @@ def evaluate(
     """
     try:
         result = run(scene, stopped=stopped)
-        if errors and result.history is not None and not result.incomplete and has_every_command(scene):
+        if errors and not result.incomplete and has_every_command(scene):
             found = estimate_errors(scene, result.history, stopped=stopped)
             if found is None:
                 return None

@@ -13,8 +13,10 @@ from ..metrics.finger_path import lag, sum_cells
 from ..metrics.force import rfd
 from ..model.set_point import asked
 from ..model.trajectory import Path, Waypoint
+from ..scene.recorder import Recorder
 from ..scene.schema import Scene
-from .trials import Trial, trial
+from ..session.run_result import Result, select_rows
+from ..session.run_scene import run
 
 __all__ = ["Criterion", "Drag", "Follows", "Lift", "followed", "largest", "largest_speed"]
 
@@ -142,7 +144,7 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
     return Path(interpolation, tuple(Waypoint(time=t, position=(x, 0.0, z)) for t, x, z in points))
 
 
-def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Trial]:
+def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
     """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it.
 
     Parameters
@@ -156,8 +158,8 @@ def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Tri
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
-    done = trial(scene.with_sections(trajectory=path, simulation=shorter))
-    part = done.between(start, end)
+    done = run(scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()))
+    part = select_rows(done.history, start, end)
     sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
     behind, wanted = lag(sums, part["fingertip"]), asked(scene.set_point, sums.following)
     deviates = rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))

@@ -1,0 +1,110 @@
+"""Memory that a session takes, and refusal of one that this machine cannot hold."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from ..base.errors import ParameterError
+from ..engine.state import Rows
+from ..scene.recorder import CHUNK, Recorder
+from ..scene.schema import Scene
+
+__all__ = ["available_memory", "bytes_needed", "check_memory", "count_busy_cells", "refuse_what_cannot_fit"]
+
+#: Bytes one row takes for one cell: height, force and command as float64, mode as int8; and one while the
+#: metrics are computed, of which rows a cell follows the force in.
+BYTES_A_CELL = 3 * 8 + 1 + 1
+#: Bytes a cell takes besides its state's rows: position (2 float64), age (float64), mode (int8).
+BYTES_BESIDE = 2 * 8 + 8 + 1
+#: Bytes a cell of a recorded session takes while the metrics are computed, however many rows there are; and
+#: those a cell that takes part takes in a control period, and for its rows that wait (measured: about three
+#: times what they are, `CHUNK` rows of 25 bytes).
+BYTES_JUDGED, BYTES_BUSY, BYTES_WAITING = 100, 850, 3 * 25 * CHUNK
+#: Bytes of memory assumed where the system does not tell.
+ASSUMED_MEMORY = 8 * 2**30
+
+
+def count_busy_cells(scene: Scene) -> int:
+    """Return how many cells may take part at once: all, where a shape is displayed; else few."""
+    return scene.cells if scene.shape is not None else 0
+
+
+def check_memory(scene: Scene, rows: Rows) -> None:
+    """Refuse a session that cannot fit in memory, before it starts; ParameterError says what to change.
+
+    Parameters
+    ----------
+    scene : Scene
+    rows : Rows
+        Of its state.
+    """
+    busy = count_busy_cells(scene)
+    refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, available_memory(), busy)
+
+
+def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
+    """Return about how much memory a session takes; tests/unit/test_memory.py compares what it does take.
+
+    Parameters
+    ----------
+    recorder : Recorder or None
+    rows : Rows
+        Of the state.
+    cells, periods : int
+    busy : int, optional
+        Cells that may take part at once, where they are more than those under a finger.
+    """
+    held = 8 * rows.count + BYTES_BESIDE
+    at_work = BYTES_BUSY
+    if recorder is not None:
+        held += recorder.rows(periods) * BYTES_A_CELL + BYTES_JUDGED
+        at_work += BYTES_WAITING
+    return cells * held + busy * at_work
+
+
+def available_memory() -> int:
+    """Return how many bytes this machine can still give."""
+    linux = Path("/proc/meminfo")
+    told = (
+        re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
+    )
+    if told:
+        return int(told[1]) * 1024
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return ASSUMED_MEMORY
+
+
+def refuse_what_cannot_fit(
+    recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int, busy: int = 0
+) -> None:
+    """Refuse, before it starts, a session that some bytes cannot hold.
+
+    Parameters
+    ----------
+    recorder, rows, cells, periods, busy
+        See `bytes_needed`.
+    available : int
+        Bytes.
+
+    Raises
+    ------
+    ParameterError
+        With the numbers, and what to change.
+    """
+    needed = bytes_needed(recorder, rows, cells, periods, busy)
+    if needed <= available:
+        return
+    memory = f"{available / 1e9:.3g} GB of free memory"
+    alone = bytes_needed(None, rows, cells, periods, busy)
+    begun = needed - (recorder.rows(periods) * BYTES_A_CELL * cells if recorder else 0)
+    spare = (available - begun) // (cells * BYTES_A_CELL)
+    if recorder is None or spare < 2:
+        rule = f"must be few enough for {memory}"
+        raise ParameterError("layout", "rows * columns", rule, f"{cells} cells, {alone / 1e9:.3g} GB")
+    rule = f"must be at least {-(-periods // (spare - 1))} for the history to fit into {memory}"
+    value = f"{recorder.every}: {recorder.rows(periods)} rows of {cells} cells are {needed / 1e9:.3g} GB"
+    raise ParameterError("recorder", "every", rule, value)
