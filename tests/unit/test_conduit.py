@@ -24,8 +24,8 @@ def series(gap: str = "stroke") -> OrificeAndConduit:
 def valve_drop(law: OrificeAndConduit, flow: np.ndarray, opening: np.ndarray, power: int) -> np.ndarray:
     """Return the drop over the valve alone: the inverse of each branch, told apart by Re* (Q = 4e4 ν h)."""
     gap = 30e-6 * (opening if power == 1 else 1.0)
-    laminar = flow / (law.laminar * opening**power)
-    turbulent = (flow / (law.turbulent * opening)) ** 2
+    laminar = flow / (law.valve.laminar * opening**power)
+    turbulent = (flow / (law.valve.turbulent * opening)) ** 2
     return np.where(flow < 4e4 * THIN.viscosity * gap, laminar, turbulent)
 
 

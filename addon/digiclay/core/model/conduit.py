@@ -31,29 +31,41 @@ class Conduit(Parameters):
 
 
 @dataclass(frozen=True)
-class OrificeAndConduit(Orifice):
-    """Valve and conduit in series: the drops add, the flow is the same.
+class OrificeAndConduit:
+    """Valve and conduit in series: the drops add, the flow is one.
 
     Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
     smaller flow holds, as without a conduit.
 
     Attributes
     ----------
+    valve : Orifice
     resistance : float
         Of the conduit, Pa s/m³.
     """
 
+    valve: Orifice
     resistance: float
+
+    @property
+    def knee(self) -> float:
+        """Smallest drop at which some opening lets the flow turn turbulent, Pa."""
+        return self.valve.knee
+
+    @property
+    def power(self) -> int:
+        """Exponent of the opening in the laminar branch."""
+        return self.valve.power
 
     @property
     def resistances(self) -> tuple[float, float]:
         """Of the conduit, and of the fully open valve in its laminar branch, Pa s/m³."""
-        return self.resistance, 1.0 / self.laminar
+        return self.resistance, 1.0 / self.valve.laminar
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
         line, valve = self.resistances
-        lift = self.laminar_lift(opening, out)
+        lift = self.valve.laminar_lift(opening, out)
         series = lift * line
         series += valve
         lift /= series
@@ -61,13 +73,17 @@ class OrificeAndConduit(Orifice):
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""
-        a = self.turbulent * np.abs(opening)
+        a = self.valve.turbulent * np.abs(opening)
         ra = self.resistance * a
         turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
         laminar: Floats = self.laminar_conductance(opening)
         return np.minimum(laminar, turbulent)
 
+    def flow(self, opening: Floats, drop: Floats) -> Floats:
+        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`."""
+        return self.conductance(opening, drop) * drop
+
 
 def in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
     """Put a conduit behind a valve."""
-    return OrificeAndConduit(valve.laminar, valve.turbulent, valve.power, conduit.resistance(fluid))
+    return OrificeAndConduit(valve, conduit.resistance(fluid))

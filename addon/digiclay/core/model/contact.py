@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.arrays import constants
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["Contact"]
+__all__ = ["Contact", "ExponentialLaw"]
 
 Floats = NDArray[np.float64]
 
@@ -19,16 +19,19 @@ Floats = NDArray[np.float64]
 LARGEST_EXPONENT = 300.0
 
 
-@dataclass(frozen=True)
-class Contact(Parameters):
-    """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
+class ExponentialLaw:
+    """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, whatever their parameters are.
 
-    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
-    exponent: float = quantity(2000.0, "rate of stiffening of the pulp", unit="1/m", symbol="m", above=0.0)
-    offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
-    share: float = quantity(
-        0.34, "share of a cell in the flat-plate law", symbol="f_d", source="D", above=0.0
-    )
+    Attributes
+    ----------
+    stiffness, exponent, offset, share : float
+        b, N/m; m, 1/m; x0, m; share f_d of the force that a cell carries. Parameters or properties.
+    """
+
+    stiffness: float
+    exponent: float
+    offset: float
+    share: float
 
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force T, N, before the share f_d.
@@ -52,3 +55,15 @@ class Contact(Parameters):
         """What `tension` is made with: m, 1/m; m x0; the exponent's bounds; b/m, N."""
         m = self.exponent
         return m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m
+
+
+@dataclass(frozen=True)
+class Contact(ExponentialLaw, Parameters):
+    """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
+
+    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
+    exponent: float = quantity(2000.0, "rate of stiffening of the pulp", unit="1/m", symbol="m", above=0.0)
+    offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
+    share: float = quantity(
+        0.34, "share of a cell in the flat-plate law", symbol="f_d", source="D", above=0.0
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import constants
-from .contact import Contact
+from .contact import ExponentialLaw
 from .fingertip import Fingertip, forms, reach, reaches, underside
 from .interfaces import Pulp
 from .layout import Disc
@@ -27,7 +27,7 @@ class Touch:
     """Fingertip, contact law and relaxation of the pulp."""
 
     fingertip: Fingertip
-    contact: Contact
+    contact: ExponentialLaw
     pulp: Pulp
 
 

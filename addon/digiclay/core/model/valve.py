@@ -43,6 +43,10 @@ class Valve(Parameters):
         choices=("stroke", "opening"),
     )
 
+    def flow_law(self, fluid: Fluid) -> Orifice:
+        """Return the valve's flow law in a fluid."""
+        return orifice(self, fluid)
+
 
 @dataclass(frozen=True)
 class Orifice:

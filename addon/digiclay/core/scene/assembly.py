@@ -13,10 +13,11 @@ from ..engine.system import System, segments
 from ..model.delay import Queue, queue
 from ..model.fingertip import require_one
 from ..model.interfaces import Controller, Flow, Lag, Pulp, Sensors, Stepper
+from ..model.laws import select_law
 from ..model.layout import Grid, grid
 from ..model.physics import Cell, speeds
 from ..model.touch import Touch
-from ..model.valve import orifice
+from ..model.valve import Orifice
 from .schema import STEPPERS, Finger, Scene, part
 
 __all__ = ["assemble"]
@@ -58,7 +59,7 @@ def _stepper(scene: Scene) -> Stepper:
 
 def _flow(scene: Scene) -> Flow:
     """Return the valve, behind it the conduit if there is one."""
-    valve = orifice(scene.valve, scene.fluid)
+    valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
     if scene.conduit is None:
         return valve
     from ..model.conduit import in_series
@@ -80,7 +81,7 @@ def _touch(scene: Scene) -> Touch | None:
     finger = require_one(scene.fingers)
     if finger.fingertip is None or finger.contact is None:
         return None
-    return Touch(finger.fingertip, finger.contact, _pulp(finger))
+    return Touch(finger.fingertip, select_law("contact", finger.contact), _pulp(finger))
 
 
 def _pulp(finger: Finger) -> Pulp:

@@ -11,6 +11,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..control.methods import METHODS, ControlParameters
 from ..model.fingertip import require_one
+from ..model.laws import LAWS, law_parameters
 from ..model.set_point import SetPoint
 from ..model.trajectory import Path, Trajectory
 
@@ -46,18 +47,17 @@ __all__ = [
     "part",
 ]
 
-#: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`.
+#: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`, and those of
+#: valve and contact on their law, see `LAWS`.
 PARTS: dict[str, tuple[str, str]] = {
     "layout": ("model.layout", "Layout"),
     "actuator": ("model.actuator", "Actuator"),
     "supply": ("model.supply", "Supply"),
     "fluid": ("model.fluid", "Fluid"),
-    "valve": ("model.valve", "Valve"),
     "conduit": ("model.conduit", "Conduit"),
     "valve_lag": ("model.lag", "ValveLag"),
     "delay": ("model.delay", "Delay"),
     "fingertip": ("model.fingertip", "Fingertip"),
-    "contact": ("model.contact", "Contact"),
     "relaxation": ("model.relaxation", "Relaxation"),
     "sensors": ("model.sensors", "Sensing"),
     "blister": ("control.blister", "Blister"),
@@ -102,7 +102,16 @@ def part(module: str, name: str) -> Any:
 
 
 def parameters(section: str, method: str) -> type[Parameters]:
-    """Import the class that holds the parameters of a section."""
+    """Import the class that holds the parameters of a section.
+
+    Parameters
+    ----------
+    section : str
+    method : str
+        The control method.
+    """
+    if section in LAWS:
+        return law_parameters(section)
     module, name = (
         PARTS[section] if section != "control" else (METHODS[method].module, METHODS[method].parameters)
     )

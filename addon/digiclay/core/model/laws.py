@@ -1,0 +1,96 @@
+"""Laws a scene's valve and contact can follow: one row a law, one module each.
+
+A section with one law has that law's parameters. A section with several has `law` besides, which
+selects one, and the parameters of all: scene files, ``--set``, Blender and the nomenclature take them
+from this one class. A parameter that an earlier law of the section declares is not declared again.
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import fields, make_dataclass
+from functools import lru_cache
+from typing import Any
+
+from ..base.quantity import Parameters, quantity
+
+__all__ = ["LAWS", "law_parameters", "select_law"]
+
+#: By section: a law's name, the module within the core, and the class of its parameters there. The first is
+#: the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact law is a
+#: `contact.ExponentialLaw`.
+LAWS: dict[str, dict[str, tuple[str, str]]] = {
+    "valve": {
+        "orifice": ("model.valve", "Valve"),
+    },
+    "contact": {
+        "exponential": ("model.contact", "Contact"),
+    },
+}
+
+
+def law_parameters(section: str) -> type[Parameters]:
+    """Return the class of a section's parameters, those of all its laws."""
+    return _merge(section, tuple(LAWS[section]))
+
+
+def select_law(section: str, own: Any) -> Any:
+    """Return the parameters of the law that a section selects.
+
+    Parameters
+    ----------
+    section : str
+    own : Parameters
+        Of the class `law_parameters`.
+    """
+    names = tuple(LAWS[section])
+    if len(names) == 1:
+        return own
+    kind = _load(section, own.law)
+    return kind(**{field.name: getattr(own, field.name) for field in fields(kind)})
+
+
+def _load(section: str, law: str) -> Any:
+    """Import the class of a law's parameters."""
+    module, name = LAWS[section][law]
+    return getattr(importlib.import_module(f"..{module}", __package__), name)
+
+
+@lru_cache
+def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
+    """Return one class with the parameters of several laws."""
+    first: type[Parameters] = _load(section, names[0])
+    if len(names) == 1:
+        return first
+    declared: dict[str, Any] = {
+        "law": (str, quantity(names[0], f"law of the {section}", choices=names)),
+    }
+    own = {field.name for field in fields(first)}
+    for name in names[1:]:
+        for field in fields(_load(section, name)):
+            if field.name not in own:
+                known = field.metadata["quantity"]
+                declared.setdefault(field.name, (field.type, _declare(field.default, known)))
+
+    def check(self: Any) -> None:
+        first.check(self)
+        if self.law != names[0]:
+            select_law(section, self)
+
+    def reduce(self: Any) -> Any:
+        return _restore, (section, {field.name: getattr(self, field.name) for field in fields(self)})
+
+    namespace = {"check": check, "__reduce__": reduce, "__doc__": first.__doc__, "__module__": __name__}
+    parts = [(name, kind, field) for name, (kind, field) in declared.items()]
+    return make_dataclass(first.__name__, parts, bases=(first,), frozen=True, namespace=namespace)
+
+
+def _declare(default: Any, known: Any) -> Any:
+    """Declare a field with the quantity of another one."""
+    given = {field.name: getattr(known, field.name) for field in fields(known)}
+    return quantity(default, given.pop("doc"), **given)
+
+
+def _restore(section: str, values: dict[str, Any]) -> Parameters:
+    """Return parameters read from a pickle."""
+    return law_parameters(section)(**values)

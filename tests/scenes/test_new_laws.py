@@ -1,0 +1,196 @@
+"""A new law is one file and one line: it runs alone and in batches, and is found wherever parameters are."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from filecmp import dircmp
+from pathlib import Path
+
+import pytest
+
+from tests.patience import HANGS
+
+ROOT = Path(__file__).parents[2]
+
+#: An equal-percentage valve: the lift grows exponentially with the opening.
+VALVE = '''
+"""A valve whose lift grows exponentially with the opening."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ..base.quantity import Parameters, quantity
+from .fluid import Fluid
+from .valve import Orifice, Valve, orifice
+
+
+@dataclass(frozen=True)
+class EqualPercentage(Parameters):
+    """Seat valve with an exponential characteristic."""
+
+    orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", above=0.0)
+    stroke: float = quantity(30e-6, "lift of the fully open valve", unit="m", above=0.0)
+    rangeability: float = quantity(20.0, "lift when open over lift when just open", symbol="R", above=1.0)
+
+    def flow_law(self, fluid: Fluid) -> Orifice:
+        """Return the valve's flow law in a fluid."""
+        open_ = orifice(Valve(self.orifice_diameter, self.stroke), fluid)
+        return ExponentialOrifice(open_.laminar, open_.turbulent, open_.power, self.rangeability)
+
+
+@dataclass(frozen=True)
+class ExponentialOrifice(Orifice):
+    """Its flow law."""
+
+    rangeability: float
+
+    def laminar_lift(self, opening: Any, out: Any) -> Any:
+        """Return (R^|K| - 1) / (R - 1), squared."""
+        lift = np.abs(opening, out)
+        lift = np.multiply(lift, np.log(self.rangeability), out)
+        lift = np.expm1(lift, out)
+        lift = np.divide(lift, self.rangeability - 1.0, out)
+        return np.multiply(lift, lift, out)
+'''
+#: A pad whose stiffness doubles over a length: the exponential law by other parameters.
+CONTACT = '''
+"""A pad whose stiffness doubles over a length."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..base.quantity import Parameters, quantity
+from .contact import ExponentialLaw
+
+
+@dataclass(frozen=True)
+class Pad(ExponentialLaw, Parameters):
+    """Pad with a stiffness that doubles."""
+
+    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", above=0.0)
+    offset: float = quantity(0.0, "indentation at which force begins", unit="m", at_least=0.0)
+    share: float = quantity(0.34, "share of the law a cell carries", above=0.0)
+    doubling: float = quantity(0.4e-3, "indentation that doubles the stiffness", unit="m", above=0.0)
+
+    @property
+    def exponent(self) -> float:
+        """m, 1/m."""
+        return math.log(2.0) / self.doubling
+'''
+#: What runs in the copy: three values alone and in one batch; prints the largest differences.
+SESSION = """
+import json, sys
+import numpy as np
+from digiclay.core.batch.run_together import run_together
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.session.run_scene import run
+
+from digiclay.settings.groups import GROUPS
+
+section, law, key, *values = sys.argv[1:]
+
+def scene(*settings):
+    return load(find("tap"), [Setting(*one.split("=")) for one in settings])
+
+scenes = [scene(f"{section}.law={law}", f"{section}.{key}={value}") for value in values]
+alone = [run(one).history["height"] for one in scenes]
+batch = {}
+for number, result in run_together(scenes):
+    batch[number] = result.history["height"].copy()
+import tomllib
+said = text(scenes[1])
+print(json.dumps({
+    "batch": max(float(np.abs(batch[i] - alone[i]).max()) for i in range(len(values))),
+    "apart": float(np.abs(alone[0] - alone[-1]).max()),
+    "default": float(np.abs(run(scene()).history["height"] - alone[0]).max()),
+    "told": resolve(tomllib.loads(said)) == scenes[1],
+    "stepper": scenes[0].simulation.stepper,
+    "panel": [name in GROUPS[section].__annotations__ for name in ("law", key)],
+    "law in file": f'law = "{law}"' in said,
+}))
+"""
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """Return a copy of the package, and of what makes the nomenclature."""
+    for name in ("addon/digiclay", "tools", "docs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+    return tmp_path
+
+
+def add_law(copy: Path, section: str, row: str, name: str, text: str) -> None:
+    """Write a law's file, and its row into the list of laws."""
+    model = copy / "addon" / "digiclay" / "core" / "model"
+    (model / name).write_text(text.lstrip(), encoding="utf-8")
+    laws = model / "laws.py"
+    lines = laws.read_text(encoding="utf-8").splitlines(keepends=True)
+    place = lines.index(f'    "{section}": {{\n') + 2
+    laws.write_text("".join([*lines[:place], f"        {row}\n", *lines[place:]]), encoding="utf-8")
+
+
+def run_python(copy: Path, *arguments: str) -> str:
+    """Run Python on the copy; return what it printed."""
+    done = subprocess.run(
+        [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
+        capture_output=True, text=True, check=False, timeout=HANGS,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def touched(compared: dircmp[str]) -> list[str]:
+    """Return the files of the package that are new or differ."""
+    names = [*compared.right_only, *compared.diff_files]
+    return [
+        *(name for name in names if name.endswith(".py")),
+        *(name for inner in compared.subdirs.values() for name in touched(inner)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("section", "row", "name", "text", "asked"),
+    [
+        (
+            "valve",
+            '"equal_percentage": ("model.valve_exponential", "EqualPercentage"),',
+            "valve_exponential.py",
+            VALVE,
+            ("equal_percentage", "rangeability", "10", "20", "40"),
+        ),
+        (
+            "contact",
+            '"pad": ("model.pad", "Pad"),',
+            "pad.py",
+            CONTACT,
+            ("pad", "doubling", "0.3e-3", "0.4e-3", "0.6e-3"),
+        ),
+    ],
+)
+def test_a_new_law_is_one_file_and_one_line(
+    copy: Path, section: str, row: str, name: str, text: str, asked: tuple[str, ...]
+) -> None:
+    add_law(copy, section, row, name, text)
+    assert sorted(touched(dircmp(ROOT / "addon" / "digiclay", copy / "addon" / "digiclay"))) == sorted(
+        [name, "laws.py"]
+    )
+    found = json.loads(run_python(copy, "-c", SESSION, section, *asked))
+    # Sums in another order: a last bit here and there.
+    assert found.pop("batch") < 1e-12
+    assert found.pop("apart") > 1e-5
+    assert found.pop("default") > 1e-5
+    assert found == {"told": True, "stepper": "bernoulli", "law in file": True, "panel": [True, True]}
+    run_python(copy, str(copy / "tools" / "nomenclature.py"))
+    page = (copy / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    assert f"`{section}.{asked[1]}`" in page
+    assert f"`{section}.law`" in page
