@@ -52,22 +52,11 @@ class OrificeAndConduit:
         """Smallest drop at which some opening lets the flow turn turbulent, Pa."""
         return self.valve.knee
 
-    @property
-    def power(self) -> int:
-        """Exponent of the opening in the laminar branch."""
-        return self.valve.power
-
-    @property
-    def resistances(self) -> tuple[float, float]:
-        """Of the conduit, and of the fully open valve in its laminar branch, Pa s/m³."""
-        return self.resistance, 1.0 / self.valve.laminar
-
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
-        line, valve = self.resistances
         lift = self.valve.laminar_lift(opening, out)
-        series = lift * line
-        series += valve
+        series = lift * self.resistance
+        series += 1.0 / self.valve.laminar
         lift /= series
         return lift
 

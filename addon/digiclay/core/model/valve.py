@@ -75,11 +75,6 @@ class Orifice:
         """Smallest drop at which some opening lets the flow turn turbulent, Pa (equation 6 at h* = 1)."""
         return (self.turbulent / self.laminar) ** 2
 
-    @property
-    def resistances(self) -> tuple[float, float]:
-        """Of the line behind the valve, and of the fully open valve in its laminar branch, Pa s/m³."""
-        return 0.0, 1.0 / self.laminar
-
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
         """Return Q/ΔP in the laminar branch, m³/(s Pa), of openings K; in `out` if that is given."""
         conductance = self.laminar_lift(opening, out)
