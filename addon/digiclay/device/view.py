@@ -89,13 +89,7 @@ def tree_of(instant: Instant, lowest: float | None = None) -> Any:
 
 
 def dress(bed: Any, instant: Instant) -> None:
-    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    instant : Instant
-    """
+    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
     _modifier(bed).node_group = tree_of(instant, 0.0)
 
 
@@ -111,14 +105,7 @@ def guard(bed: Any) -> None:
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    instant : Instant
-        Of the same bed.
-    """
+    """Show another instant of the same bed, its fingertip's pose included."""
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 

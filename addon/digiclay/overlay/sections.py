@@ -169,15 +169,7 @@ def head_height(told: Told) -> float:
 
 
 def head(told: Told, pen: Pen, top: float) -> None:
-    """Name the bed, the method and how well the simulation keeps up.
-
-    Parameters
-    ----------
-    told : Told
-    pen : Pen
-    top : float
-        Pixels.
-    """
+    """Name the bed, the method and how well the simulation keeps up."""
     speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
     top = pen.row(top, told.name, "paused" if told.paused else speed)
     top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
@@ -190,15 +182,7 @@ def force_height(told: Told) -> float:
 
 
 def force(told: Told, pen: Pen, top: float) -> None:
-    """Draw the total force over the last seconds, its set point dashed.
-
-    Parameters
-    ----------
-    told : Told
-    pen : Pen
-    top : float
-        Pixels.
-    """
+    """Draw the total force over the last seconds, its set point dashed."""
     now = force_words(float(told.force[-1])) if told.force.size else ""
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
     top = pen.row(top, f"Total force  {now}", asked)
@@ -224,15 +208,7 @@ def heights_height(told: Told) -> float:
 
 
 def heights(told: Told, pen: Pen, top: float) -> None:
-    """Draw the heights of the picked pins over the last seconds.
-
-    Parameters
-    ----------
-    told : Told
-    pen : Pen
-    top : float
-        Pixels.
-    """
+    """Draw the heights of the picked pins over the last seconds."""
     if not told.pins:
         pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
         return
@@ -259,15 +235,7 @@ def scale_height(told: Told) -> float:
 
 
 def scale(told: Told, pen: Pen, top: float) -> None:
-    """Draw the colours of the force on a pin.
-
-    Parameters
-    ----------
-    told : Told
-    pen : Pen
-    top : float
-        Pixels.
-    """
+    """Draw the colours of the force on a pin."""
     if told.top is None:
         return
     top = pen.row(top, "Force on a pin")
@@ -283,15 +251,7 @@ def modes_height(told: Told) -> float:
 
 
 def modes(told: Told, pen: Pen, top: float) -> None:
-    """List how many pins are in each mode that occurs, with its colour.
-
-    Parameters
-    ----------
-    told : Told
-    pen : Pen
-    top : float
-        Pixels.
-    """
+    """List how many pins are in each mode that occurs, with its colour."""
     top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):
         x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
