@@ -55,9 +55,25 @@ class Lag(Protocol):
     @property
     def rows(self) -> int: ...
 
-    def opening(self, own: Floats, command: Floats) -> Floats: ...
+    def opening(self, own: Floats, command: Floats) -> Floats:
+        """Return the opening K, shape (n,).
 
-    def rate(self, own: Floats, command: Floats) -> Floats: ...
+        Parameters
+        ----------
+        own : ndarray (rows, n)
+        command : ndarray (n,)
+        """
+        ...
+
+    def rate(self, own: Floats, command: Floats) -> Floats:
+        """Return the rates of change of `own`, 1/s.
+
+        Parameters
+        ----------
+        own : ndarray (rows, n)
+        command : ndarray (n,)
+        """
+        ...
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats: ...
 
@@ -88,11 +104,23 @@ class Sensors(Protocol):
     def rows(self) -> int: ...
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
-        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is."""
+        """Return measured forces, N, and heights, m, shape (m,); `own`, (rows, m), stays as it is.
+
+        Parameters
+        ----------
+        own : ndarray (rows, m)
+        truth : Truth
+        """
         ...
 
     def update(self, own: Floats, truth: Truth) -> None:
-        """Bring `own` up to date, in place, with what there is at the end of a period."""
+        """Bring `own` up to date, in place, with what there is at the end of a period.
+
+        Parameters
+        ----------
+        own : ndarray (rows, m)
+        truth : Truth
+        """
         ...
 
 
@@ -137,7 +165,16 @@ class Stepper(Protocol):
         ...
 
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
-        """Work out once what all periods share."""
+        """Work out once what all periods share.
+
+        Parameters
+        ----------
+        cell : physics.Cell
+        queue : Queue
+            Commands on their way to the valve.
+        segments : tuple of Segment
+            Physics steps of a period.
+        """
         ...
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
@@ -223,9 +260,25 @@ class Controller(Protocol):
         ...
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control."""
+        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control.
+
+        Parameters
+        ----------
+        memory : object
+            From `begin`, or the period before.
+        touched : Measurement
+            Of the cells the finger may touch.
+        """
         ...
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
-        """Return memory and orders for the cells of the disc and all that still move."""
+        """Return memory and orders for the cells of the disc and all that still move.
+
+        Parameters
+        ----------
+        memory : object
+            From `locate`.
+        seen : Measurement
+            Of the cells to command.
+        """
         ...
