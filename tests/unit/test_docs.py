@@ -22,6 +22,7 @@ PAGES = sorted(
     ]
 )
 PACKAGES = ("addon", "benchmarks", "digiclay_paper", "tools")
+SOURCES = (*PACKAGES, "tests")
 #: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(
     r"^(what|how|why|where|when|who|which|whether)\b"
@@ -133,6 +134,18 @@ def test_every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
         if not file.exists() or (anchor and anchor not in _anchors(file)):
             broken.append(target)
     assert broken == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_module_a_page_names_exists(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"(?<![\w./])((?:\w+/)*\w+\.py)\b", text)
+    known = [
+        f"/{path.relative_to(ROOT).as_posix()}"
+        for folder in SOURCES
+        for path in (ROOT / folder).rglob("*.py")
+    ]
+    assert [name for name in named if not any(path.endswith(f"/{name}") for path in known)] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
