@@ -10,12 +10,12 @@ import platform
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from digiclay import __version__
 from digiclay.commands.arguments import add_command
-from digiclay.commands.progress import Steps
+from digiclay.commands.progress import Line, draw_share
 from digiclay.commands.refusals import refuse_unwritable
 from digiclay.commands.tables import table
 from digiclay.core.base.errors import OutputError
@@ -53,6 +53,30 @@ def _folder(text: str) -> Path:
     except OutputError as error:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
     return Path(text)
+
+
+class Steps(Line):
+    """Progress of a sequence of pieces; updated after each with its name.
+
+    Parameters
+    ----------
+    stream : TextIO
+    label : str
+    total : int
+        Pieces of work.
+    """
+
+    def __init__(self, stream: TextIO, label: str, total: int) -> None:
+        super().__init__(stream)
+        self._label, self._total, self._done = label, total, 0
+
+    def __call__(self, doing: str = "") -> None:
+        """Count one more piece as done, and draw the bar if it is time to."""
+        self._done += 1
+        if self.due():
+            share = self._done / self._total
+            said = f"{self._done} of {self._total}{self.left(share)}  {doing}"
+            self.draw(f"{self._label} {draw_share(share)} {said}")
 
 
 def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:

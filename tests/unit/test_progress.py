@@ -6,7 +6,9 @@ import io
 from collections.abc import Callable
 
 import pytest
-from digiclay.commands.progress import PAUSE, Bar, Counted, Line, Steps, format_duration
+from digiclay.commands.progress import PAUSE, Bar, Counted, Line, format_duration
+
+from benchmarks.report import Steps
 
 #: Each kind of progress, and one step of it of three.
 KINDS: dict[str, Callable[[io.StringIO], Line]] = {

@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..core.base.whole_files import as_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
-from ..core.session.run_scene import Result, run, save
+from ..core.session.run_scene import run, save
 from ..core.studies.job_outputs import Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
 from .arguments import add_command
@@ -140,11 +141,7 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
     timing: dict[str, Any] = {"start_up": started - arguments.since if arguments.since else None}
     patience = GRACE if arguments.follow else 0.0
     with write_folder(out, overwrite=arguments.overwrite, patience=patience) as staged:
-        for step, work in _steps(scene, outputs, staged, stopped, tell):
-            began = time.perf_counter()
-            if stopped() or not work():
-                raise KeyboardInterrupt
-            timing[step] = time.perf_counter() - began
+        _make(scene, outputs, staged, timing, stopped, tell)
         for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
             shutil.copyfile(folder / file, staged / file)
         timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
@@ -152,65 +149,67 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
     return out
 
 
-def _steps(
-    scene: Scene, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
-) -> Iterator[tuple[str, Callable[[], bool]]]:
-    """Give each step by its name; a step returns False when it was stopped."""
-    results: list[Result] = []
+def _make(
+    scene: Scene,
+    outputs: Outputs,
+    out: Path,
+    timing: dict[str, Any],
+    stopped: Callable[[], bool],
+    tell: Tell,
+) -> None:
+    """Run the session, and make all that belongs to it; KeyboardInterrupt when it was stopped."""
     names = ["run", *(n for n in ("errors", "export", "still", "turntable", "film") if getattr(outputs, n))]
-    said = [0.0]
+    told = 0.0
 
-    def telling(step: str) -> Callable[[int, int], None]:
-        before = names.index(step)
+    @contextmanager
+    def step(name: str) -> Iterator[Callable[[int, int], None]]:
+        """Time a step; give what is to be called with how much of it is done."""
 
-        def told(done: int, total: int) -> None:
-            now = time.monotonic()
-            if now - said[0] >= PAUSE:
-                said[0] = now
-                tell(step, (before + done / total) / len(names))
+        def progress(done: int, total: int) -> None:
+            nonlocal told
+            if time.monotonic() - told >= PAUSE:
+                told = time.monotonic()
+                tell(name, (names.index(name) + done / total) / len(names))
 
-        return told
+        if stopped():
+            raise KeyboardInterrupt
+        began = time.perf_counter()
+        yield progress
+        timing[name] = time.perf_counter() - began
 
-    def simulate() -> bool:
-        versions = {"digiclay": __version__}
-        results.append(run(scene, progress=telling("run"), stopped=stopped, versions=versions))
-        return not results[-1].incomplete
-
-    def judge() -> bool:
-        result = results[-1]
-        if has_every_command(scene):
-            errors = estimate_errors(scene, result.history, progress=telling("errors"), stopped=stopped)
-            if errors is None:
-                return False
-            results.append(result.with_errors(errors))
-        return True
-
-    def keep() -> bool:
-        save(results[-1], out)
-        return True
-
-    yield "run", simulate
+    with step("run") as progress:
+        result = run(scene, progress=progress, stopped=stopped, versions={"digiclay": __version__})
+        if result.incomplete:
+            raise KeyboardInterrupt
     if outputs.errors:
-        yield "errors", judge
-    yield "save", keep
-    history = results[-1].history
+        with step("errors") as progress:
+            if has_every_command(scene):
+                errors = estimate_errors(scene, result.history, progress=progress, stopped=stopped)
+                if errors is None:
+                    raise KeyboardInterrupt
+                result = result.with_errors(errors)
+    with step("save"):
+        save(result, out)
+    history = result.history
     if not history:
         return
     if outputs.export:
-        yield "export", lambda: bool(exported(scene, history, -1, outputs.export, out, outputs.mesh))
-    still, turning, film = outputs.still, outputs.turntable, outputs.film
-    if still:
-        yield "still", lambda: bool(draw_still(scene, history, still, out / "still.png"))
-    if turning:
-        path, turns = out / "turntable.mp4", telling("turntable")
-        yield "turntable", lambda: bool(draw_turntable(scene, history, turning, path, turns, stopped))
-    if film:
-        whole, plays = out / "film.mp4", telling("film")
-        yield "film", lambda: bool(draw_film(scene, history, film, whole, plays, stopped))
-    if still:
-        yield "thumbnail", lambda: bool(of_picture(out / "still.png", out))
-    else:
-        yield (
-            "thumbnail",
-            lambda: bool(of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)),
-        )
+        with step("export"):
+            exported(scene, history, -1, outputs.export, out, outputs.mesh)
+    if outputs.still:
+        with step("still"):
+            draw_still(scene, history, outputs.still, out / "still.png")
+    if outputs.turntable:
+        with step("turntable") as progress:
+            path = out / "turntable.mp4"
+            if not draw_turntable(scene, history, outputs.turntable, path, progress, stopped):
+                raise KeyboardInterrupt
+    if outputs.film:
+        with step("film") as progress:
+            if not draw_film(scene, history, outputs.film, out / "film.mp4", progress, stopped):
+                raise KeyboardInterrupt
+    with step("thumbnail"):
+        if outputs.still:
+            of_picture(out / "still.png", out)
+        else:
+            of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)

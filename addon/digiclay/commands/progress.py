@@ -6,7 +6,7 @@ import shutil
 import time
 from typing import Self, TextIO
 
-__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "Steps", "format_duration"]
+__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "draw_share", "format_duration"]
 
 #: Cells of a bar, and seconds between two drawings of it.
 WIDTH, PAUSE = 28, 0.1
@@ -99,30 +99,6 @@ class Counted(Line):
             here = (done - self._before) / max(total - self._before, 1)
             said = f"{int(done)} of {total} {self._unit}{self.left(here)}{note}"
             self.draw(f"{self._label} {draw_share(done / total)} {said}")
-
-
-class Steps(Line):
-    """Progress of a sequence of pieces; updated after each with its name.
-
-    Parameters
-    ----------
-    stream : TextIO
-    label : str
-    total : int
-        Pieces of work.
-    """
-
-    def __init__(self, stream: TextIO, label: str, total: int) -> None:
-        super().__init__(stream)
-        self._label, self._total, self._done = label, total, 0
-
-    def __call__(self, doing: str = "") -> None:
-        """Count one more piece as done, and draw the bar if it is time to."""
-        self._done += 1
-        if self.due():
-            share = self._done / self._total
-            said = f"{self._done} of {self._total}{self.left(share)}  {doing}"
-            self.draw(f"{self._label} {draw_share(share)} {said}")
 
 
 def draw_share(share: float) -> str:

@@ -1,12 +1,13 @@
-"""Size check of external TOML text, before parsing."""
+"""TOML text: size check of external text before parsing, and values as text."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from typing import Any
 
-__all__ = ["LARGEST", "parse_tables"]
+__all__ = ["LARGEST", "format_value", "parse_tables"]
 
 #: Most bytes of a text: the heights of the largest bed, 20 million cells, packed, take 107 MB of them.
 LARGEST = 128_000_000
@@ -45,3 +46,15 @@ def parse_tables(text: str) -> dict[str, Any]:
         line = text.count("\n", 0, piece.start()) + 1
         raise ValueError(f"{said} (at line {line})")
     return tomllib.loads(text)
+
+
+def format_value(value: Any) -> str:
+    """Write a text, number, truth value, or a list of them; a float reads back as the same one."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(format_value, value))}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's; only TOML wants the delete character escaped as well.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

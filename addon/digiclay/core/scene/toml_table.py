@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.part_table import read_part, refuse_unknown, shorten, show_value
 from ..base.quantity import Parameters, quantities
+from ..base.toml_text import format_value
 from ..control.methods import METHODS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, parameters
@@ -209,7 +209,7 @@ def _lines(scene: Scene) -> Iterator[str]:
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
     yield "# Every parameter of the scene, in SI units."
-    yield from (f"{key} = {_toml(getattr(scene, key))}" for key in TEXTS)
+    yield from (f"{key} = {format_value(getattr(scene, key))}" for key in TEXTS)
     yield from (
         f'{name} = "{ABSENT}"' for name in OPTIONAL if name in sections and scene.section(name) is None
     )
@@ -236,28 +236,21 @@ def _part_lines(section: str, part: Parameters | None, method: str = "") -> Iter
         return
     yield f"\n[{section}]"
     if method:
-        yield f"method = {_toml(method)}"
+        yield f"method = {format_value(method)}"
     for key, known in quantities(part).items():
         note = f"{known.unit}: {known.doc}" if known.unit else known.doc
-        yield f"{key} = {_toml(getattr(part, key))}  # {note}"
+        yield f"{key} = {format_value(getattr(part, key))}  # {note}"
 
 
 def _path_lines(section: str, path: Path) -> Iterator[str]:
     """Give the lines of a finger's path."""
     yield f"\n[{section}]"
-    yield f"interpolation = {_toml(path.interpolation)}"
+    yield f"interpolation = {format_value(path.interpolation)}"
     yield "waypoints = ["
     for point in path.waypoints:
-        pairs = (f"{field.name} = {_toml(getattr(point, field.name))}" for field in dataclasses.fields(point))
+        pairs = (
+            f"{field.name} = {format_value(getattr(point, field.name))}"
+            for field in dataclasses.fields(point)
+        )
         yield f"  {{ {', '.join(pairs)} }},"
     yield "]"
-
-
-def _toml(value: Any) -> str:
-    """Write a value; a float is written so that it reads back as the same one."""
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's; only TOML wants the delete character escaped as well.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)

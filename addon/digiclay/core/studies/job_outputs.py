@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,10 +9,11 @@ from typing import Any
 from ..base.errors import ParameterError
 from ..base.part_table import read_part, refuse_unknown, show_value
 from ..base.quantity import Parameters, quantities
+from ..base.toml_text import format_value
 from ..mesh_io.export_model import Model
 from ..session.render_settings import Film, Still, Turntable
 
-__all__ = ["KEYS", "Outputs", "make_outputs", "write_value"]
+__all__ = ["KEYS", "Outputs", "make_outputs"]
 
 #: Pictures a job can leave, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
@@ -54,7 +54,7 @@ class Outputs:
     def text(self) -> str:
         """Return a job.toml that reads back as an equal value."""
         lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
-        lines += [f"export = {write_value(list(self.export))}", f"errors = {write_value(self.errors)}"]
+        lines += [f"export = {format_value(list(self.export))}", f"errors = {format_value(self.errors)}"]
         for section in SECTIONS:
             part = getattr(self, section)
             if part is None:
@@ -62,7 +62,7 @@ class Outputs:
             lines.append(f"\n[{section}]")
             for key, known in quantities(part).items():
                 note = f"{known.unit}: {known.doc}" if known.unit else known.doc
-                lines.append(f"{key} = {write_value(getattr(part, key))}  # {note}")
+                lines.append(f"{key} = {format_value(getattr(part, key))}  # {note}")
         return "\n".join(lines) + "\n"
 
 
@@ -92,15 +92,3 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
             raise ParameterError(section, "", f"must be a section, [{section}]", show_value(own))
         parts[section] = read_part(section, kind, {}, own)
     return Outputs(tuple(export), errors, **parts)
-
-
-def write_value(value: Any) -> str:
-    """Write a value as TOML: a text, number, truth value, or a list of them."""
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(write_value, value))}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's; only TOML wants the delete character escaped as well.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)

@@ -18,13 +18,14 @@ from ..base.errors import ParameterError, SceneError, one_line
 from ..base.part_table import refuse_unknown, show_value
 from ..base.safe_names import find_name, make_unique_names
 from ..base.sample_file import found, named
+from ..base.toml_text import format_value
 from ..control.methods import METHODS
 from ..model.layout import grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
 from ..scene.schema import Scene
 from ..shapes.height_text import packed
 from ..shapes.source_file import fitted_to
-from .job_outputs import KEYS, Outputs, make_outputs, write_value
+from .job_outputs import KEYS, Outputs, make_outputs
 
 __all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "find_jobs_file", "read_jobs", "read_outputs"]
 
@@ -153,7 +154,7 @@ def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
         if not re.fullmatch(r"\w[\w.+-]*", label):
             raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
         option = f"settings.{label}"
-        found[label] = [Setting(key, write_value(value), option) for key, value in _flat(changes)]
+        found[label] = [Setting(key, format_value(value), option) for key, value in _flat(changes)]
     return found
 
 
@@ -179,7 +180,7 @@ def _name(file: Path, method: str, label: str) -> str:
 
 def _job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
     """Make one job."""
-    chosen = [Setting("control.method", write_value(method), "methods")] if method else []
+    chosen = [Setting("control.method", format_value(method), "methods")] if method else []
     try:
         return Job(name, _alone(load(file, [*chosen, *setting[1]])))
     except (SceneError, ParameterError) as error:
