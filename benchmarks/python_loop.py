@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 from digiclay.core.engine.simulation import begin
+from digiclay.core.model.conduit import OrificeAndConduit
 from digiclay.core.model.fingertip import JOIN
 from digiclay.core.steppers.bernoulli_plan import POINTS
 from digiclay.core.steppers.closed_form import TINY, crossed
@@ -90,7 +91,9 @@ class Scalar:
         cell, contact, pulp = line.cell, line.contact, line.pulp
         self.tip, self.h = line.tip, step
         self.high, self.low, self.stroke = cell.supply.high, cell.supply.low, cell.actuator.stroke
-        self.laminar, self.resistance = cell.flow.laminar, cell.flow.resistance
+        flow = cell.flow
+        assert isinstance(flow, OrificeAndConduit)
+        self.laminar, self.resistance = flow.valve.laminar, flow.resistance
         self.area, self.m = cell.actuator.area, contact.exponent
         self.unit = contact.stiffness / contact.exponent
         self.share = contact.share
