@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import shlex
 from collections.abc import Iterator
@@ -146,6 +147,34 @@ def test_every_module_a_page_names_exists(page: Path) -> None:
         for path in (ROOT / folder).rglob("*.py")
     ]
     assert [name for name in named if not any(path.endswith(f"/{name}") for path in known)] == []
+
+
+@functools.cache
+def _definitions() -> dict[str, set[str]]:
+    """Return the names that each module defines, by the module's own name; those of equal names together."""
+    defined: dict[str, set[str]] = {}
+    for path in (path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")):
+        names = defined.setdefault(path.stem, set())
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                names.add(node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+    return defined
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_name_of_a_module_that_a_page_gives_exists(page: Path) -> None:
+    parameters = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    endings = {"py", "md", "csv", "png", "toml", "json", "npz", "stl", "obj", "html"}
+    named = re.findall(r"`(?!bpy)(?:[\w.]+\.)?([a-z_]+)\.([A-Za-z]\w*)", page.read_text(encoding="utf-8"))
+    wrong = [
+        f"{module}.{name}"
+        for module, name in named
+        if module in _definitions() and name not in endings and f"`{module}.{name}`" not in parameters
+        if name not in _definitions()[module] and name not in _definitions()
+    ]
+    assert wrong == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
