@@ -36,7 +36,7 @@ BANNED = re.compile(
     r"\b(wants?|wishes|knows|knew|lives|lived|judges?|judged|judging|tells?|told|says?|said|asks?|speaks?"
     r"|remembers?|forgets?|believes?|thinks?|sees|notices|feels?|likes to|a gift|for free|as ever"
     r"|take part|takes part|taking part|taken part|stands? for|of its own accord"
-    r"|the finger|fingers? of|left out|what it costs)\b",
+    r"|the finger|fingers? of|left out|what it costs|stand-ins?|gathering|stacks?)\b",
     re.IGNORECASE,
 )
 #: A speed or a run time: a row of a table, not a sentence.
