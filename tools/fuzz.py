@@ -27,8 +27,15 @@ from digiclay.core.engine.simulation import advance, begin, periods, trace_finge
 from digiclay.core.engine.system import System
 from digiclay.core.model.trajectory import Path, Waypoint, interpolate_poses
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import OPTIONAL, SECTIONS, STEPPERS, UNASKED, parameters
-from digiclay.core.scene.toml_table import ABSENT, PRESETS, resolve, text
+from digiclay.core.scene.schema import (
+    FINGER_SECTIONS,
+    OPTIONAL,
+    SECTIONS,
+    STEPPERS,
+    UNASKED,
+    import_parameters,
+)
+from digiclay.core.scene.toml_table import ABSENT, FINGERS, PRESETS, format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import run
 from digiclay.core.session.snapshot import START
@@ -85,7 +92,7 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
         section = SECTIONS[chance.integers(len(SECTIONS))]
         if made.get(section) == ABSENT or (section == "blister" and "blister" not in made):
             continue
-        known = parameters(section, method if method != ABSENT else "virtual_master")
+        known = import_parameters(section, method if method != ABSENT else "virtual_master")
         fields = list(quantities(known))
         field = fields[chance.integers(len(fields))]
         made.setdefault(section, {})[field] = odd(chance, getattr(known(), field))
@@ -98,6 +105,10 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
         usual = {"orientation": (1.0, 0.0, 0.0, 0.0)}.get(field) or point.get(field)
         point[field] = odd(chance, tuple(usual) if isinstance(usual, list) else usual)
         made["trajectory"] = {"waypoints": points, "interpolation": ("smooth", "linear")[chance.integers(2)]}
+    if chance.random() < 0.2:
+        # The same finger as one or two in a list; the physics refuses two.
+        own = {section: made.pop(section) for section in FINGER_SECTIONS if section in made}
+        made[FINGERS] = [own] * int(chance.integers(0, 3)) if chance.random() < 0.9 else odd(chance, [own])
     return made
 
 
@@ -105,7 +116,9 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
 def written() -> str:
     """Return the text of a small scene."""
     small = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
-    return text(resolve({"layout": {"rows": 3, "columns": 3}, "blister": small, "sensors": {}, "shape": {}}))
+    return format_scene(
+        resolve({"layout": {"rows": 3, "columns": 3}, "blister": small, "sensors": {}, "shape": {}})
+    )
 
 
 def spoilt(chance: np.random.Generator) -> str:
@@ -133,7 +146,7 @@ def scene(chance: np.random.Generator) -> None:
     else:
         made = table(chance)
     found = resolve(made)
-    assert resolve(parse_tables(text(found))) == found
+    assert resolve(parse_tables(format_scene(found))) == found
     if found.cells > CELLS or found.cells * found.periods > RECORDED:
         return
     seen: list[int] = []

@@ -15,7 +15,7 @@ if __name__ == "__main__":
 
 from digiclay.core.base.quantity import EXTENTS, Parameters, Quantity, quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
-from digiclay.core.scene.schema import SECTIONS, parameters  # noqa: E402
+from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
 
 INTRODUCTION = """\
 # Nomenclature
@@ -188,7 +188,7 @@ def bounds(known: Quantity) -> str:
 
 def section(name: str, method: str) -> list[str]:
     """Return the lines of one section of a scene file."""
-    kind: type[Parameters] = parameters(name, method)
+    kind: type[Parameters] = import_parameters(name, method)
     title = f"### [{name}]" + (f' with method = "{method}"' if name == "control" else "")
     lines = ["", title, "", "| Symbol | Name | Unit | Meaning | Range | Default | Source |", RULE]
     defaults = kind()

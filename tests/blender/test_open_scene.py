@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
-from digiclay.core.scene.scene_source import SAMPLES, find, load, sample_names
+from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
 from digiclay.core.shapes.source_file import sample_shapes
 from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
@@ -21,7 +21,7 @@ from tests.assemble import replayed
 pytestmark = pytest.mark.usefixtures("extension")
 
 
-@pytest.mark.parametrize("name", sample_names())
+@pytest.mark.parametrize("name", list_samples())
 def test_every_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"session:{name}", take=False) == {"FINISHED"}
     bed, wanted = bpy.context.object, load(find(name))

@@ -13,8 +13,8 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import quantities
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.scene.scene_source import find, load, sample_names
-from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, parameters
+from digiclay.core.scene.scene_source import find, list_samples, load
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.settings import properties
 from digiclay.settings.shown_units import unit_of
@@ -52,7 +52,7 @@ def test_every_parameter_of_a_part_has_a_property_with_its_unit_and_meaning(
     settings = thing().digiclay
     settings.method = method
     shown = properties.part_group(settings, section).bl_rna.properties
-    kind = parameters(section, method)
+    kind = import_parameters(section, method)
     defaults = {field.name: field.default for field in dataclasses.fields(kind)}
     for name, known in quantities(kind).items():
         unit, _ = unit_of(known.unit, defaults[name])
@@ -65,7 +65,7 @@ def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str)
     settings = thing().digiclay
     settings.method = method
     group = properties.part_group(settings, section)
-    kind = parameters(section, method)
+    kind = import_parameters(section, method)
     for field in dataclasses.fields(kind):
         known = field.metadata["quantity"]
         if not isinstance(field.default, float):
@@ -78,7 +78,7 @@ def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str)
                 assert known.broken_rule(value) == "", field.name
 
 
-@pytest.mark.parametrize("sample", sample_names())
+@pytest.mark.parametrize("sample", list_samples())
 def test_a_sample_scene_comes_back_bit_for_bit(sample: str) -> None:
     scene = load(find(sample))
     bed = thing(scene.layout)

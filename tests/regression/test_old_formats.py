@@ -12,7 +12,7 @@ from digiclay.core.engine.simulation import periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import SECTIONS, Scene
-from digiclay.core.scene.toml_table import ABSENT, text
+from digiclay.core.scene.toml_table import ABSENT, format_scene
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, replay
 
@@ -70,7 +70,7 @@ def test_a_scene_of_an_older_version_is_what_it_was(path: Path) -> None:
 
 @pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_a_scene_of_one_finger_is_written_as_older_versions_read_it(path: Path) -> None:
-    assert without_notes(text(load(path))) == without_notes(path.read_text(encoding="utf-8"))
+    assert without_notes(format_scene(load(path))) == without_notes(path.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("path", BY_HAND, ids=lambda path: path.stem)

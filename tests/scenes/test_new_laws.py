@@ -92,7 +92,7 @@ import json, sys
 import numpy as np
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
 
 from digiclay.settings.groups import GROUPS
@@ -108,7 +108,7 @@ batch = {}
 for number, result in run_together(scenes):
     batch[number] = result.history["height"].copy()
 import tomllib
-said = text(scenes[1])
+said = format_scene(scenes[1])
 print(json.dumps({
     "batch": max(float(np.abs(batch[i] - alone[i]).max()) for i in range(len(values))),
     "apart": float(np.abs(alone[0] - alone[-1]).max()),

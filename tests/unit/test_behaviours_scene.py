@@ -11,7 +11,7 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.scene.toml_table import format_scene, resolve
 
 BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 
@@ -36,7 +36,7 @@ def test_a_behaviour_forms_no_blister(method: str) -> None:
 @pytest.mark.parametrize("method", BEHAVIOURS)
 def test_a_scene_with_the_behaviour_reads_back_equal(method: str) -> None:
     scene = resolve({"control": {"method": method}})
-    assert resolve(tomllib.loads(text(scene))) == scene
+    assert resolve(tomllib.loads(format_scene(scene))) == scene
 
 
 WRONG = [

@@ -17,10 +17,10 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.snapshot import START
-from digiclay.core.session.take import Take, from_bytes, make_scene, to_bytes
+from digiclay.core.session.take import Take, from_bytes, to_bytes, to_scene
 
 ROOT = Path(__file__).parents[2]
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
@@ -69,13 +69,13 @@ def test_a_scene_of_any_number_of_fingers_is_written_and_read_back(words: str) -
     made = resolve(
         parse_tables(words + BED) if words.startswith("finger") else parse_tables(BED + words), "bed"
     )
-    assert resolve(parse_tables(text(made))) == made
+    assert resolve(parse_tables(format_scene(made))) == made
 
 
 def test_one_finger_in_a_list_is_the_same_as_one_beside_the_other_sections() -> None:
     beside = ONE.replace("[[finger]]", "").replace("[finger.", "[")
     assert scene(ONE) == scene(beside)
-    assert "[[finger]]" not in text(scene(ONE))
+    assert "[[finger]]" not in format_scene(scene(ONE))
 
 
 def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_a_take_of_a_later_version_is_refused() -> None:
 def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
     made = scene(ONE)
     system = assemble(made)
-    (finger,) = make_scene(replace(take_of(made), start=snapshot.dump(system, begin(system))), "take").fingers
+    (finger,) = to_scene(replace(take_of(made), start=snapshot.dump(system, begin(system))), "take").fingers
     assert [point.time for point in finger.trajectory.waypoints] == [0.0, pytest.approx(0.015)]
 
 

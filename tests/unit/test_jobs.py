@@ -10,7 +10,7 @@ import pytest
 from digiclay.core.base.errors import SceneError
 from digiclay.core.model.layout import grid
 from digiclay.core.scene.scene_source import SAMPLES, load
-from digiclay.core.scene.toml_table import text
+from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.render_settings import Film, Still, Turntable
 from digiclay.core.shapes.source_file import fitted_to
 from digiclay.core.studies.job_outputs import Outputs, make_outputs
@@ -132,7 +132,7 @@ def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
     assert job.scene is not None
     assert job.scene.shape is not None
     (tmp_path / "far").mkdir()
-    (tmp_path / "far" / "scene.toml").write_text(text(job.scene), encoding="utf-8")
+    (tmp_path / "far" / "scene.toml").write_text(format_scene(job.scene), encoding="utf-8")
     wanted = fitted_to(job.scene.shape, grid(job.scene.layout), job.scene.actuator).heights
     (tmp_path / "own.npy").unlink()
     alone = load(tmp_path / "far" / "scene.toml")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.schema import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene, Simulation
-from digiclay.core.scene.toml_table import PRESETS, resolve, text
+from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
 
 def section(name: str, **values: Any) -> Scene:
@@ -275,12 +275,12 @@ SCENES: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("table", SCENES.values(), ids=SCENES.keys())
 def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table: dict[str, Any]) -> None:
     scene = resolve(table, "some name")
-    assert resolve(tomllib.loads(text(scene))) == scene
+    assert resolve(tomllib.loads(format_scene(scene))) == scene
 
 
 def test_a_written_scene_names_every_parameter() -> None:
     scene = resolve({name: {} for name in UNASKED})
-    tables = tomllib.loads(text(scene))
+    tables = tomllib.loads(format_scene(scene))
     missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
     assert missing == []
 

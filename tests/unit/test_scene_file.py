@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import SceneError
-from digiclay.core.scene.scene_source import SAMPLES, Setting, find, load, sample_names
+from digiclay.core.scene.scene_source import SAMPLES, Setting, find, list_samples, load
 from digiclay.core.scene.schema import Scene
 
 
@@ -117,7 +117,7 @@ def test_a_sample_is_found_by_its_name() -> None:
     assert find("ridge_mound_valley") == SAMPLES / "ridge_mound_valley.toml"
 
 
-@pytest.mark.parametrize("name", sample_names())
+@pytest.mark.parametrize("name", list_samples())
 def test_every_sample_is_a_scene_called_like_its_file(name: str) -> None:
     assert load(find(name)).name == name
 
@@ -151,6 +151,6 @@ def test_a_misspelt_sample_is_told_with_the_nearest_and_all_names() -> None:
     with pytest.raises(SceneError) as caught:
         find("ridge_mund_valley")
     assert str(caught.value) == (
-        f"ridge_mund_valley is neither a file nor a sample ({', '.join(sample_names())}). "
+        f"ridge_mund_valley is neither a file nor a sample ({', '.join(list_samples())}). "
         "Did you mean ridge_mound_valley?"
     )

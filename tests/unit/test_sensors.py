@@ -17,7 +17,7 @@ from digiclay.core.model.sensors import Delayed, Noisy, Quantised, Sensing, norm
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
@@ -266,7 +266,7 @@ def test_a_scene_with_sensors_reads_back_as_it_was_written(settings: tuple[str, 
     import tomllib
 
     written = scene(*settings)
-    assert resolve(tomllib.loads(text(written))) == written
+    assert resolve(tomllib.loads(format_scene(written))) == written
 
 
 @pytest.mark.parametrize(

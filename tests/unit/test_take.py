@@ -15,10 +15,10 @@ from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import Scene
-from digiclay.core.scene.toml_table import text
+from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_periods import simulate_path
-from digiclay.core.session.take import Take, from_bytes, make_scene, refine, replay, to_bytes
+from digiclay.core.session.take import Take, from_bytes, refine, replay, to_bytes, to_scene
 from numpy.typing import NDArray
 
 from tests.assemble import record, replayed, sample
@@ -114,7 +114,7 @@ def test_a_step_cut_into_too_few_or_too_many_parts_is_refused(parts: int) -> Non
 def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: object) -> None:
     system, take, last = taken()
     file = tmp_path / "my take.toml"  # type: ignore[operator]
-    file.write_text(text(make_scene(take, "my take")), encoding="utf-8")
+    file.write_text(format_scene(to_scene(take, "my take")), encoding="utf-8")
     read = load(file)
     done = record(assemble(read), read.section("trajectory").trajectory(), read.periods)
     assert read.periods == COUNT
@@ -128,7 +128,7 @@ def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
     system, take, last = taken()
     away = np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1))
     *_, waited = simulate_path(system, begin(system), away)
-    late = make_scene(replace(take, start=snapshot.dump(system, waited)), "late")
+    late = to_scene(replace(take, start=snapshot.dump(system, waited)), "late")
     done = record(assemble(late), late.section("trajectory").trajectory(), late.periods)
     assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
 
@@ -136,14 +136,14 @@ def test_a_take_begun_on_a_bed_that_has_waited_at_rest_is_a_scene_too() -> None:
 def test_only_turning_points_of_the_path_become_waypoints() -> None:
     _, take, _ = taken()
     # The finger was read every 6th period, and goes straight in between.
-    assert len(make_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
+    assert len(to_scene(take, "take").section("trajectory").waypoints) <= COUNT // 6 + 2
 
 
 def test_a_take_begun_on_a_formed_bed_is_no_scene() -> None:
     _, _, formed = taken()
     _, take, _ = taken(formed)
     with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
-        make_scene(take, "late")
+        to_scene(take, "late")
 
 
 def test_states_come_one_a_period() -> None:

@@ -18,7 +18,7 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load, read_table
-from digiclay.core.scene.toml_table import resolve, text
+from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.memory_limit import available_memory
@@ -111,7 +111,7 @@ def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path: Path) -> None:
 def history(folder: Path, **arrays: np.ndarray) -> Path:
     """Leave what a run of four cells and ten periods leaves, with some arrays in place of its own."""
     scene = resolve({"layout": {"rows": 2, "columns": 2}, "simulation": {"duration": 0.05}, "blister": SMALL})
-    (folder / "scene.toml").write_text(text(scene), encoding="utf-8")
+    (folder / "scene.toml").write_text(format_scene(scene), encoding="utf-8")
     own = {"time": np.arange(11) * 5e-3, "height": np.zeros((11, 4)), "force": np.zeros((11, 4))}
     np.savez_compressed(folder / "history.npz", **(own | arrays))
     return folder
@@ -149,7 +149,7 @@ def test_a_history_that_is_not_its_scenes_is_not_unpacked(
 def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path: Path) -> None:
     # 20 million cells over 10 000 rows are what such a scene would leave: 1.6 TB.
     scene = resolve({"layout": {"rows": 4472, "columns": 4472}, "simulation": {"duration": 50.0}})
-    (tmp_path / "scene.toml").write_text(text(scene), encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(format_scene(scene), encoding="utf-8")
     with zipfile.ZipFile(tmp_path / "history.npz", "w") as archive:
         archive.writestr("time.npy", npy(np.zeros(10_001)))
         archive.writestr("height.npy", head((10_001, 4472 * 4472)))

@@ -15,7 +15,7 @@ from ..core.base.run_folder import resolve_inside
 from ..core.base.unfinished import remove_abandoned
 from ..core.base.whole_files import read_json, write_whole
 from ..core.scene.scene_source import load
-from ..core.scene.toml_table import text
+from ..core.scene.toml_table import format_scene
 from ..core.session.finished_run import is_whole
 from ..core.studies.job_table import JOB, SCENE, Batch, Job, read_outputs
 from ..core.studies.series import Kind, open_series
@@ -82,7 +82,7 @@ class Folder:
         except OSError as error:
             raise OutputError(f"{self.job(job)} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(self.job(job))
-        write_whole(self.job(job) / SCENE, text(job.scene).encode())
+        write_whole(self.job(job) / SCENE, format_scene(job.scene).encode())
         write_whole(self.job(job) / JOB, self.batch.outputs.text().encode())
 
     def start_up(self) -> float | None:

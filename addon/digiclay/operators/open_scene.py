@@ -7,7 +7,7 @@ from typing import Any
 from .. import bridge
 from ..compat import bpy
 from ..core.model.trajectory import sample_poses
-from ..core.scene.scene_source import find, load, sample_names
+from ..core.scene.scene_source import find, list_samples, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
@@ -88,7 +88,7 @@ class AddSample(AddSceneAction, bpy.types.Operator):
     sample: bpy.props.EnumProperty(
         name="Sample",
         items=[
-            *((f"session:{name}", title(name), "A session") for name in sample_names()),
+            *((f"session:{name}", title(name), "A session") for name in list_samples()),
             *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in sample_shapes()),
         ],
     )
@@ -118,7 +118,7 @@ class Entries:
 
     def draw(self, context: Any) -> None:
         """Draw an entry for each."""
-        for name in sample_names() if self.kind == "session" else sample_shapes():
+        for name in list_samples() if self.kind == "session" else sample_shapes():
             entry = self.layout.operator(AddSample.bl_idname, text=title(name))
             entry.sample = f"{self.kind}:{name}"
 

@@ -6,8 +6,8 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.base.whole_files import write_whole
-from ..core.scene.toml_table import text
-from ..core.session.take import make_scene
+from ..core.scene.toml_table import format_scene
+from ..core.session.take import to_scene
 from ..device.view import bed_of
 from ..live import recovery, running, sculpting
 from ..recorded import takes
@@ -108,7 +108,7 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
         take = takes.read(bed_of(context), entry.number)
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
         file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
-        write_whole(file, text(make_scene(take, entry.name)).encode())
+        write_whole(file, format_scene(to_scene(take, entry.name)).encode())
         self.report({"INFO"}, f"{entry.name} written to {file}")
 
 

@@ -9,7 +9,7 @@ from .. import bridge
 from ..compat import bpy
 from ..core.base.quantity import quantities
 from ..core.control.methods import METHODS
-from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, parameters
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from .declared import Update, group, title
@@ -39,7 +39,7 @@ def take_preset(settings: Any, context: Any) -> None:
         (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
     }
     for section, name in sorted(changed):
-        own, kind = getattr(settings, section), parameters(section, settings.method)
+        own, kind = getattr(settings, section), import_parameters(section, settings.method)
         values = PRESETS[settings.preset].get(section, {})
         if name in values:
             assign(own, kind, name, values[name])
@@ -58,7 +58,7 @@ def take_method(settings: Any, context: Any) -> None:
     values = METHODS[settings.method].blister
     if values is None:
         return
-    kind = parameters("blister", settings.method)
+    kind = import_parameters("blister", settings.method)
     for name in quantities(kind):
         if name in values:
             assign(settings.blister, kind, name, values[name])
@@ -75,7 +75,7 @@ def take_arrangement(layout: Any, context: Any) -> None:
     context : bpy.types.Context
     """
     settings = layout.id_data.digiclay
-    kind = parameters("contact", settings.method)
+    kind = import_parameters("contact", settings.method)
     if layout.arrangement == "hexagonal":
         assign(settings.contact, kind, "share", HEXAGONAL_SHARE)
     else:
@@ -92,7 +92,7 @@ def take_size(fingertip: Any, context: Any) -> None:
     """
     bed = fingertip.id_data
     tip = view.fingertip_of(bed)
-    kind = parameters("fingertip", bed.digiclay.method)
+    kind = import_parameters("fingertip", bed.digiclay.method)
     if tip is not None:
         bridge.resize_fingertip(tip, kind(**read(fingertip, kind, {}, "fingertip")))
 
@@ -146,10 +146,10 @@ def pointers(groups: dict[str, type]) -> dict[str, Any]:
     return {name: bpy.props.PointerProperty(type=kind, name=title(name)) for name, kind in groups.items()}
 
 
-METHOD_GROUPS = {name: group(name, parameters("control", name), {}) for name in METHODS}
+METHOD_GROUPS = {name: group(name, import_parameters("control", name), {}) for name in METHODS}
 CONTROL = made("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
 GROUPS = {
-    section: group(section, parameters(section, "virtual_master"), UPDATES.get(section, {}))
+    section: group(section, import_parameters(section, "virtual_master"), UPDATES.get(section, {}))
     for section in PLAIN
 }
 SETTINGS = made(

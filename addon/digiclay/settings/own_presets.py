@@ -8,7 +8,7 @@ from pathlib import Path
 from ..compat import PACKAGE, bpy
 from ..core.base.errors import OutputError
 from ..core.scene.schema import Scene
-from ..core.scene.toml_table import PRESETS, text
+from ..core.scene.toml_table import PRESETS, format_scene
 
 __all__ = ["folder", "names", "path", "remove", "save"]
 
@@ -68,7 +68,7 @@ def save(name: str, scene: Scene) -> Path:
     partial = file.with_suffix(".partial")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text(scene), encoding="utf-8")
+        partial.write_text(format_scene(scene), encoding="utf-8")
         os.replace(partial, file)
     except OSError as error:
         raise OutputError(f"Cannot write {file}: {error.strerror or error}.") from None

@@ -12,7 +12,7 @@ from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters
 from ..core.control.methods import METHODS
-from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, parameters
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
 from ..device.pins_drawn import differs
 from .groups import CLASSES, SETTINGS
@@ -69,7 +69,7 @@ def table_of(bed: Any) -> dict[str, Any]:
             continue
         elif section != "blister" or METHODS[method].blister is not None:
             own = part_group(settings, section)
-            kind = parameters(section, method)
+            kind = import_parameters(section, method)
             values = read(own, kind, notes.get(_key(section, method), {}), section)
             table[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:
@@ -104,7 +104,7 @@ def stale(bed: Any) -> str:
     """Return why a bed no longer shows the pins its settings describe, or an empty text."""
     settings = bed.digiclay
     notes = _notes(settings).get("layout", {})
-    kind = parameters("layout", settings.method)
+    kind = import_parameters("layout", settings.method)
     return differs(bed, kind(**read(settings.layout, kind, notes, "layout")))
 
 

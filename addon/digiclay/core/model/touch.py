@@ -61,6 +61,12 @@ class FingerPath:
         """Return the underside in one of the periods, see `FingerPeriod.under`.
 
         It is asked for period by period, mostly of the same places: several are worked out at a time.
+
+        Parameters
+        ----------
+        period : int
+        place : ndarray (6, k)
+            See `fingertip.underside`.
         """
         known, first, unders = self._last
         if known is not place or not first <= period < first + len(unders):

@@ -145,7 +145,17 @@ class Path:
 
 
 def level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
-    """Return a trajectory whose finger stays level."""
+    """Return the trajectory of a level finger.
+
+    Parameters
+    ----------
+    times : ndarray (w,)
+        s.
+    positions : ndarray (w, 3)
+        m.
+    interpolation : str, optional
+        See `Trajectory`.
+    """
     return Trajectory(times, positions, np.tile(LEVEL, (times.size, 1)), interpolation)
 
 

@@ -18,7 +18,7 @@ from ..model.layout import Grid, grid
 from ..model.physics import Cell, speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
-from .schema import STEPPERS, Finger, Scene, part
+from .schema import STEPPERS, Finger, Scene, import_part
 
 __all__ = ["assemble"]
 
@@ -52,7 +52,7 @@ def assemble(scene: Scene) -> System:
 
 def _stepper(scene: Scene) -> Stepper:
     """Return how a period is integrated."""
-    kind = part(*STEPPERS[scene.simulation.stepper])
+    kind = import_part(*STEPPERS[scene.simulation.stepper])
     stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
     return stepper
 
@@ -131,7 +131,7 @@ def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
         device = replace(device, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
-        controller = part(METHODS[scene.method].module, "build")(scene.control, device)
+        controller = import_part(METHODS[scene.method].module, "build")(scene.control, device)
     if scene.shape and not (controller and controller.name == "shape_display"):
         from ..control.handover import handover
 

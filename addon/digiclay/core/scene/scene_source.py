@@ -14,13 +14,13 @@ from ..base.toml_text import LARGEST, parse_tables
 from .schema import Scene
 from .toml_table import merge_one_finger, resolve
 
-__all__ = ["SAMPLES", "Setting", "find", "load", "make_scene", "read_table", "sample_names"]
+__all__ = ["SAMPLES", "Setting", "find", "list_samples", "load", "make_scene", "read_table"]
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
 
 
-def sample_names() -> list[str]:
+def list_samples() -> list[str]:
     """Return the names of the sample scenes."""
     return list(named(SAMPLES, ".toml"))
 
@@ -59,6 +59,11 @@ class Setting(NamedTuple):
 
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     """Read a scene file, and let settings override what it says.
+
+    Parameters
+    ----------
+    path : Path
+    settings : sequence of Setting, optional
 
     Raises
     ------

@@ -15,7 +15,7 @@ from ..model.laws import LAWS, law_parameters
 from ..model.set_point import SetPoint
 from ..model.trajectory import Path, Trajectory
 
-if TYPE_CHECKING:  # a part that is left out is never imported, see `part`
+if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part`
     from ..control.blister import Blister
     from ..model.actuator import Actuator
     from ..model.conduit import Conduit
@@ -43,8 +43,8 @@ __all__ = [
     "Finger",
     "Scene",
     "Simulation",
-    "parameters",
-    "part",
+    "import_parameters",
+    "import_part",
 ]
 
 #: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`, and those of
@@ -96,12 +96,18 @@ MOST_STEPS = 1000
 MOST_CUT = {"adaptive": 10, "richardson": 500}
 
 
-def part(module: str, name: str) -> Any:
-    """Import a class of the core by name, now that a scene needs it."""
+def import_part(module: str, name: str) -> Any:
+    """Import a class of the core by name, now that a scene needs it.
+
+    Parameters
+    ----------
+    module, name : str
+        Of the class.
+    """
     return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
-def parameters(section: str, method: str) -> type[Parameters]:
+def import_parameters(section: str, method: str) -> type[Parameters]:
     """Import the class that holds the parameters of a section.
 
     Parameters
@@ -115,7 +121,7 @@ def parameters(section: str, method: str) -> type[Parameters]:
     module, name = (
         PARTS[section] if section != "control" else (METHODS[method].module, METHODS[method].parameters)
     )
-    kind: type[Parameters] = part(module, name)
+    kind: type[Parameters] = import_part(module, name)
     return kind
 
 

@@ -12,9 +12,9 @@ from ..base.quantity import Parameters, quantities
 from ..base.toml_text import format_value
 from ..control.methods import METHODS
 from ..model.trajectory import Path, Waypoint
-from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, parameters
+from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
-__all__ = ["ABSENT", "PRESETS", "merge_one_finger", "resolve", "text"]
+__all__ = ["ABSENT", "FINGERS", "PRESETS", "format_scene", "merge_one_finger", "resolve"]
 
 Table = Mapping[str, Any]
 
@@ -79,7 +79,7 @@ def resolve(table: Table, name: str = "") -> Scene:
         usual = defaults.get(section, {})
         if section == "blister":
             usual |= METHODS[method].blister or {}
-        parts[section] = read_part(section, parameters(section, method), usual, own)
+        parts[section] = read_part(section, import_parameters(section, method), usual, own)
     if parts["layout"].arrangement == "hexagonal":
         defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
     rest_height = parts["actuator"].rest_height
@@ -129,7 +129,9 @@ def _finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_
         if own is None or (needed and parts[needed] is None):
             parts[section] = None
             continue
-        parts[section] = read_part(owner + section, parameters(section, ""), defaults.get(section, {}), own)
+        parts[section] = read_part(
+            owner + section, import_parameters(section, ""), defaults.get(section, {}), own
+        )
     return Finger(**parts, trajectory=_path(owner + "trajectory", table.get("trajectory", {}), rest_height))
 
 
@@ -199,7 +201,7 @@ def _waypoint(owner: str, row: Table) -> Waypoint:
     return read_part(owner, Waypoint, {}, row)
 
 
-def text(scene: Scene) -> str:
+def format_scene(scene: Scene) -> str:
     """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units."""
     return "\n".join(_lines(scene)) + "\n"
 

@@ -101,7 +101,16 @@ def _affordable(clock: Clock, gone: float) -> int:
 
 
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
-    """Return the clock after `count` periods of a measured duration, s."""
+    """Return the clock after some periods of a measured duration.
+
+    Parameters
+    ----------
+    clock : Clock
+    count : int
+        Control periods.
+    took : float
+        Of the wall's time, all together, s.
+    """
     if count < 1 or took <= 0.0:
         return clock
     each = took / count

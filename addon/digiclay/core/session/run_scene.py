@@ -15,7 +15,7 @@ from ..engine.simulation import begin, periods
 from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
-from ..scene.toml_table import text
+from ..scene.toml_table import format_scene
 from .memory_limit import check_memory
 from .run_result import Ended, Result, count_losses, evaluate
 
@@ -82,7 +82,7 @@ def save(result: Result, folder: Path) -> None:
         When the folder cannot be written.
     """
     try:
-        (folder / "scene.toml").write_text(text(result.scene), encoding="utf-8")
+        (folder / "scene.toml").write_text(format_scene(result.scene), encoding="utf-8")
         if result.history:
             write(result.history, folder / "history.npz")
         metrics = json.dumps(result.metrics, indent=2, ensure_ascii=False, allow_nan=False)

@@ -49,7 +49,14 @@ class Kept:
 
 
 def dump(system: System, state: State) -> bytes:
-    """Write a state as bytes that do not change when the session goes on."""
+    """Return a state as bytes, which do not change when the session goes on.
+
+    Parameters
+    ----------
+    system : System
+        The state's.
+    state : State
+    """
     held, rows = state.gathered, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
@@ -88,7 +95,14 @@ def dump(system: System, state: State) -> bytes:
 
 
 def load(system: System, data: bytes) -> State:
-    """Read a state back; a session that goes on from it does so bit for bit.
+    """Return the state that bytes hold; a session goes on from it bit for bit.
+
+    Parameters
+    ----------
+    system : System
+        With the cells, parts, control period and method of the state's.
+    data : bytes
+        From `dump`.
 
     Raises
     ------
@@ -136,6 +150,13 @@ def transfer_heights(system: System, data: bytes) -> State:
 
     Every pin stands still at the height it had, as far as the stroke allows; pulp, valves and
     the controller begin anew.
+
+    Parameters
+    ----------
+    system : System
+        With the cells of the state's.
+    data : bytes
+        From `dump`.
 
     Raises
     ------

@@ -21,6 +21,13 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return a memory as JSON holds it; its arrays are put behind those in `arrays`.
 
     A named tuple becomes a list that starts with its name, an array its place among the arrays.
+
+    Parameters
+    ----------
+    memory : object
+        A controller's: numbers, enumerations, arrays, and tuples of them.
+    arrays : list of ndarray
+        Grows.
     """
     if isinstance(memory, np.ndarray):
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
@@ -34,7 +41,7 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
 
 
 def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return the memory that was `flatten`, in the types of a memory of the same controller.
+    """Return the memory that `flatten` took apart, in the types of a memory of the same controller.
 
     Parameters
     ----------

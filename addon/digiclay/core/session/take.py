@@ -24,11 +24,11 @@ from ..engine.system import System
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
-from ..scene.toml_table import resolve, text
+from ..scene.toml_table import format_scene, resolve
 from . import snapshot
 from .live_periods import simulate_path
 
-__all__ = ["Take", "from_bytes", "make_scene", "refine", "replay", "to_bytes"]
+__all__ = ["Take", "from_bytes", "refine", "replay", "to_bytes", "to_scene"]
 
 Floats = NDArray[np.float64]
 
@@ -109,6 +109,12 @@ def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
 def refine(scene: Scene, parts: int) -> Scene:
     """Return a scene whose physics steps are cut into `parts`; control is sampled as before.
 
+    Parameters
+    ----------
+    scene : Scene
+    parts : int
+        From 1 to 64.
+
     Raises
     ------
     ParameterError
@@ -119,8 +125,14 @@ def refine(scene: Scene, parts: int) -> Scene:
     return replace(scene, simulation=scene.simulation.refined(parts))
 
 
-def make_scene(take: Take, name: str) -> Scene:
+def to_scene(take: Take, name: str) -> Scene:
     """Return a take as a scene that `digiclay run` simulates.
+
+    Parameters
+    ----------
+    take : Take
+    name : str
+        Of the scene.
 
     Raises
     ------
@@ -174,7 +186,7 @@ def to_bytes(take: Take) -> bytes:
     written = io.BytesIO()
     np.savez(
         written,
-        scene=np.frombuffer(text(take.scene).encode(), np.uint8),
+        scene=np.frombuffer(format_scene(take.scene).encode(), np.uint8),
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),

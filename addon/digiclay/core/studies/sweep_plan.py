@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import OutputError
 from ..base.whole_files import as_json, read_json, write_whole
-from ..scene.toml_table import text
+from ..scene.toml_table import format_scene
 from .axes import Axis, Column, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
@@ -80,7 +80,7 @@ def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], versio
     """
     scenes = hashlib.sha256()
     for point in points:
-        scenes.update((NOTE.sub("", text(point.scene)) if point.scene else point.error).encode())
+        scenes.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
     plan = {
         "digiclay": version,
         "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
