@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from digiclay.commands.arguments import add_scene, scene_of
-from digiclay.core.batch.run_together import judge_together, run_together
+from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.evaluation import evaluate
@@ -108,9 +108,9 @@ def measured(scene: Scene, name: str, count: int, repeats: int) -> Size:
         (lambda: run(middle), 1),
         (lambda: list(run_together(plain)), count),
         (lambda: evaluate(one), 1),
-        (lambda: list(judge_together(scenes)), count),
+        (lambda: list(measure_together(scenes)), count),
         (lambda: evaluate(one, errors=True), 1),
-        (lambda: list(judge_together(scenes, errors=True)), count),
+        (lambda: list(measure_together(scenes, errors=True)), count),
     ]
     spent = [[_spent(work) / runs for work, runs in works] for _ in range(repeats)]
     return Size(name, count, *(statistics.median(column) for column in zip(*spent, strict=True)))

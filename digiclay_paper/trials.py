@@ -15,7 +15,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_result import Result, select_rows
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.speed_limits import Drag, Follows, Lift, followed, largest_speed
+from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
 
 from . import scenes
 from .results import AS_IT_IS, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing
@@ -96,7 +96,7 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
     results.tracks[method] = []
     for speed in extent.speeds:
         told(f"drag at {speed * 1e3:g} mm/s, {method}")
-        results.tracks[method].append(followed(found, Drag(height=TALL), speed)[0])
+        results.tracks[method].append(track(found, Drag(height=TALL), speed)[0])
     told(f"fastest drag, {method}")
     tracks = results.tracks[method]
 
@@ -104,12 +104,12 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
         told(f"drag at {one.speed * 1e3:.1f} mm/s, {method}")
         tracks.append(one)
 
-    results.fastest[method] = largest_speed(
+    results.fastest[method] = find_largest_speed(
         found, Drag(height=TALL), results.criterion,
         low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
     )  # fmt: skip
     tracks.sort(key=lambda one: one.speed)
-    results.lifting[method] = largest_speed(
+    results.lifting[method] = find_largest_speed(
         found, Lift(), results.criterion,
         low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
         told=lambda one: told(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),

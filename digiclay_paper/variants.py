@@ -13,7 +13,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_result import Result, select_rows
-from digiclay.core.studies.speed_limits import Drag, followed
+from digiclay.core.studies.speed_limits import Drag, track
 
 from . import scenes
 from .results import AHEAD, PAPER_SPEED, SESSION, WAYS, Dragged, Extent, Located, Results
@@ -71,7 +71,7 @@ def dragged(scene: Scene, way: Drag, speed: float = PAPER_SPEED) -> tuple[Dragge
     speed : float
         m/s.
     """
-    follows, done = followed(scene, way, speed)
+    follows, done = track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)
     total, following = part["total_force"], np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)

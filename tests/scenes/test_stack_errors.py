@@ -7,9 +7,9 @@ from dataclasses import asdict, replace
 
 import pytest
 from digiclay.core.batch.packing import STACKED, structure
-from digiclay.core.batch.run_together import judge_of, judge_together
+from digiclay.core.batch.run_together import measure_together
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.accuracy import estimate_errors
+from digiclay.core.session.accuracy import estimate_errors, make_reference
 from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, sample
@@ -21,8 +21,8 @@ RELATIVE, ABSOLUTE = 1e-9, {"height": 1e-15, "force": 1e-12, "total_force": 1e-1
 
 def judged(scenes: Sequence[Scene]) -> list[Result]:
     """Run scenes in a stack with their errors."""
-    assert len({structure(judge_of(one)) for one in scenes}) == 1
-    done = dict(judge_together(scenes, errors=True))
+    assert len({structure(make_reference(one)) for one in scenes}) == 1
+    done = dict(measure_together(scenes, errors=True))
     results = [done[number] for number in range(len(scenes))]
     return [one for one in results if isinstance(one, Result)]
 
@@ -103,6 +103,6 @@ def test_where_commands_are_left_out_no_errors_are_told() -> None:
 
 
 def test_without_being_asked_no_errors_are_told() -> None:
-    ((_, found),) = judge_together([sample("tap", "simulation.duration=0.1")])
+    ((_, found),) = measure_together([sample("tap", "simulation.duration=0.1")])
     assert isinstance(found, Result)
     assert "height_error" not in found.metrics

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.batch.packing import STACKED
-from digiclay.core.batch.run_together import judge_together
+from digiclay.core.batch.run_together import measure_together
 from digiclay.core.metrics.summary import METRICS
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
@@ -23,7 +23,7 @@ RELATIVE, ABSOLUTE = 1e-9, {"m": 1e-12, "N": 1e-10, "m3": 1e-15, "s": 1e-12, "1"
 
 def judged(scenes: Sequence[Scene]) -> list[Any]:
     """Judge scenes in a stack; return what each came to."""
-    done = dict(judge_together(scenes))
+    done = dict(measure_together(scenes))
     return [done[number] for number in range(len(scenes))]
 
 

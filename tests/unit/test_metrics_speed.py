@@ -16,9 +16,9 @@ from digiclay.core.studies.speed_limits import (
     Drag,
     Follows,
     Lift,
-    followed,
-    largest,
-    largest_speed,
+    bisect,
+    find_largest_speed,
+    track,
 )
 
 
@@ -28,7 +28,7 @@ def device(method: str = "virtual_master", **layout: object) -> Scene:
 
 
 def test_the_bisection_finds_a_limit_to_its_resolution() -> None:
-    found = largest(lambda value: value <= 17.3, 2.0, 40.0, 0.1)
+    found = bisect(lambda value: value <= 17.3, 2.0, 40.0, 0.1)
     assert found is not None
     assert 17.2 <= found <= 17.3
 
@@ -40,22 +40,22 @@ def test_the_bisection_returns_a_value_that_held() -> None:
         tried.append(value)
         return value <= 11.0
 
-    assert largest(holds, 2.0, 40.0, 1.0) in [value for value in tried if value <= 11.0]
+    assert bisect(holds, 2.0, 40.0, 1.0) in [value for value in tried if value <= 11.0]
 
 
 def test_the_bisection_halves_what_is_left() -> None:
     tried: list[float] = []
-    largest(lambda value: bool(tried.append(value)) or value <= 11.0, 0.0, 32.0, 1.0)
+    bisect(lambda value: bool(tried.append(value)) or value <= 11.0, 0.0, 32.0, 1.0)
     # Both ends, then log2(32) halvings.
     assert len(tried) == 7
 
 
 def test_a_limit_below_the_range_is_none() -> None:
-    assert largest(lambda value: False, 2.0, 40.0, 0.1) is None
+    assert bisect(lambda value: False, 2.0, 40.0, 0.1) is None
 
 
 def test_a_limit_beyond_the_range_is_its_end() -> None:
-    assert largest(lambda value: True, 2.0, 40.0, 0.1) == 40.0
+    assert bisect(lambda value: True, 2.0, 40.0, 0.1) == 40.0
 
 
 GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
@@ -97,19 +97,19 @@ def test_a_lift_is_as_fast_as_it_says_at_its_fastest() -> None:
 
 def test_a_bed_narrower_than_the_drag_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"^layout\.columns must make the bed at least as wide"):
-        followed(device(columns=9), Drag(), 10e-3)
+        track(device(columns=9), Drag(), 10e-3)
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_both_methods_follow_a_drag_at_15_mm_a_second_and_have_a_limit(method: str) -> None:
-    found = largest_speed(device(method), Drag(), Criterion(), low=15e-3, high=40e-3, resolution=20e-3)
+    found = find_largest_speed(device(method), Drag(), Criterion(), low=15e-3, high=40e-3, resolution=20e-3)
     assert found is not None
     assert 15e-3 <= found < 40e-3
 
 
 def test_a_finger_that_is_lost_is_counted_with_its_time() -> None:
     # No pin rises at 40 mm/s; the finger leaves at 2 s and is given up 50 ms later.
-    judged, done = followed(device(), Lift(), 40e-3)
+    judged, done = track(device(), Lift(), 40e-3)
     assert judged.losses == done.metrics["losses"] == 1
     assert done.loss_times is not None
     assert 2.05 < done.loss_times[0] < 2.6

@@ -197,7 +197,7 @@ def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def faulty(*given: Any, **known: Any) -> Any:
         raise error
 
-    monkeypatch.setattr("digiclay.core.studies.evaluation.judge_together", faulty)
+    monkeypatch.setattr("digiclay.core.studies.evaluation.measure_together", faulty)
 
 
 def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:

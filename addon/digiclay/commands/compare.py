@@ -22,7 +22,7 @@ from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.session.run_result import RUN_METRICS, Result
 from ..core.session.run_scene import run
-from ..core.studies.speed_limits import Criterion, Drag, Lift, largest_speed
+from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
 from .arguments import add_command, add_scene, settings_of
 from .progress import Bar
 from .refusals import refuse_without
@@ -131,7 +131,7 @@ def _speeds(scene: Scene) -> Metrics:
     found: Metrics = {}
     for name, way in zip(SPEEDS, (Drag(), Lift()), strict=True):
         try:
-            found[name] = largest_speed(scene, way, Criterion())
+            found[name] = find_largest_speed(scene, way, Criterion())
         except ParameterError:
             found[name] = None
     return found

@@ -13,7 +13,7 @@ from ..engine.system import System
 from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
-from ..session.accuracy import Errors, compare, has_every_command, reference_settings
+from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_result import Result, evaluate
 from .advance import blow_up, follow
@@ -21,7 +21,7 @@ from .broadcasting import Floats
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, play_all
 from .recording import Histories, Sums
 
-__all__ = ["judge_of", "judge_together", "run_together"]
+__all__ = ["measure_together", "run_together"]
 
 Outcome = Result | DigiclayError
 
@@ -70,14 +70,9 @@ class Monitor:
     largest: Floats
 
 
-def judge_of(scene: Scene) -> Scene:
-    """Return the reference a scene is compared with, see `accuracy`: its commands are the other's."""
-    return replace(scene, control=None, shape=None, simulation=reference_settings(scene.simulation))
-
-
 def _start(scenes: Mapping[int, Scene]) -> Monitor:
     """Return the monitor of sessions before their first control period."""
-    references = {run: judge_of(scene) for run, scene in scenes.items()}
+    references = {run: make_reference(scene) for run, scene in scenes.items()}
     systems = {run: assemble(scene) for run, scene in references.items()}
     return Monitor(begin_play(references, systems), np.zeros((3, len(scenes))))
 
@@ -155,7 +150,7 @@ def run_together(
     return _run(scenes, Histories, stopped)
 
 
-def judge_together(
+def measure_together(
     scenes: Sequence[Scene], *, errors: bool = False, stopped: Callable[[], bool] | None = None
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes as `run_together` does, and measure them without ever having their histories.
@@ -166,7 +161,7 @@ def judge_together(
         Of one `packing.structure`, with a recorder.
     errors : bool, optional
         Estimate their errors too, where `accuracy.has_every_command`; their references, see
-        `judge_of`, must be of one structure as well.
+        `accuracy.make_reference`, must be of one structure as well.
     stopped : callable, optional
         See `run_together`.
 

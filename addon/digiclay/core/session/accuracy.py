@@ -35,6 +35,7 @@ __all__ = [
     "estimate_errors",
     "follow",
     "has_every_command",
+    "make_reference",
     "reference_settings",
     "reset",
     "start",
@@ -104,6 +105,11 @@ def reference_settings(simulation: Simulation) -> Simulation:
     return finer if finer.stepper == "adaptive" else replace(finer, stepper="richardson")
 
 
+def make_reference(scene: Scene) -> Scene:
+    """Return the reference of a run: its parts and `reference_settings`, without a controller of its own."""
+    return replace(scene, control=None, shape=None, simulation=reference_settings(scene.simulation))
+
+
 def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
     """Return the largest differences of height, m, and force, N, over the cells, and that of the total force.
 
@@ -144,7 +150,7 @@ def estimate_errors(
     stopped : callable, optional
         Asked after each control period; when it says True, there is no estimate: None.
     """
-    system = _replay(_reference(scene), history["command"])
+    system = _replay(assemble(make_reference(scene)), history["command"])
     done, largest = len(history["time"]) - 1, np.zeros(3)
     for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
         height, force = state.row(0), state.row(system.rows.force)
@@ -157,11 +163,6 @@ def estimate_errors(
     return Errors.estimate(largest)
 
 
-def _reference(scene: Scene) -> System:
-    """Return the system of a scene with the `reference_settings`."""
-    return assemble(replace(scene, simulation=reference_settings(scene.simulation)))
-
-
 def _replay(system: System, commands: Floats) -> System:
     """Return the system under given commands (t, n)."""
     return replace(system, controller=Replay(system.grid, commands))
@@ -170,7 +171,8 @@ def _replay(system: System, commands: Floats) -> System:
 def start(scene: Scene) -> ErrorMonitor | None:
     """Return the monitor of a live session's beginning; None where the step cannot be halved."""
     try:
-        return ErrorMonitor(_reference(scene))
+        # The state of a session, of which a stretch begins with a copy, has the rows of its controller.
+        return ErrorMonitor(assemble(replace(scene, simulation=reference_settings(scene.simulation))))
     except DigiclayError:
         return None
 

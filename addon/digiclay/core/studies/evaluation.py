@@ -12,10 +12,10 @@ from typing import Any
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import nearest
 from ..batch.packing import structure, why_not
-from ..batch.run_together import judge_of, judge_together
+from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
 from ..scene.schema import Scene
-from ..session.accuracy import estimate_errors, has_every_command
+from ..session.accuracy import estimate_errors, has_every_command, make_reference
 from ..session.run_scene import Result, run
 from .axes import Point
 from .series import describe_error
@@ -123,7 +123,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             why.update([reason] if reason else [])
             continue
         try:
-            judge = structure(judge_of(point.scene)) if errors else None
+            judge = structure(make_reference(point.scene)) if errors else None
         except ParameterError:  # it is told when the point is run
             alone.append(point)
             continue
@@ -231,7 +231,7 @@ def evaluate_bundle(
     why = ""
     if len(scenes) > 1:
         try:
-            for number, result in judge_together(scenes, errors=errors, stopped=stopped):
+            for number, result in measure_together(scenes, errors=errors, stopped=stopped):
                 if isinstance(result, DigiclayError):
                     records[number] = {"error": one_line(result)}
                 else:

@@ -18,7 +18,7 @@ from ..scene.schema import Scene
 from ..session.run_result import Result, select_rows
 from ..session.run_scene import run
 
-__all__ = ["Criterion", "Drag", "Follows", "Lift", "followed", "largest", "largest_speed"]
+__all__ = ["Criterion", "Drag", "Follows", "Lift", "bisect", "find_largest_speed", "track"]
 
 #: How long the finger rests at the ends of a phase, s.
 REST = 0.3
@@ -144,7 +144,7 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
     return Path(interpolation, tuple(Waypoint(time=t, position=(x, 0.0, z)) for t, x, z in points))
 
 
-def followed(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
+def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
     """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it.
 
     Parameters
@@ -183,7 +183,7 @@ def _refuse_small(scene: Scene, way: Drag | Lift) -> None:
         raise ParameterError("layout", "columns", rule, f"{wide:g} m")
 
 
-def largest(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
+def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
     """Return the largest value known to hold, to within a resolution, by bisection.
 
     Parameters
@@ -210,7 +210,7 @@ def largest(holds: Callable[[float], bool], low: float, high: float, resolution:
     return low
 
 
-def largest_speed(
+def find_largest_speed(
     scene: Scene,
     way: Drag | Lift,
     criterion: Criterion,
@@ -220,7 +220,7 @@ def largest_speed(
     resolution: float = 0.5e-3,
     told: Callable[[Follows], None] | None = None,
 ) -> float | None:
-    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `largest`.
+    """Return the largest speed, m/s, at which a finger is followed, by bisection; see `bisect`.
 
     Parameters
     ----------
@@ -235,9 +235,9 @@ def largest_speed(
     """
 
     def holds(speed: float) -> bool:
-        judged, _ = followed(scene, way, speed)
+        judged, _ = track(scene, way, speed)
         if told:
             told(judged)
         return judged.meets(criterion)
 
-    return largest(holds, low, high, resolution)
+    return bisect(holds, low, high, resolution)
