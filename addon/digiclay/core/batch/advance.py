@@ -164,7 +164,15 @@ def broken(state: Beds) -> NDArray[np.bool_]:
 
 
 def blow_up(stack: Stack, state: Beds, run: int) -> DivergenceError:
-    """Return the error a run with a number that is not finite ends in; see `core.engine.simulation`."""
+    """Return the error a run with a number that is not finite ends in; see `core.engine.simulation`.
+
+    Parameters
+    ----------
+    stack : Stack
+    state : Beds
+    run : int
+        Which of them.
+    """
     system, held, rows = stack.systems[run], state.gathered, stack.rows
     row, place = np.argwhere(~np.isfinite(held.block[..., run]))[0].tolist()
     names = {0: "height", rows.force: "force", rows.target: "commanded height"}

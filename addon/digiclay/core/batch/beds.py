@@ -106,7 +106,18 @@ class Beds:
 
 
 def at_rest(rows: Rows, count: int, heights: Floats, memory: Any) -> Beds:
-    """Return the beds before the sessions: every valve shut, every pin of a run at one height (b,), m."""
+    """Return the beds before the sessions: every valve shut, every pin of a run at one height (b,), m.
+
+    Parameters
+    ----------
+    rows : Rows
+    count : int
+        Cells of a bed.
+    heights : ndarray (b,)
+        m.
+    memory : object
+        Of the controllers.
+    """
     runs = heights.size
     values = np.zeros((rows.count, count, runs))
     values[0] = values[rows.target] = heights

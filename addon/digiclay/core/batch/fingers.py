@@ -63,7 +63,16 @@ def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, c
 def still_coming(
     coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
 ) -> Fingers | None:
-    """Return how the fingers come in a period and some more: what is known, or worked out anew."""
+    """Return how the fingers come in a period and some more: what is known, or worked out anew.
+
+    Parameters
+    ----------
+    coming : Fingers or None
+        What is known.
+    systems : sequence of System
+    ways : sequence of Trajectory
+    period : int
+    """
     if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
         return coming
     return fingers(systems, ways, period, CHUNK)
@@ -136,7 +145,15 @@ class Way:
 
 
 def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
-    """Work out a finger's way at times (t,), s."""
+    """Work out a finger's way at times (t,), s.
+
+    Parameters
+    ----------
+    grid : Grid
+    trajectory : Trajectory
+    time : ndarray (t,)
+        s.
+    """
     tip = trajectory.poses(time)
     places = np.unique(tip[:, :2], axis=0)
     nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]

@@ -98,7 +98,15 @@ def taking_part(known: Gathering, beds: Beds, window: Floats | None, control: Di
 
 
 def taken_along(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
-    """Return the cells that other beds have chosen, taken out of these; their arrays are used up."""
+    """Return the cells that other beds have chosen, taken out of these; their arrays are used up.
+
+    Parameters
+    ----------
+    known : Gathering
+    beds : Beds
+    chosen : Gathered
+        Of the other beds.
+    """
     _put_back(known, beds)
     return _taken(known, beds, chosen)
 

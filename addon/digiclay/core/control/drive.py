@@ -65,7 +65,14 @@ Touch = TypeVar("Touch", bound=TouchParameters)
 
 
 def raise_felt_force(floor: float, parameters: Touch) -> Touch:
-    """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0."""
+    """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0.
+
+    Parameters
+    ----------
+    floor : float
+        N.
+    parameters : Touch
+    """
     return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
 
 
@@ -201,6 +208,16 @@ def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 
     force in a control period. With the dead time and the lag of the default valve it swings from about
     2 on, so 1 is allowed. The pulp is stiffest at the largest force a pin can lift,
     ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
+
+    Parameters
+    ----------
+    damping : float
+        c, N s/m.
+    cell : Cell
+    period : float
+        T_c, s.
+    stiffness : float
+        Of a spring under the pin, N/m.
 
     Raises
     ------

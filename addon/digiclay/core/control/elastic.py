@@ -54,7 +54,13 @@ class ElasticControl(CellwiseControl):
 
 
 def build(parameters: Elastic, device: DeviceInfo) -> ElasticControl:
-    """Put the elastic behaviour together for a device."""
+    """Put the elastic behaviour together for a device.
+
+    Parameters
+    ----------
+    parameters : Elastic
+    device : DeviceInfo
+    """
     check_damping(parameters.damping, device.cell, device.period, parameters.stiffness)
     parameters = raise_felt_force(device.force_floor, parameters)
     return ElasticControl(

@@ -88,6 +88,11 @@ class ForceDisplayControl(CellwiseControl):
 def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
     """Put force display together for a device.
 
+    Parameters
+    ----------
+    parameters : ForceDisplay
+    device : DeviceInfo
+
     Raises
     ------
     ParameterError

@@ -72,12 +72,28 @@ class Master(NamedTuple):
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
     def move_to(self, x: float, y: float, heading: Heading) -> Master:
-        """Return the master where it has felt the finger."""
+        """Return the master where it has felt the finger.
+
+        Parameters
+        ----------
+        x, y : float
+            m.
+        heading : Heading
+        """
         kept = self.height, self.opening, self.reference, self.edge
         return Master(self.phase, x, y, *kept, heading, self.felt, 0, self.losses)
 
     def lead(self, phase: Phase, height: float, opening: float) -> Master:
-        """Return the master after a period, with its valve's opening."""
+        """Return the master after a period, with its valve's opening.
+
+        Parameters
+        ----------
+        phase : Phase
+        height : float
+            m.
+        opening : float
+            Of its valve.
+        """
         felt = height if self.alone == 0 else self.felt
         place, kept = (self.x, self.y), (self.reference, self.edge)
         return Master(phase, *place, height, opening, *kept, self.heading, felt, self.alone, self.losses)
@@ -202,7 +218,14 @@ class MasterControl(BatchControl):
         return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
 
     def lead(self, master: Master, force: float) -> Master:
-        """VM Control and VM Model: the effort, and the height a real cell would make of it."""
+        """VM Control and VM Model: the effort, and the height a real cell would make of it.
+
+        Parameters
+        ----------
+        master : Master
+        force : float
+            Total force on the bed, N.
+        """
         known, phase = self.parameters, master.phase
         if phase is Phase.IDLE:
             return master
@@ -238,7 +261,16 @@ class MasterControl(BatchControl):
         return master.x, master.y, toward_x, toward_y
 
     def set_edge(self, master: Master, level: float, count: int) -> Master:
-        """Put a master into a surface whose height is the mean of some cells'; `level` is their sum, m."""
+        """Put a master into a surface whose height is the mean of some cells'; `level` is their sum, m.
+
+        Parameters
+        ----------
+        master : Master
+        level : float
+            Sum of the heights, m.
+        count : int
+            Cells in the sum.
+        """
         return master.with_edge(self.keep_in_stroke(level / count)) if count else master
 
     def keep_in_stroke(self, height: float) -> float:

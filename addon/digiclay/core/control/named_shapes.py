@@ -22,49 +22,97 @@ FILE = ".npy"
 
 
 def dome(x: Floats, y: Floats) -> Floats:
-    """Return a paraboloid, 1 in the middle, 0 on the unit circle and beyond."""
+    """Return a paraboloid, 1 in the middle, 0 on the unit circle and beyond.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     bump: Floats = np.maximum(1.0 - x * x - y * y, 0.0)
     return bump
 
 
 def saddle(x: Floats, y: Floats) -> Floats:
-    """Return a saddle, 1 at x = ±1, -1 at y = ±1."""
+    """Return a saddle, 1 at x = ±1, -1 at y = ±1.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     seat: Floats = x * x - y * y
     return seat
 
 
 def wave(x: Floats, y: Floats) -> Floats:
-    """Return two waves along x."""
+    """Return two waves along x.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     waves: Floats = np.sin(2.0 * math.pi * x)
     return waves
 
 
 def ripple(x: Floats, y: Floats) -> Floats:
-    """Return waves around the middle."""
+    """Return waves around the middle.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     waves: Floats = np.cos(3.0 * math.pi * np.hypot(x, y))
     return waves
 
 
 def crater(x: Floats, y: Floats) -> Floats:
-    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6."""
+    """Return a ring wall, 1 high at radius 0.6, around a hollow of depth 0.6.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     r = np.hypot(x, y)
     ring: Floats = np.exp(-(((r - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((r / 0.3) ** 2))
     return ring
 
 
 def pyramid(x: Floats, y: Floats) -> Floats:
-    """Return a four-sided pyramid, 1 in the middle."""
+    """Return a four-sided pyramid, 1 in the middle.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     sides: Floats = 1.0 - np.maximum(np.abs(x), np.abs(y))
     return sides
 
 
 def ramp(x: Floats, y: Floats) -> Floats:
-    """Return a plane that rises along x, from -1 to 1."""
+    """Return a plane that rises along x, from -1 to 1.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     return x
 
 
 def flat(x: Floats, y: Floats) -> Floats:
-    """Return 0."""
+    """Return 0.
+
+    Parameters
+    ----------
+    x, y : ndarray (n,)
+        -1 to 1 over the bed.
+    """
     return 0.0 * x
 
 
@@ -84,6 +132,12 @@ SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
 def check_shape(owner: str, field: str, shape: str) -> None:
     """Refuse what is neither a shape's name nor a file's.
 
+    Parameters
+    ----------
+    owner, field : str
+        What the message calls it.
+    shape : str
+
     Raises
     ------
     ParameterError
@@ -97,6 +151,11 @@ def named(shape: str, grid: Grid) -> Floats:
     """Return the values of a named shape for all cells of a bed, shape (n,), from -1 to 1.
 
     A shape's square is the bed; a bed longer than wide stretches it.
+
+    Parameters
+    ----------
+    shape : str
+    grid : Grid
     """
     middle_x, middle_y = grid.x / _half(grid.x), grid.y / _half(grid.y)
     return SHAPES[shape](middle_x, middle_y)

@@ -148,6 +148,11 @@ class PushPullControl:
 def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
     """Put push and pull together for a device.
 
+    Parameters
+    ----------
+    parameters : PushPull
+    device : DeviceInfo
+
     Raises
     ------
     ParameterError

@@ -45,11 +45,25 @@ class BatchControl:
         return rule(self, memory, *columns)
 
     def any_run(self, rule: Callable[..., bool], memory: Any) -> bool:
-        """Tell whether a rule holds for the run, or for any of a stack; see `decide`."""
+        """Tell whether a rule holds for the run, or for any of a stack; see `decide`.
+
+        Parameters
+        ----------
+        rule : callable
+            As `decide` takes it.
+        memory : object
+        """
         return any(self.decide(rule, memory)) if self.runs else rule(self, memory)
 
     def gather(self, rule: Callable[..., tuple[Any, ...]], memory: Any) -> tuple[Any, ...]:
-        """Return the numbers that a rule finds in a memory; in a stack arrays (b,); see `decide`."""
+        """Return the numbers that a rule finds in a memory; in a stack arrays (b,); see `decide`.
+
+        Parameters
+        ----------
+        rule : callable
+            As `decide` takes it.
+        memory : object
+        """
         found = self.decide(rule, memory)
         return tuple(np.array(column) for column in zip(*found, strict=True)) if self.runs else found
 

@@ -149,6 +149,11 @@ class ShapeDisplayControl:
 def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
     """Put shape display together for a device; a shape of the scene's own is displayed in place of its own.
 
+    Parameters
+    ----------
+    parameters : ShapeDisplay
+    device : DeviceInfo
+
     Raises
     ------
     ParameterError

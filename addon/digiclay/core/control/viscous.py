@@ -111,6 +111,11 @@ class Exchange:
 
         What one gives the other gets, and nothing is exchanged with a cell that is not there: the
         sum stays what it was.
+
+        Parameters
+        ----------
+        cells : ndarray of int (m,)
+        values : ndarray (m,)
         """
         change = np.zeros(cells.size)
         for one, other, share in self.find_pairs(cells):
@@ -215,7 +220,13 @@ class ViscousControl:
 
 
 def build(parameters: Viscous, device: DeviceInfo) -> ViscousControl:
-    """Put the viscous behaviour together for a device."""
+    """Put the viscous behaviour together for a device.
+
+    Parameters
+    ----------
+    parameters : Viscous
+    device : DeviceInfo
+    """
     check_damping(parameters.damping, device.cell, device.period)
     return ViscousControl(
         raise_felt_force(device.force_floor, parameters),

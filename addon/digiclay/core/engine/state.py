@@ -228,7 +228,18 @@ class State(NamedTuple):
 
 
 def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
-    """Return the state before a session: every pin at `height`, every valve shut."""
+    """Return the state before a session: every pin at `height`, every valve shut.
+
+    Parameters
+    ----------
+    rows : Rows
+    count : int
+        Cells.
+    height : float
+        m.
+    memory : object
+        Of the controller.
+    """
     values = np.zeros((rows.count, count))
     values[0] = values[rows.target] = height
     none = np.empty(0, np.intp)

@@ -53,7 +53,15 @@ class OrificeAndConduit:
         return self.valve.knee
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
-        """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`."""
+        """Return g / (1 + R g), m³/(s Pa); see `Orifice.laminar_conductance`.
+
+        Parameters
+        ----------
+        opening : ndarray
+            Valve opening K, any shape.
+        out : ndarray, optional
+            Takes the result.
+        """
         lift = self.valve.laminar_lift(opening, out)
         series = lift * self.resistance
         series += 1.0 / self.valve.laminar
@@ -61,7 +69,15 @@ class OrificeAndConduit:
         return lift
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
-        """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`."""
+        """Return Q/ΔP of the series, m³/(s Pa); see `Orifice.conductance`.
+
+        Parameters
+        ----------
+        opening : ndarray (n,)
+            Valve opening K.
+        drop : ndarray (n,)
+            Pressure drop over valve and conduit, Pa.
+        """
         a = self.valve.turbulent * np.abs(opening)
         ra = self.resistance * a
         turbulent = 2.0 * a / (ra + np.sqrt(ra * ra + 4.0 * np.abs(drop)) + np.finfo(float).tiny)
@@ -69,10 +85,25 @@ class OrificeAndConduit:
         return np.minimum(laminar, turbulent)
 
     def flow(self, opening: Floats, drop: Floats) -> Floats:
-        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`."""
+        """Return the flow Q with the sign of `drop`, m³/s; arguments as `conductance`.
+
+        Parameters
+        ----------
+        opening : ndarray (n,)
+            Valve opening K.
+        drop : ndarray (n,)
+            Pressure drop over valve and conduit, Pa.
+        """
         return self.conductance(opening, drop) * drop
 
 
 def in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
-    """Put a conduit behind a valve."""
+    """Put a conduit behind a valve.
+
+    Parameters
+    ----------
+    valve : Orifice
+    conduit : Conduit
+    fluid : Fluid
+    """
     return OrificeAndConduit(valve, conduit.resistance(fluid))

@@ -114,7 +114,18 @@ class ValveObserver:
 def valve_observer(
     inner: Sensors, cell: Cell, line: Queue, period: float, doubt: float = 0.0
 ) -> ValveObserver:
-    """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m."""
+    """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m.
+
+    Parameters
+    ----------
+    inner : Sensors
+    cell : Cell
+    line : Queue
+    period : float
+        Control period, s.
+    doubt : float
+        m.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(NODES)  # type: ignore[no-untyped-call]
     edges = (0.0, line.cut, period) if line.cut else (0.0, period)
     times: list[float] = []

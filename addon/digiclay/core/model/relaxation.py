@@ -71,7 +71,15 @@ class Relaxation(Parameters):
         return relaxed
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13)."""
+        """Return dz/dt = ν (T - z), N/s, shape (k, n) (equation 13).
+
+        Parameters
+        ----------
+        own : ndarray (k, n)
+            The filters, N.
+        tension : ndarray (n,)
+            N.
+        """
         return self.rates * (tension - own)
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
@@ -109,5 +117,13 @@ class Relaxation(Parameters):
         return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Let filters decay without contact for `time` seconds, shape (n[, b]), in place; exact."""
+        """Let filters decay without contact for `time` seconds, shape (n[, b]), in place; exact.
+
+        Parameters
+        ----------
+        own : ndarray (k, n[, b])
+            The filters, N.
+        time : ndarray (n[, b])
+            s.
+        """
         own *= np.exp(-per_row(self.rates, own.ndim) * time)

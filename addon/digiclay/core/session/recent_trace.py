@@ -65,12 +65,27 @@ class Trace:
 
 
 def begun(period: float, pins: Sequence[int] = ()) -> Trace:
-    """Return an empty trace for a control period, s."""
+    """Return an empty trace for a control period, s.
+
+    Parameters
+    ----------
+    period : float
+        s.
+    pins : sequence of int
+        Whose heights are kept.
+    """
     return Trace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED)))
 
 
 def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
-    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out."""
+    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out.
+
+    Parameters
+    ----------
+    trace : Trace
+    pins : sequence of int
+    count : int
+    """
     kept = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
     if kept == trace.pins:
         return trace
@@ -83,13 +98,28 @@ def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
 
 
 def felt(system: System, state: State) -> float:
-    """Return the total force on the bed, N."""
+    """Return the total force on the bed, N.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+    """
     held = state.gathered
     return float(held.block[system.rows.force, : held.near].sum())
 
 
 def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
-    """Return what a trace keeps of a state."""
+    """Return what a trace keeps of a state.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+    set_point : SetPoint or None
+    pins : sequence of int
+        Whose heights are kept.
+    """
     held = state.gathered
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
@@ -100,7 +130,14 @@ def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence
 
 
 def extended(trace: Trace, rows: list[list[float]]) -> Trace:
-    """Return the trace with rows added, each as wide as its own; time may have gone back in between."""
+    """Return the trace with rows added, each as wide as its own; time may have gone back in between.
+
+    Parameters
+    ----------
+    trace : Trace
+    rows : list of list of float
+        From `row`.
+    """
     if not rows:
         return trace
     new = np.array(rows)

@@ -100,7 +100,16 @@ class BernoulliPlan:
 
 
 def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
-    """Work out once what all periods share."""
+    """Work out once what all periods share.
+
+    Parameters
+    ----------
+    cell : Cell
+    queue : Queue
+        Commands on their way to the valve.
+    segments : tuple of Segment
+        Physics steps of a period.
+    """
     times, weights, nodes = _gauss_points(queue, segments)
     end = segments[-1].start + segments[-1].length
     pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())

@@ -61,7 +61,17 @@ class Explicit:
         return ExplicitPlan(cell, queue, segments, speeds(cell))
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go in one step, s long."""
+        """Return how far the rows go in one step, s long.
+
+        Parameters
+        ----------
+        rates : callable
+            Rates of the rows, at rows and a node of the step.
+        y : ndarray (r, n)
+            State rows at the start of the step.
+        step : float
+            s.
+        """
         raise NotImplementedError
 
     def prepare(self, plan: ExplicitPlan, rows: Floats, near: int) -> Movement:
@@ -69,7 +79,16 @@ class Explicit:
         return partial(self.advance, plan, rows)
 
     def advance(self, plan: ExplicitPlan, rows: Floats, under: Floats) -> Floats:
-        """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
+        """Move a block of cells on by one control period, in place; see `interfaces.Movement`.
+
+        Parameters
+        ----------
+        plan : ExplicitPlan
+        rows : ndarray (r + q, n)
+            State rows, then the commands of the queue, oldest first.
+        under : ndarray (p, k)
+            Underside of the finger over the first k cells at the period's instants, m.
+        """
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = rows[: cell.rows], rows[cell.rows :]
         thrown = np.zeros(y.shape[1:], np.bool_)
