@@ -21,7 +21,7 @@ from digiclay.live import bed_state, running, sculpting, tick
 from digiclay.live.waiting import blocking_reason
 from digiclay.operators.add_bed import add, select_only
 from digiclay.settings import properties
-from digiclay.settings.devices import device
+from digiclay.settings.devices import make_scene
 
 __all__ = ["PARTS", "TICK", "Cost", "measured"]
 
@@ -87,7 +87,7 @@ def measured(rows: int, columns: int, ticks: int) -> Cost:
 def _session(rows: int, columns: int) -> Iterator[Any]:
     """Give a bed with a session in the open file, and take both away again."""
     with _settings(), scratch():
-        bed = add(bpy.context, device("paper", Layout(rows=rows, columns=columns), "virtual_master"))
+        bed = add(bpy.context, make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master"))
         select_only(bpy.context, bed)
         tick.start(bpy.context, bed)
         try:
@@ -115,7 +115,7 @@ def _move(bed: Any, count: int) -> None:
     """Put the fingertip where it is at a tick: down, and round and round."""
     tip = view.fingertip_of(bed)
     turn = 2.0 * np.pi * count / ROUND
-    session = running.of(bed)
+    session = running.find(bed)
     assert session is not None
     rest = session.scene.actuator.rest_height
     down = min(count / (0.8 * WARM_UP), 1.0) * (DEPTH + 2e-3)
@@ -143,13 +143,13 @@ def _timed(bed: Any, count: int) -> float:
 def _timed_parts(bed: Any, count: int) -> dict[str, float]:
     """Return what the parts of a tick take, s."""
     _move(bed, count)
-    session = running.of(bed)
+    session = running.find(bed)
     assert session is not None
     moments = [time.perf_counter()]
     blocking_reason(bpy.context, bed)
     pose = bridge.pose(view.fingertip_of(bed))
     moments.append(time.perf_counter())
-    later = sculpting.advanced(session, pose, TICK * count, 1000)
+    later = sculpting.advance(session, pose, TICK * count, 1000)
     moments.append(time.perf_counter())
     running.put(later)
     bed_state.write(bed, later, session)

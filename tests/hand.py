@@ -24,9 +24,9 @@ def pose(x: float = 0.0, z: float = 46.0) -> Floats:
 
 def started() -> Running:
     """Return a session at its beginning, its clock started."""
-    session, said = sculpting.begun(7, "Bed", SCENE, pose())
+    session, said = sculpting.begin_session(7, "Bed", SCENE, pose())
     assert said == ""
-    return sculpting.advanced(session, pose(), 0.0, 100)
+    return sculpting.advance(session, pose(), 0.0, 100)
 
 
 class Hand:
@@ -39,7 +39,7 @@ class Hand:
         """Advance tick by tick."""
         for x, z in poses:
             self.now += TICK
-            session = sculpting.advanced(session, pose(x, z), self.now, 100)
+            session = sculpting.advance(session, pose(x, z), self.now, 100)
         return session
 
     def press(self, session: Running, x: float = 0.0) -> Running:

@@ -7,7 +7,7 @@ from typing import Any
 from .compat import bpy
 from .device import palettes
 
-__all__ = ["Choices", "Preferences", "of", "register", "unregister"]
+__all__ = ["Choices", "Preferences", "get", "register", "unregister"]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def take_palette(preferences: Any, context: Any) -> None:
     preferences : bpy.types.AddonPreferences
     context : bpy.types.Context
     """
-    palettes.wear(preferences.palette)
+    palettes.set_palette(preferences.palette)
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -82,7 +82,7 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "palette")
 
 
-def of(context: Any) -> Any:
+def get(context: Any) -> Any:
     """Return the user's preferences; where the package is used without being enabled, the defaults.
 
     Returns

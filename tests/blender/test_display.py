@@ -16,8 +16,8 @@ from digiclay.core.session.accuracy import Errors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
-from digiclay.overlay.look import look
-from digiclay.overlay.placement import laid_out
+from digiclay.overlay.look import choose_colours
+from digiclay.overlay.placement import lay_out
 from digiclay.panels.live_session import error_line
 from digiclay.settings import properties
 
@@ -37,15 +37,15 @@ def session(bed: Any) -> Iterator[running.Running]:
     """A running session whose finger has pressed the middle of the bed for a third of a second."""
     scene = properties.scene_of(bed)
     above = bridge.pose(view.fingertip_of(bed))
-    begun, _ = sculpting.begun(bed.session_uid, bed.name, scene, above)
+    begun, _ = sculpting.begin_session(bed.session_uid, bed.name, scene, above)
     pressed = above.copy()
     pressed[2] = 0.037
-    begun = sculpting.advanced(begun, above, 0.0, 100)
+    begun = sculpting.advance(begun, above, 0.0, 100)
     for tick in range(1, 11):
-        begun = sculpting.advanced(begun, pressed, tick / 30, 100, pins=display.picked(bed))
+        begun = sculpting.advance(begun, pressed, tick / 30, 100, pins=display.picked_pins(bed))
     # The trace keeps every other period: it ends with this state.
     while begun.state.period % begun.trace.every:
-        begun = sculpting.advanced(sculpting.request_step(begun), pressed, 1.0, 100)
+        begun = sculpting.advance(sculpting.request_step(begun), pressed, 1.0, 100)
     begun = replace(begun, paused=False)
     running.put(begun)
     yield begun
@@ -61,7 +61,7 @@ def forces(bed: Any) -> np.ndarray:
 def test_the_properties_are_the_settings_of_the_geometry_nodes(bed: Any) -> None:
     shown = bed.digiclay_display
     shown.colour, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
-    assert (view.coloured_by(bed), view.arrows_shown(bed)) == ("force", True)
+    assert (view.colour_source(bed), view.shows_arrows(bed)) == ("force", True)
     assert view.top_colour(bed) == 0.5
     assert view.arrow_length(bed) == pytest.approx(0.25, rel=1e-12)
     view.colour_by(bed, "mode")
@@ -124,13 +124,13 @@ def test_disabling_the_extension_takes_the_overlay_away(bed: Any, session: runni
 
 
 def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Running) -> None:
-    told = views.told(bed, session, palettes.PALETTES["okabe_ito"])
+    told = views.read_session(bed, session, palettes.PALETTES["okabe_ito"])
     assert (told.name, told.method, told.set_point) == (bed.name, "virtual_master", 0.4)
     assert told.modes.sum() == 400
     assert np.count_nonzero(told.modes) > 1
     total = session.state.row(session.system.rows.force).sum()
     assert told.force[-1] == pytest.approx(total, rel=1e-12)
-    stopped = views.told(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
+    stopped = views.read_session(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
     assert stopped.paused
     assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
 
@@ -140,18 +140,18 @@ def test_panel_and_overlay_say_the_same_of_the_error(
     bed: Any, session: running.Running, errors: Errors | None
 ) -> None:
     known = replace(session, errors=errors)
-    told = views.told(bed, known, palettes.PALETTES["okabe_ito"])
-    chosen = look((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
-    written = [words.text for words in laid_out(told, chosen, (0.0, 0.0, 900.0, 700.0), 1.0).words]
+    told = views.read_session(bed, known, palettes.PALETTES["okabe_ito"])
+    chosen = choose_colours((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
+    written = [words.text for words in lay_out(told, chosen, (0.0, 0.0, 900.0, 700.0), 1.0).words]
     assert error_line(known) in written
 
 
 def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: Any) -> None:
-    display.pick(bed, (7, 399, 0))
-    assert display.picked(bed) == (7, 399, 0)
-    assert display.picked(bed.copy()) == (7, 399, 0)
+    display.pick_pins(bed, (7, 399, 0))
+    assert display.picked_pins(bed) == (7, 399, 0)
+    assert display.picked_pins(bed.copy()) == (7, 399, 0)
     assert bpy.ops.digiclay.clear_pins() == {"FINISHED"}
-    assert display.picked(bed) == ()
+    assert display.picked_pins(bed) == ()
     assert not bpy.ops.digiclay.clear_pins.poll()
 
 
@@ -161,8 +161,8 @@ def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(bed: An
 )
 def test_pins_that_cannot_be_picked_are_refused(bed: Any, pins: tuple[int, ...], said: str) -> None:
     with pytest.raises(DigiclayError, match=said):
-        display.pick(bed, pins)
-    assert display.picked(bed) == ()
+        display.pick_pins(bed, pins)
+    assert display.picked_pins(bed) == ()
 
 
 def test_the_panel_display_stands_in_the_sidebar(bed: Any) -> None:

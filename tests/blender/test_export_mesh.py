@@ -186,9 +186,9 @@ def test_a_session_tells_its_forces_whether_they_are_drawn_or_not(bed):
     force = state.row(system.rows.force).copy()
     assert force.max() > 1e-3
     bed["digiclay_state"] = snapshot.dump(system, state)
-    np.testing.assert_array_equal(formed_bed.formed(bed).force, force)
+    np.testing.assert_array_equal(formed_bed.read_formed(bed).force, force)
     bed["digiclay_state"] = b"damaged"
-    assert not np.array_equal(formed_bed.formed(bed).force, force)
+    assert not np.array_equal(formed_bed.read_formed(bed).force, force)
 
 
 def test_each_feature_becomes_a_body_of_its_own_selected(bed):
@@ -262,16 +262,16 @@ def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
 
 def test_the_kept_surface_comes_through_saving(bed, tmp_path):
     bpy.ops.digiclay.keep_surface()
-    name, kept = bed.name, formed_bed.formed(bed).former.copy()
+    name, kept = bed.name, formed_bed.read_formed(bed).former.copy()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.read_factory_settings()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    np.testing.assert_array_equal(formed_bed.formed(bpy.data.objects[name]).former, kept)
+    np.testing.assert_array_equal(formed_bed.read_formed(bpy.data.objects[name]).former, kept)
 
 
 def test_the_heights_are_measured_from_the_rest_height_of_the_settings(bed):
     bed.digiclay.actuator.rest_height = 35.0
-    np.testing.assert_allclose(formed_bed.formed(bed).former, 0.035, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(formed_bed.read_formed(bed).former, 0.035, rtol=0, atol=1e-12)
 
 
 def test_without_a_bed_nothing_can_be_exported_or_made(extension):

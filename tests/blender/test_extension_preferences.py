@@ -59,7 +59,7 @@ def test_any_two_modes_look_different_with_any_colour_vision(name: str, vision: 
 @pytest.mark.usefixtures("extension")
 def test_a_palette_recolours_the_beds_of_the_file() -> None:
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
-    palettes.wear("tol_muted")
+    palettes.set_palette("tol_muted")
     for mode, colour in palettes.PALETTES["tol_muted"].items():
         # float32 numbers up to 1.
         np.testing.assert_allclose(mode_colour(mode), linear(colour), rtol=0, atol=1e-6)
@@ -76,14 +76,14 @@ def test_a_second_bed_leaves_colours_the_user_has_changed() -> None:
 
 def test_a_palette_in_a_file_without_a_bed_does_nothing() -> None:
     before = len(bpy.data.materials)
-    palettes.wear("brightness")
-    assert (palettes.worn(), len(bpy.data.materials)) == (False, before)
+    palettes.set_palette("brightness")
+    assert (palettes.has_palette(), len(bpy.data.materials)) == (False, before)
 
 
 @pytest.mark.usefixtures("extension")
 def test_where_the_package_is_not_enabled_the_preferences_are_their_defaults() -> None:
     assert "digiclay" not in bpy.context.preferences.addons
-    assert preferences.of(bpy.context) == preferences.Choices()
+    assert preferences.get(bpy.context) == preferences.Choices()
 
 
 @pytest.mark.usefixtures("extension")

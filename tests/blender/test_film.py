@@ -80,7 +80,7 @@ def test_a_film_shows_the_rows_in_their_colours_at_its_rate(tmp_path: Path, hist
     before = inventory()
     told: list[tuple[int, int]] = []
     looks = Film(**SMALL, arrows=False)
-    path = films.film(
+    path = films.render_film(
         history, tmp_path / "a film.mp4", looks, set_point=0.3, progress=lambda *at: told.append(at)
     )
     assert inventory() == before
@@ -98,7 +98,7 @@ def test_a_film_shows_the_rows_in_their_colours_at_its_rate(tmp_path: Path, hist
 
 def test_the_strip_fills_up_as_time_goes_on(tmp_path: Path, history: Any) -> None:
     history["total_force"][:] = 0.3
-    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, arrows=False))
+    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, arrows=False))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     # Along the strip's lower edge, what has been is blue and what is to come is grey.
@@ -109,7 +109,9 @@ def test_the_strip_fills_up_as_time_goes_on(tmp_path: Path, history: Any) -> Non
 
 
 def test_without_a_strip_the_bed_has_its_place(tmp_path: Path, history: Any) -> None:
-    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, strip=False, stop=0.125, arrows=False))
+    path = films.render_film(
+        history, tmp_path / "film.mp4", Film(**SMALL, strip=False, stop=0.125, arrows=False)
+    )
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     assert len(pictures) == 2
@@ -120,7 +122,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.375, stop=0.45, arrows=arrows, strip=False)
-        path = films.film(history, tmp_path / f"{arrows}.mp4", looks)
+        path = films.render_film(history, tmp_path / f"{arrows}.mp4", looks)
         assert path is not None
         _, pictures = frames_of(path, tmp_path / f"{arrows}")
         red = pictures[-1]
@@ -138,7 +140,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
 
 def test_a_bed_coloured_by_force_changes_its_colours_with_the_force(tmp_path: Path, history: Any) -> None:
     history["force"] = history["force"] * 10.0
-    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, colour="force", arrows=False))
+    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, colour="force", arrows=False))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
@@ -150,7 +152,7 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
-    path = films.turntable(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
+    path = films.render_turntable(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     assert len(pictures) == 4
@@ -166,34 +168,38 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path: Path, history: 
 
 def test_a_film_that_is_stopped_leaves_nothing(tmp_path: Path, history: Any) -> None:
     asked = iter([False, False, True])
-    assert films.film(history, tmp_path / "film.mp4", Film(**SMALL), stopped=lambda: next(asked)) is None
+    assert (
+        films.render_film(history, tmp_path / "film.mp4", Film(**SMALL), stopped=lambda: next(asked)) is None
+    )
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_part_that_is_not_in_the_session_is_refused_before_any_work(tmp_path: Path, history: Any) -> None:
     with pytest.raises(ParameterError, match="start must be between 0 s and 1 s"):
-        films.film(history, tmp_path / "film.mp4", Film(start=3.0))
+        films.render_film(history, tmp_path / "film.mp4", Film(start=3.0))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, history: Any) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
-        films.film(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
+        films.render_film(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
     assert "\n" not in str(caught.value)
 
 
 def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any) -> None:
-    path = films.film(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.2))
+    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.2))
     assert path is not None
     data = path.read_bytes()
-    assert film_file.whole_film(data)
-    assert not any(film_file.whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
+    assert film_file.is_whole_film(data)
+    assert not any(
+        film_file.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1)
+    )
     path = still.render_still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
     picture = path.read_bytes()
-    assert still.whole_picture(picture)
+    assert still.is_whole_picture(picture)
     assert not any(
-        still.whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
+        still.is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
     )
 
 
@@ -206,7 +212,7 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path: Path, history: Any)
         pytest.skip("this machine does not let root mount a disk")
     try:
         with pytest.raises(OutputError, match=r"film\.mp4 cannot be written: [Nn]o space") as caught:
-            films.film(history, disk / "film.mp4", Film(**SMALL))
+            films.render_film(history, disk / "film.mp4", Film(**SMALL))
         assert "\n" not in str(caught.value)
         assert list(disk.iterdir()) == []
     finally:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from digiclay.compat import scratch
 from digiclay.core.base.modes import Mode
-from digiclay.pictures.force_plot import SHARE, strip
-from digiclay.pictures.legend import READ, READ_BESIDE, Front, of_forces, of_modes
+from digiclay.pictures.force_plot import SHARE, draw_force_plot
+from digiclay.pictures.legend import READ, READ_BESIDE, Front, write_force_legend, write_mode_legend
 from digiclay.pictures.stage import MARGINS, half_frame
 
 #: Sizes of pictures, pixels, and how large their ordinary letters and those beside them are.
@@ -45,7 +45,7 @@ def texts(plane: Front) -> dict[str, Any]:
 def session(plane: Front) -> None:
     """Draw the strip of a session of 26.5 s."""
     time = np.linspace(0.0, 26.5, 50)
-    strip(plane, time, 0.4 + 0.1 * np.sin(time), 0.4).show(15.92, 0.49)
+    draw_force_plot(plane, time, 0.4 + 0.1 * np.sin(time), 0.4).show(15.92, 0.49)
 
 
 def extent(plane: Front, part: Any) -> tuple[float, float, float, float]:
@@ -61,7 +61,7 @@ def extent(plane: Front, part: Any) -> tuple[float, float, float, float]:
 @pytest.mark.parametrize(("size", "letters"), SIZES.items())
 def test_letters_have_a_size_that_can_be_read(size: tuple[int, int], letters: tuple[float, float]) -> None:
     plane = front(*size)
-    of_modes(plane, list(Mode))
+    write_mode_legend(plane, list(Mode))
     session(plane)
     found = texts(plane)
     sizes = [found[said].data.size / plane.pixel for said in ("force follow", "total force 0.49 N")]
@@ -74,13 +74,13 @@ def test_letters_have_a_size_that_can_be_read(size: tuple[int, int], letters: tu
 )
 def test_modes_are_explained_where_it_can_be_read(size: tuple[int, int], explained: int) -> None:
     plane = front(*size)
-    of_modes(plane, list(Mode))
+    write_mode_legend(plane, list(Mode))
     assert len(texts(plane)) == len(Mode) + explained
 
 
 @pytest.mark.usefixtures("written")
 @pytest.mark.parametrize("size", [*SIZES, (200, 320), (64, 40), (1000, 200)])
-@pytest.mark.parametrize("legend", [lambda plane: of_modes(plane, list(Mode)), of_forces])
+@pytest.mark.parametrize("legend", [lambda plane: write_mode_legend(plane, list(Mode)), write_force_legend])
 def test_nothing_that_is_written_covers_anything_else(size: tuple[int, int], legend: Any) -> None:
     plane = front(*size)
     legend(plane)
@@ -98,7 +98,7 @@ def test_nothing_that_is_written_covers_anything_else(size: tuple[int, int], leg
 @pytest.mark.parametrize("size", SIZES)
 def test_the_bar_of_forces_ends_above_the_strip_and_the_strip_below_the_bed(size: tuple[int, int]) -> None:
     plane = front(*size)
-    of_forces(plane)
+    write_force_legend(plane)
     session(plane)
     (bar,) = (part for part in plane.scene.objects if part.name.startswith("edge"))
     upper = extent(plane, texts(plane)["total force 0.49 N"])[3]

@@ -66,7 +66,7 @@ def test_the_session_goes_on_to_the_stored_heights(name: str, x: float) -> None:
 
 def test_the_take_replays_to_the_stored_heights() -> None:
     found = bed("Session")
-    first, second = takes.entries(found)
+    first, second = takes.list_takes(found)
     assert (first.name, second.name) == ("A press", "Take 2")  # the second was recorded when it was saved
     take = takes.read(found, first.number)
     system = assemble(take.scene)
@@ -79,9 +79,9 @@ def test_the_take_replays_to_the_stored_heights() -> None:
 def test_a_session_resets_and_goes_back_from_the_older_state() -> None:
     found = bed("Session")
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
-    assert bed_state.kept(found) is None
+    assert bed_state.read_snapshot(found) is None
     assert (exact(found) == 40e-3).all()
-    assert running.all() == ()
+    assert running.list_sessions() == ()
 
 
 def test_settings_of_the_user_s_own_are_those_of_the_scene_file() -> None:
@@ -90,12 +90,12 @@ def test_settings_of_the_user_s_own_are_those_of_the_scene_file() -> None:
     display = found.digiclay_display
     assert (display.colour, display.arrows) == ("force", True)
     assert tuple(display.picked) == (40, 41, -1, -1, -1, -1)
-    assert view.coloured_by(found) == "force"
+    assert view.colour_source(found) == "force"
 
 
 def test_features_are_measured_from_the_surface_that_was_kept() -> None:
     found = bed("Settings")
-    assert formed_bed.is_kept(found)
+    assert formed_bed.has_reference(found)
     listed = found["digiclay_features"]
     assert listed.startswith("0 bosses and 1 crease")
     assert bpy.ops.digiclay.find_features() == {"FINISHED"}
@@ -105,4 +105,4 @@ def test_features_are_measured_from_the_surface_that_was_kept() -> None:
 def test_the_fingertip_stands_where_the_session_was_left() -> None:
     found = bed("Session")
     pose = bridge.pose(view.fingertip_of(found))
-    np.testing.assert_allclose(pose, bed_state.pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits
+    np.testing.assert_allclose(pose, bed_state.read_pose(found), rtol=0, atol=1e-6)  # Blender's 32 bits

@@ -51,7 +51,7 @@ def test_every_sample_shape_opens_on_a_bed_that_displays_it(name: str) -> None:
 def test_a_sample_s_session_is_a_take_that_replays_bit_for_bit(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"session:{name}") == {"FINISHED"}
     bed = bpy.context.object
-    (entry,) = takes.entries(bed)
+    (entry,) = takes.list_takes(bed)
     assert entry.name == name
     assert entry.seconds == pytest.approx(load(find(name)).simulation.duration, abs=5e-3)
     assert replayed(takes.read(bed, entry.number))
@@ -75,7 +75,7 @@ def test_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path: Pa
     path = tmp_path / "long.toml"
     path.write_text("[simulation]\nduration = 3600", encoding="utf-8")
     assert bpy.ops.digiclay.open_scene(filepath=str(path)) == {"FINISHED"}
-    assert takes.entries(bpy.context.object) == []
+    assert takes.list_takes(bpy.context.object) == []
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def bed(extension: None) -> Any:
     made = bpy.context.object
     made.scale = (LARGER,) * 3
     made.rotation_euler = (0.1, -0.2, 0.5)
-    cells, height = aim.surface(made)
+    cells, height = aim.read_surface(made)
     bridge.write_cells(made.data, cells.positions, height + 0.0003 * np.sin(np.arange(cells.count)))
     bpy.context.view_layer.update()
     return made
@@ -67,10 +67,10 @@ def test_the_tool_comes_and_goes_with_the_extension() -> None:
 
 
 def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed: Any, in_the_view: Any) -> None:
-    cells, height = aim.surface(bed)
+    cells, height = aim.read_surface(bed)
     tops = np.column_stack([cells.positions, height])
-    pixels = aim.on_screen(in_the_view, bed, tops)
-    met = [aim.target(in_the_view, tuple(xy)) for xy in pixels]
+    pixels = aim.project(in_the_view, bed, tops)
+    met = [aim.find_target(in_the_view, tuple(xy)) for xy in pixels]
     assert all(found is not None and found.bed == bed for found in met)
     hit = np.array([found.pin for found in met])
     near = np.array([found.point for found in met])
@@ -94,50 +94,50 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed: Any, in_th
     world = bed.matrix_world @ Vector(place[0] * bridge.SCALE)
     theirs = location_3d_to_region_2d(in_the_view.region, in_the_view.region_data, world)
     # A thousandth of a pixel: theirs is reckoned in float32.
-    np.testing.assert_allclose(aim.on_screen(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
+    np.testing.assert_allclose(aim.project(in_the_view, bed, place)[0], theirs, rtol=0, atol=1e-2)
 
 
 def test_what_lies_behind_the_eye_is_nowhere_on_the_screen(bed: Any, in_the_view: Any) -> None:
     eye = np.array(bed.matrix_world.inverted() @ in_the_view.region_data.view_matrix.inverted().translation)
     behind = 1.5 * eye[None] / bridge.SCALE
-    assert np.isnan(aim.on_screen(in_the_view, bed, behind)).all()
+    assert np.isnan(aim.project(in_the_view, bed, behind)).all()
 
 
 def test_a_pixel_beside_the_bed_points_at_nothing(bed: Any, in_the_view: Any) -> None:
-    assert aim.target(in_the_view, (0.0, 0.0)) is None
+    assert aim.find_target(in_the_view, (0.0, 0.0)) is None
 
 
 def test_an_unevenly_scaled_bed_is_looked_through_and_pressing_it_says_why(
     bed: Any, in_the_view: Any
 ) -> None:
-    cells, height = aim.surface(bed)
+    cells, height = aim.read_surface(bed)
     middle = np.array([[0.0, 0.0, float(height.max())]])
-    xy = tuple(aim.on_screen(in_the_view, bed, middle)[0])
-    assert aim.target(in_the_view, xy) is not None
+    xy = tuple(aim.project(in_the_view, bed, middle)[0])
+    assert aim.find_target(in_the_view, xy) is not None
     bed.scale.z *= 1.2
     bpy.context.view_layer.update()
-    assert aim.target(in_the_view, xy) is None
+    assert aim.find_target(in_the_view, xy) is None
     with pytest.raises(DigiclayError, match="the same along x, y and z"):
-        aim.meets(in_the_view, bed, cells, height, xy)
+        aim.hit_point(in_the_view, bed, cells, height, xy)
 
 
 def test_a_hidden_bed_is_looked_through(bed: Any, in_the_view: Any) -> None:
-    _, height = aim.surface(bed)
-    xy = tuple(aim.on_screen(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
+    _, height = aim.read_surface(bed)
+    xy = tuple(aim.project(in_the_view, bed, np.array([[0.0, 0.0, float(height.max())]]))[0])
     bed.hide_set(True)
-    assert aim.target(in_the_view, xy) is None
+    assert aim.find_target(in_the_view, xy) is None
 
 
 def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
-    cells, height = aim.surface(bed)
+    cells, height = aim.read_surface(bed)
     wanted = grid(properties.scene_of(bed).layout)
     np.testing.assert_array_equal(cells.positions, wanted.positions)
     np.testing.assert_array_equal(height, bridge.read_cells(bed.data)["height"])
 
 
 def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed: Any) -> None:
-    cells, height = aim.surface(bed)
-    rim = tool.outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
+    cells, height = aim.read_surface(bed)
+    rim = tool.touch_outline(bed, cells, height, np.array([0.002, 0.001, 0.04]), 4e-3)
     finger = bridge.finger_of(view.fingertip_of(bed))
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim[:, :2], axis=0) / 2

@@ -82,7 +82,7 @@ def test_a_number_cannot_be_dragged_out_of_its_bounds(section: str, method: str)
 def test_a_sample_scene_comes_back_bit_for_bit(sample: str) -> None:
     scene = load(find(sample))
     bed = thing(scene.layout)
-    properties.adopt(bed, scene)
+    properties.write_scene(bed, scene)
     assert properties.scene_of(bed) == told(bed, scene)
 
 
@@ -95,13 +95,13 @@ def test_values_blender_cannot_keep_come_back_bit_for_bit() -> None:
         }
     )
     bed = thing()
-    properties.adopt(bed, scene)
+    properties.write_scene(bed, scene)
     assert properties.scene_of(bed) == told(bed, scene)
 
 
 def test_a_value_changed_by_hand_is_no_longer_the_one_adopted() -> None:
     bed = thing()
-    properties.adopt(bed, resolve({"valve": {"stroke": 1 / 33000}}))
+    properties.write_scene(bed, resolve({"valve": {"stroke": 1 / 33000}}))
     bed.digiclay.valve.stroke = 0.04
     assert properties.scene_of(bed).valve.stroke == 40e-6
 
@@ -110,7 +110,7 @@ def test_a_value_changed_by_hand_is_no_longer_the_one_adopted() -> None:
 def test_a_length_typed_in_mm_is_that_length_exactly(typed: float, meant: float) -> None:
     bed = thing()
     bed.digiclay.layout.pitch = typed
-    assert properties.described(bed).layout.pitch == meant
+    assert properties.read_scene(bed).layout.pitch == meant
 
 
 @pytest.mark.parametrize("section", OPTIONAL)
@@ -143,7 +143,7 @@ def test_choosing_an_arrangement_gives_the_contact_it_needs(arrangement: str) ->
     bed = thing()
     bed.digiclay.layout.arrangement = "hexagonal"
     bed.digiclay.layout.arrangement = arrangement
-    assert properties.described(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
+    assert properties.read_scene(bed) == resolve({"layout": {"arrangement": arrangement}}, bed.name)
 
 
 def test_each_method_keeps_parameters_of_its_own() -> None:
@@ -201,7 +201,7 @@ def test_settings_are_saved_with_the_file(tmp_path: Any) -> None:
     bed = thing()
     bpy.context.scene.collection.objects.link(bed)
     scene = resolve({"preset": "viscous", "valve": {"stroke": 1 / 33000}, "conduit": "absent"})
-    properties.adopt(bed, scene)
+    properties.write_scene(bed, scene)
     path = str(tmp_path / "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)

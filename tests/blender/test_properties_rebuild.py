@@ -88,14 +88,14 @@ def test_a_fingertip_that_was_deleted_comes_back(bed: Any) -> None:
 def test_the_state_of_other_pins_is_forgotten(bed: Any) -> None:
     bed[bed_state.STATE] = b"of 48 pins"
     bpy.ops.digiclay.rebuild()
-    assert bed_state.kept(bed) is None
+    assert bed_state.read_snapshot(bed) is None
 
 
 def test_how_a_bed_is_coloured_outlives_its_pins(bed: Any) -> None:
     view.colour_by(bed, "force")
     bed.digiclay.layout.rows = 7
     bpy.ops.digiclay.rebuild()
-    assert view.coloured_by(bed) == "force"
+    assert view.colour_source(bed) == "force"
 
 
 def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed: Any) -> None:
@@ -111,16 +111,16 @@ def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed: Any) -> No
     [("rows", 8), ("pitch", 3.5), ("arrangement", "staggered"), ("arrangement", "hexagonal")],
 )
 def test_the_panel_says_when_a_bed_is_no_longer_as_its_layout(field: str, value: object, bed: Any) -> None:
-    assert properties.stale(bed) == ""
+    assert properties.rebuild_reason(bed) == ""
     setattr(bed.digiclay.layout, field, value)
-    assert properties.stale(bed) != ""
+    assert properties.rebuild_reason(bed) != ""
     bpy.ops.digiclay.rebuild()
-    assert properties.stale(bed) == ""
+    assert properties.rebuild_reason(bed) == ""
 
 
 def test_rows_and_columns_exchanged_are_another_bed_of_as_many_pins(bed: Any) -> None:
     bed.digiclay.layout.rows, bed.digiclay.layout.columns = 8, 6
-    assert properties.stale(bed) == "The pins differ from the parameters of Layout"
+    assert properties.rebuild_reason(bed) == "The pins differ from the parameters of Layout"
     with pytest.raises(ParameterError, match="press Rebuild"):
         properties.scene_of(bed)
 

@@ -83,7 +83,7 @@ def test_the_legend_names_the_modes_present_in_their_colours(tmp_path: Path) -> 
 
 def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
     view.build(bed_in(Mode.HOLD), bpy.context.collection)
-    palettes.wear("tol_muted")
+    palettes.set_palette("tol_muted")
     width = 2 * WIDTH
     out = still.render_still(
         bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2

@@ -71,7 +71,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     assert np.abs(heights(made) - wanted).max() <= SHOWN
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
-    state = snapshot.load(system, bed_state.kept(made))
+    state = snapshot.load(system, bed_state.read_snapshot(made))
     assert system.controller.displayed(state.memory)
     assert np.abs(state.row(0) - wanted).max() <= SHOWN
 
@@ -134,7 +134,7 @@ def test_a_shape_is_taken_back_by_undo() -> None:
     made = next(thing for thing in bpy.data.objects if view.is_bed(thing))
     assert np.ptp(heights(made)) == 0.0
     assert not made.digiclay.use_shape
-    assert bed_state.kept(made) is None
+    assert bed_state.read_snapshot(made) is None
 
 
 def test_a_file_is_displayed_without_any_other_library(tmp_path: Path) -> None:

@@ -57,12 +57,12 @@ def record(bed: Any) -> str:
     press(bed)
     assert bpy.ops.digiclay.take_keep(name="A press") == {"FINISHED"}
     tick.stop(bed.session_uid)
-    return takes.entries(bed)[-1].number
+    return takes.list_takes(bed)[-1].number
 
 
 def test_what_is_recorded_becomes_a_take_of_the_bed(bed: Any) -> None:
     record(bed)
-    (entry,) = takes.entries(bed)
+    (entry,) = takes.list_takes(bed)
     assert entry.name == "A press"
     # Twelve ticks of ten periods: the first look at the clock starts it.
     assert entry.seconds == pytest.approx(0.6)
@@ -70,13 +70,13 @@ def test_what_is_recorded_becomes_a_take_of_the_bed(bed: Any) -> None:
 
 def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(bed: Any) -> None:
     number = record(bed)
-    kept, drawn = bed_state.kept(bed), heights(bed)
+    kept, drawn = bed_state.read_snapshot(bed), heights(bed)
     begin(bed)
     press(bed, deep=11e-3)
     tick.stop(bed.session_uid)
-    assert bed_state.kept(bed) != kept
+    assert bed_state.read_snapshot(bed) != kept
     assert bpy.ops.digiclay.take_replay(take=number) == {"FINISHED"}
-    assert bed_state.kept(bed) == kept == takes.read(bed, number).end
+    assert bed_state.read_snapshot(bed) == kept == takes.read(bed, number).end
     assert np.array_equal(heights(bed), drawn)
 
 
@@ -92,7 +92,7 @@ def test_the_session_goes_on_from_a_replayed_take(bed: Any) -> None:
     number = record(bed)
     bpy.ops.digiclay.take_replay(take=number)
     begin(bed)
-    session = running.of(bed)
+    session = running.find(bed)
     assert session.state.period == takes.read(bed, number).periods
     tick.stop(bed.session_uid)
 
@@ -154,14 +154,14 @@ def test_a_take_from_a_formed_bed_is_not_exported_and_the_file_is_not_made(bed: 
 def test_a_removed_take_is_gone(bed: Any) -> None:
     number = record(bed)
     assert bpy.ops.digiclay.take_remove(take=number) == {"FINISHED"}
-    assert takes.entries(bed) == []
+    assert takes.list_takes(bed) == []
 
 
 def test_keeping_a_take_of_nothing_says_so(bed: Any) -> None:
     begin(bed)
     bpy.ops.digiclay.take_record()
     assert bpy.ops.digiclay.take_keep() == {"CANCELLED"}
-    assert running.of(bed).recording is None
+    assert running.find(bed).recording is None
     tick.stop(bed.session_uid)
 
 
@@ -170,7 +170,7 @@ def test_a_session_that_is_stopped_while_it_records_keeps_the_take(bed: Any) -> 
     bpy.ops.digiclay.take_record()
     press(bed)
     tick.stop(bed.session_uid)
-    assert [one.seconds for one in takes.entries(bed)] == [pytest.approx(0.6)]
+    assert [one.seconds for one in takes.list_takes(bed)] == [pytest.approx(0.6)]
 
 
 def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_former_scene(bed: Any) -> None:
@@ -180,10 +180,10 @@ def test_a_changed_parameter_ends_the_recording_and_keeps_it_as_a_take_of_the_fo
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
     later = [tick.tick(bpy.context, 101.0 + TICK * count) for count in range(tick.LOOK)]
     (note,) = [note for notes in later for note in notes]
-    assert "The recording ended and was kept as Take 1" in note.words
-    (entry,) = takes.entries(bed)
+    assert "The recording ended and was kept as Take 1" in note.message
+    (entry,) = takes.list_takes(bed)
     assert takes.read(bed, entry.number).scene.set_point == SetPoint(0.4)
-    assert running.of(bed).recording is None
+    assert running.find(bed).recording is None
     tick.stop(bed.session_uid)
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
 
@@ -193,8 +193,8 @@ def test_a_reset_keeps_what_was_recorded(bed: Any) -> None:
     bpy.ops.digiclay.take_record()
     press(bed)
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
-    assert [one.seconds for one in takes.entries(bed)] == [pytest.approx(0.6)]
-    assert running.of(bed).recording is None
+    assert [one.seconds for one in takes.list_takes(bed)] == [pytest.approx(0.6)]
+    assert running.find(bed).recording is None
     tick.stop(bed.session_uid)
 
 
@@ -206,7 +206,7 @@ def test_a_take_is_exported_while_a_session_runs_and_records(bed: Any, tmp_path:
     file = tmp_path / "live.toml"
     assert bpy.ops.digiclay.take_export(filepath=str(file)) == {"FINISHED"}
     assert load(file).simulation.duration == pytest.approx(0.6)
-    assert len(running.of(bed).path) > 1
+    assert len(running.find(bed).path) > 1
     tick.stop(bed.session_uid)
 
 
@@ -217,7 +217,7 @@ def test_a_button_without_what_it_needs_is_disabled(bed: Any, name: str) -> None
 
 def test_the_session_recorded_by_hand_is_the_one_sculpting_records(bed: Any) -> None:
     begin(bed)
-    running.put(sculpting.recording(running.of(bed), True))
+    running.put(sculpting.set_recording(running.find(bed), True))
     press(bed, 3)
-    assert takes.recorded(running.of(bed)).periods == 30
+    assert takes.read_recording(running.find(bed)).periods == 30
     tick.stop(bed.session_uid)

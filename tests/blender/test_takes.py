@@ -70,10 +70,10 @@ def shown(bed: Any, frame: float) -> Floats:
     return places.reshape(-1, 3)[:, 2].astype(float) / bridge.SCALE
 
 
-def baked(bed: Any, take: Take, first: int = 1) -> bake.Moments:
+def baked(bed: Any, take: Take, first: int = 1) -> bake.BakedFrames:
     """Bake a take into a bed."""
-    *_, moments = bake.moments_of(take, 40.0)
-    assert isinstance(moments, bake.Moments)
+    *_, moments = bake.simulate_frames(take, 40.0)
+    assert isinstance(moments, bake.BakedFrames)
     bake.apply(bed, moments, first, Fingertip(), keyframe_finger=True)
     return moments
 
@@ -81,11 +81,11 @@ def baked(bed: Any, take: Take, first: int = 1) -> bake.Moments:
 def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_path: Path) -> None:
     take, _ = taken()
     name = bed.name
-    entry = takes.keep(bed, take, "A press")
+    entry = takes.add(bed, take, "A press")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     again = bpy.data.objects[name]
-    assert takes.entries(again) == [entry]
+    assert takes.list_takes(again) == [entry]
     read = takes.read(again, entry.number)
     assert np.array_equal(read.poses, take.poses)
     assert (read.start, read.end) == (take.start, take.end)
@@ -93,21 +93,21 @@ def test_a_take_kept_in_a_bed_comes_back_after_saving_and_loading(bed: Any, tmp_
 
 def test_a_copy_of_a_bed_has_its_takes(bed: Any) -> None:
     take, _ = taken()
-    takes.keep(bed, take)
-    assert takes.entries(bed.copy()) == takes.entries(bed)
+    takes.add(bed, take)
+    assert takes.list_takes(bed.copy()) == takes.list_takes(bed)
 
 
 def test_a_number_is_not_used_again_while_later_takes_stand(bed: Any) -> None:
     take, _ = taken(5)
-    numbers = [takes.keep(bed, take).number for _ in range(3)]
+    numbers = [takes.add(bed, take).number for _ in range(3)]
     takes.remove(bed, numbers[1])
-    assert takes.keep(bed, take).number == "4"
-    assert [one.number for one in takes.entries(bed)] == ["1", "3", "4"]
+    assert takes.add(bed, take).number == "4"
+    assert [one.number for one in takes.list_takes(bed)] == ["1", "3", "4"]
 
 
 def test_a_take_that_is_not_there_is_refused_with_those_that_are(bed: Any) -> None:
     take, _ = taken(5)
-    takes.keep(bed, take)
+    takes.add(bed, take)
     with pytest.raises(DigiclayError, match="has no take '7': its takes are 1"):
         takes.read(bed, "7")
 
@@ -241,7 +241,7 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     bpy.context.scene.frame_set(3)
-    *_, poses = bake.sampled(bpy.context.scene, bed, 1, 21, 5e-3)
+    *_, poses = bake.sample_path(bpy.context.scene, bed, 1, 21, 5e-3)
     # 20 frames at 40 a second are 100 periods; a subframe is read to 1e-4 of a frame or better.
     assert np.abs(poses[:, 0, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
     assert bpy.context.scene.frame_current == 3
@@ -250,7 +250,7 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed: Any) -> None:
 @pytest.mark.parametrize(("first", "last"), [(5, 5), (9, 2), (1, 300_000)])
 def test_a_range_of_frames_that_cannot_be_is_refused(bed: Any, first: int, last: int) -> None:
     with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):
-        next(bake.sampled(bpy.context.scene, bed, first, last, 5e-3))
+        next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))
 
 
 def test_a_take_shorter_than_a_frame_bakes_to_its_first_moment(bed: Any) -> None:
@@ -261,5 +261,5 @@ def test_a_take_shorter_than_a_frame_bakes_to_its_first_moment(bed: Any) -> None
 
 def test_each_frame_shows_the_nearest_period() -> None:
     take, _ = taken()
-    assert bake.frames_in(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]
+    assert bake.frame_periods(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]
     assert Layout(rows=12, columns=12) == take.scene.layout

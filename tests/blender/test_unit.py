@@ -9,11 +9,14 @@ import bpy
 import numpy as np
 import pytest
 from digiclay import bridge
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.device import view
 from digiclay.device.roles import BALL, ROLE
+from digiclay.exchange import formed_bed
 from digiclay.live import running, tick
 from digiclay.recorded import bake
+from digiclay.settings import properties
 
 from tests.blender.at_hand import added, beds, done, housings, looked, redone, select, undone, whole
 from tests.blender.session.live import Clock, press, started
@@ -21,11 +24,13 @@ from tests.blender.session.live import Clock, press, started
 pytestmark = pytest.mark.usefixtures("watched")
 
 
-def still(bed: Any) -> bake.Moments:
+def still(bed: Any) -> bake.BakedFrames:
     """Return a bake of two frames in which nothing moves."""
     cells = bridge.read_cells(bed.data)
     twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
-    return bake.Moments(cells["position"], **twice, pose=np.array([bridge.pose(view.fingertip_of(bed))] * 2))
+    return bake.BakedFrames(
+        cells["position"], **twice, pose=np.array([bridge.pose(view.fingertip_of(bed))] * 2)
+    )
 
 
 @pytest.mark.parametrize("baked", [False, True])
@@ -164,7 +169,7 @@ def test_a_fingertip_deleted_alone_stays_deleted_and_comes_back_with_the_next_se
     done("Delete")
     assert list(bpy.context.scene.objects) == [bed]
     notes = tick.start(bpy.context, bed)
-    assert [note.words for note in notes] == [f"{bed.name} got its fingertip back"]
+    assert [note.message for note in notes] == [f"{bed.name} got its fingertip back"]
     assert whole(bed)
     np.testing.assert_array_equal(bridge.pose(view.fingertip_of(bed)), at)
 
@@ -182,10 +187,10 @@ def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state(
     bpy.ops.object.delete()
     clock.tick()
     done("Delete")
-    assert running.all() == ()
+    assert running.list_sessions() == ()
     assert whole(copy)
     started(copy)
-    assert running.of(copy).state.row(0).min() < 39e-3
+    assert running.find(copy).state.row(0).min() < 39e-3
 
 
 def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is() -> None:
@@ -240,3 +245,21 @@ def test_undo_shows_again_what_was_hidden_along() -> None:
     (bed,) = beds()
     tip = view.fingertip_of(bed)
     assert hidden("eye", bed, tip, tip[BALL]) == [False] * 3
+
+
+def test_a_copy_of_a_bed_whose_settings_do_not_go_together_gets_a_fingertip_too() -> None:
+    bed = added()
+    bed.digiclay.layout.pitch = 1.0  # mm, less than the bore
+    select(bed)
+    bpy.ops.object.duplicate()
+    done("Duplicate")
+    assert whole(bed, bpy.context.object)
+
+
+def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn() -> None:
+    bed = added()
+    bed.digiclay.layout.pitch = 1.0  # mm, less than the bore
+    with pytest.raises(ParameterError, match="Pitch must be"):
+        properties.read_scene(bed)
+    assert bpy.ops.digiclay.find_features() == {"FINISHED"}
+    np.testing.assert_array_equal(formed_bed.read_formed(bed).height, bridge.read_cells(bed.data)["height"])

@@ -242,8 +242,8 @@ def test_a_copy_of_a_bed_keeps_its_own_colours_and_arrows(bed: Any) -> None:
     bpy.context.collection.objects.link(other)
     view.colour_by(other, "force")
     view.show_arrows(other, True)
-    assert (view.coloured_by(bed), view.arrows_shown(bed)) == ("mode", False)
-    assert (view.coloured_by(other), view.arrows_shown(other)) == ("force", True)
+    assert (view.colour_source(bed), view.shows_arrows(bed)) == ("mode", False)
+    assert (view.colour_source(other), view.shows_arrows(other)) == ("force", True)
 
 
 def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> None:

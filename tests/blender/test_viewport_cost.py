@@ -16,7 +16,7 @@ def test_every_part_of_a_tick_is_timed_and_nothing_is_left_in_the_file() -> None
     assert set(cost.parts) == set(viewport_cost.PARTS)
     assert min(cost.parts.values()) > 0.0
     assert len(bpy.data.objects) == objects
-    assert running.all() == ()
+    assert running.list_sessions() == ()
 
 
 def test_a_session_does_not_gather_memory_as_it_goes_on() -> None:

@@ -42,7 +42,7 @@ def main() -> None:
     seen["added"] = sorted(bpy.ops.mesh.digital_clay_add(rows=6, columns=6))
     bed = bpy.context.object
     seen["scene"] = part("settings.properties").scene_of(bed).cells
-    chosen = part("preferences").of(bpy.context)
+    chosen = part("preferences").get(bpy.context)
     chosen.redraw_rate = 24
     seen["redraw rate"] = bpy.context.preferences.addons[EXTENSION].preferences.redraw_rate
 

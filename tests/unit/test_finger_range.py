@@ -15,7 +15,7 @@ from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run
-from digiclay.overlay.sections import force_words
+from digiclay.overlay.sections import force_message
 
 from tests.assemble import sample, under
 
@@ -86,7 +86,7 @@ def test_only_what_is_beyond_is_named(force: float | None, indentation: float | 
 
 
 def test_the_overlay_says_when_no_finger_presses_so_hard() -> None:
-    assert [force_words(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
+    assert [force_message(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
         "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
     ]  # fmt: skip
 

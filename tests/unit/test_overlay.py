@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import COLOURS, Mode
 from digiclay.device import heat
-from digiclay.overlay.look import LETTERS, LINES, contrast, look
-from digiclay.overlay.picture import Box, Picture, axis, scaled
-from digiclay.overlay.placement import free, laid_out
-from digiclay.overlay.sections import Told
+from digiclay.overlay.look import LETTERS, LINES, choose_colours, contrast
+from digiclay.overlay.picture import Box, Picture, round_axis, scale_curve
+from digiclay.overlay.placement import find_room, lay_out
+from digiclay.overlay.sections import Readings
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,10 +21,10 @@ COLOUR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
 ROOM = (0.0, 0.0, 900.0, 700.0)
 
 
-def session(**changes: object) -> Told:
+def session(**changes: object) -> Readings:
     """Return what a session of ten seconds tells, two pins picked."""
     time = np.linspace(0.0, 10.0, 1001)
-    told = Told(
+    told = Readings(
         name="Digital Clay",
         method="virtual_master",
         paused=False,
@@ -49,7 +49,9 @@ def said(picture: Picture) -> str:
 
 @pytest.mark.parametrize("back", [DARK, LIGHT, (0.5, 0.5, 0.5)])
 def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, float]) -> None:
-    chosen = look(back, back)  # a theme with letters of the colour of the ground: the worst there is
+    chosen = choose_colours(
+        back, back
+    )  # a theme with letters of the colour of the ground: the worst there is
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
     assert min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force)) >= LINES
@@ -59,7 +61,7 @@ def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, f
 def test_every_theme_gets_letters_that_can_be_read(
     back: tuple[float, float, float], ink: tuple[float, float, float]
 ) -> None:
-    assert contrast(look(back, ink).ink, back) >= LETTERS
+    assert contrast(choose_colours(back, ink).ink, back) >= LETTERS
 
 
 def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
@@ -67,7 +69,7 @@ def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
 
 
 def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None:
-    words = said(laid_out(session(), look(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(session(), choose_colours(DARK, LIGHT), ROOM, 1.0))
     for part in (
         "Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
         "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister",
@@ -78,17 +80,17 @@ def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None
 def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
     force = np.full(1001, 0.4)
     force[900] = 180.0
-    assert "2 N" in said(laid_out(session(force=force), look(DARK, LIGHT), ROOM, 1.0)).split(" | ")
+    assert "2 N" in said(lay_out(session(force=force), choose_colours(DARK, LIGHT), ROOM, 1.0)).split(" | ")
 
 
 def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
-    words = said(laid_out(session(errors=(9e-12, 0.0)), look(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(session(errors=(9e-12, 0.0)), choose_colours(DARK, LIGHT), ROOM, 1.0))
     assert "Solver error: about 0.01 µm or less, 0.01 mN or less" in words
 
 
 def test_the_colours_of_the_force_are_explained_while_pins_wear_them() -> None:
-    plain = laid_out(session(), look(DARK, LIGHT), ROOM, 1.0)
-    hot = laid_out(session(top=0.2), look(DARK, LIGHT), ROOM, 1.0)
+    plain = lay_out(session(), choose_colours(DARK, LIGHT), ROOM, 1.0)
+    hot = lay_out(session(top=0.2), choose_colours(DARK, LIGHT), ROOM, 1.0)
     assert len(plain.boxes) == 1
     assert [box.colour for box in hot.boxes[1:]] == list(heat.COLOURS)
     assert "Force on a pin | 0 N | 0.2 N" in said(hot)
@@ -99,7 +101,7 @@ def test_it_says_what_is_not_known_yet() -> None:
     told = session(
         factor=None, errors=None, set_point=None, time=empty, force=empty, heights=np.empty((0, 2)), method=""
     )
-    words = said(laid_out(told, look(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(told, choose_colours(DARK, LIGHT), ROOM, 1.0))
     assert "Solver error: not estimated yet" in words
     assert "Method: none" in words
     assert "real time" not in words
@@ -108,7 +110,7 @@ def test_it_says_what_is_not_known_yet() -> None:
 
 def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
     told = session(heights=np.full((1001, 2), np.nan))
-    picture = laid_out(told, look(DARK, LIGHT), ROOM, 1.0)
+    picture = lay_out(told, choose_colours(DARK, LIGHT), ROOM, 1.0)
     assert "312: | 40:" in said(picture)
     for line in picture.lines:
         assert np.isfinite(line.points).all()
@@ -116,7 +118,7 @@ def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
 def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) -> None:
-    picture = laid_out(session(), look(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
+    picture = lay_out(session(), choose_colours(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
     (box,) = picture.boxes
     assert box.width == 290.0 * scale
     points = [line.points for line in picture.lines]
@@ -130,38 +132,38 @@ def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) ->
 
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
-    colours = look(DARK, LIGHT)
-    full = laid_out(session(), colours, ROOM, 1.0)
-    low = laid_out(session(), colours, (0.0, 0.0, 900.0, 240.0), 1.0)
-    middling = laid_out(session(), colours, (0.0, 0.0, 900.0, 320.0), 1.0)
+    colours = choose_colours(DARK, LIGHT)
+    full = lay_out(session(), colours, ROOM, 1.0)
+    low = lay_out(session(), colours, (0.0, 0.0, 900.0, 240.0), 1.0)
+    middling = lay_out(session(), colours, (0.0, 0.0, 900.0, 320.0), 1.0)
     assert ("Heights" in said(middling), "Pins by mode" in said(middling)) == (False, True)
     assert "Pins by mode" in said(full)
     assert "Total force" in said(low)
     assert "Pins by mode" not in said(low)
     assert low.boxes[0].height <= 240.0
-    assert laid_out(session(), colours, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
-    assert laid_out(session(), colours, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
+    assert lay_out(session(), colours, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
+    assert lay_out(session(), colours, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
 
 
 def test_panels_over_the_view_are_kept_clear_of() -> None:
-    assert free(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)]) == (
+    assert find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)]) == (
         50.0, 0.0, 700.0, 648.0,
     )  # fmt: skip
-    right = laid_out(session(), look(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
+    right = lay_out(session(), choose_colours(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
     assert right.x + right.width <= 700.0
 
 
 def test_a_curve_shows_the_window_alone_and_nothing_that_is_no_number() -> None:
     time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
     value = np.where(time == 7.0, np.nan, time)
-    points = scaled(time, value, (5.0, 10.0), (0.0, 10.0), box)
+    points = scale_curve(time, value, (5.0, 10.0), (0.0, 10.0), box)
     np.testing.assert_allclose(points[:, 0], [100.0, 140.0, 220.0, 260.0, 300.0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(points[:, 1], [70.0, 74.0, 82.0, 86.0, 90.0], rtol=0, atol=1e-9)
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
 def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> None:
-    ends = axis(low, low + span)
+    ends = round_axis(low, low + span)
     slack = 1e-9 * (abs(low) + span)
     assert ends[0] <= low + slack
     assert ends[1] >= low + span - slack
@@ -170,7 +172,7 @@ def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> 
 
 
 def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
-    picture = laid_out(session(set_point=0.25), look(DARK, LIGHT), ROOM, 1.0)
+    picture = lay_out(session(set_point=0.25), choose_colours(DARK, LIGHT), ROOM, 1.0)
     (dashed,) = (line for line in picture.lines if line.dashed)
     low, high = (line.points[0, 1] for line in picture.lines[:2])
     share = (dashed.points[0, 1] - low) / (high - low)

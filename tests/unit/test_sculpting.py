@@ -135,19 +135,19 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     hand = Hand()
     session = hand.press(started())
     kept = session.kept
-    back = sculpting.restored(hand.press(session, 6.0), kept, pose())
+    back = sculpting.restore(hand.press(session, 6.0), kept, pose())
     assert snapshot.dump(back.system, back.state) == kept
     assert len(back.gestures) == 1
 
 
 def test_undo_to_before_the_first_start_finds_a_bed_at_rest() -> None:
     session = Hand().press(started())
-    assert (heights(sculpting.restored(session, None, pose())) == 40e-3).all()
+    assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
 
 
 def test_a_bed_goes_on_from_what_was_kept() -> None:
     session = Hand().press(started())
-    other, said = sculpting.begun(8, "Copy", SCENE, pose(), session.kept)
+    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), session.snapshot)
     assert said == ""
     assert snapshot.dump(other.system, other.state) == session.kept
 
@@ -155,14 +155,14 @@ def test_a_bed_goes_on_from_what_was_kept() -> None:
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:
     session = Hand().press(started())
     other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
-    later, said = sculpting.begun(8, "Copy", other, pose(), session.kept)
+    later, said = sculpting.begin_session(8, "Copy", other, pose(), session.snapshot)
     assert np.array_equal(heights(later), heights(session))
     assert "heights were taken up" in said
 
 
 @pytest.mark.parametrize("kept", [b"nothing", b""])
 def test_a_kept_state_that_cannot_be_used_begins_at_rest_and_says_so(kept: bytes) -> None:
-    session, said = sculpting.begun(7, "Bed", SCENE, pose(), kept)
+    session, said = sculpting.begin_session(7, "Bed", SCENE, pose(), kept)
     assert (heights(session) == 40e-3).all()
     assert "begins at rest" in said
 
@@ -171,14 +171,14 @@ def test_a_gain_that_is_changed_takes_effect_and_nothing_jumps() -> None:
     hand = Hand()
     session = hand.move(started(), [(0.0, 38.0)] * 10)
     other = resolve({"layout": SIZES, "control": {"force_setpoint": 0.8}})
-    later, said = sculpting.adapted(session, other)
-    assert (said, later.kept) == ("", session.kept)
+    later, said = sculpting.change_scene(session, other)
+    assert (said, later.snapshot) == ("", session.snapshot)
     assert hand.move(later, [(0.0, 38.0)] * 30).trace.set_point[-1] == 0.8
 
 
 def test_nothing_changes_where_no_parameter_has() -> None:
     session = started()
-    assert sculpting.adapted(session, resolve({"layout": SIZES}))[0] is session
+    assert sculpting.change_scene(session, resolve({"layout": SIZES}))[0] is session
 
 
 def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
@@ -213,9 +213,9 @@ def test_a_step_too_long_to_halve_has_no_error_estimate() -> None:
         "layout": SIZES,
         "control": "absent",
     }
-    session, _ = sculpting.begun(7, "Bed", resolve(table), pose())
-    session = sculpting.advanced(session, pose(), 0.0, 9)
-    assert sculpting.advanced(session, pose(z=39.0), 2.0, 9).errors is None
+    session, _ = sculpting.begin_session(7, "Bed", resolve(table), pose())
+    session = sculpting.advance(session, pose(), 0.0, 9)
+    assert sculpting.advance(session, pose(z=39.0), 2.0, 9).errors is None
 
 
 def test_an_error_estimate_is_there_after_a_second() -> None:
@@ -230,7 +230,7 @@ def test_scenes_whose_parts_do_not_go_together_are_refused() -> None:
         "control": {"method": "shape_display", "amplitude": "1 m"},
     }
     with pytest.raises(DigiclayError, match="amplitude"):
-        sculpting.adapted(started(), resolve(table))
+        sculpting.change_scene(started(), resolve(table))
 
 
 class Bed:
@@ -244,11 +244,11 @@ def test_a_session_is_found_by_its_bed_until_it_is_dropped() -> None:
     session = started()
     running.put(session)
     try:
-        assert running.of(Bed(7)) is session
-        assert running.all() == (session,)
-        assert running.of(Bed(8)) is None
-        assert running.of(None) is None
+        assert running.find(Bed(7)) is session
+        assert running.list_sessions() == (session,)
+        assert running.find(Bed(8)) is None
+        assert running.find(None) is None
     finally:
         assert running.drop(7) is session
-    assert running.all() == ()
+    assert running.list_sessions() == ()
     assert running.drop(7) is None

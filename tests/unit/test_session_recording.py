@@ -19,7 +19,7 @@ def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
     hand = Hand()
-    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = sculpting.set_recording(hand.press(started(), -6.0), True)
     session = hand.press(hand.press(session), 6.0)
     keep = session.recording
     assert keep is not None
@@ -29,10 +29,10 @@ def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
 
 def test_undo_shortens_a_recording_to_what_led_there() -> None:
     hand = Hand()
-    session = sculpting.recording(hand.press(started(), -6.0), True)
+    session = sculpting.set_recording(hand.press(started(), -6.0), True)
     session = hand.press(session)
-    kept, moment, at = session.kept, session.moment, session.pose
-    session = sculpting.restored(hand.press(session, 6.0), kept, at, moment)
+    kept, moment, at = session.snapshot, session.tick, session.pose
+    session = sculpting.restore(hand.press(session, 6.0), kept, at, moment)
     session = hand.press(session, 3.0)
     keep = session.recording
     assert keep is not None
@@ -42,21 +42,21 @@ def test_undo_shortens_a_recording_to_what_led_there() -> None:
 
 def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
     hand = Hand()
-    session = sculpting.recording(started(), True)
+    session = sculpting.set_recording(started(), True)
     early = hand.press(session)
-    here = early.kept, early.pose, early.moment
+    here = early.snapshot, early.pose, early.tick
     late = hand.press(early, 6.0)
-    there = late.kept, late.pose, late.moment
-    session = hand.press(sculpting.restored(late, *here), -6.0)
-    assert sculpting.restored(session, *there).path is None
+    there = late.snapshot, late.pose, late.tick
+    session = hand.press(sculpting.restore(late, *here), -6.0)
+    assert sculpting.restore(session, *there).path is None
 
 
 def test_a_long_recording_copies_itself_seldom() -> None:
-    session = sculpting.recording(started(), True)
+    session = sculpting.set_recording(started(), True)
     keep, arrays = session.recording, set()
     assert keep is not None
     for moment in range(5000):
-        keep = keep.extended(np.zeros((7, 7)), moment)
+        keep = keep.extend(np.zeros((7, 7)), moment)
         arrays.add(id(keep.rows))
     assert len(keep.path) == 35001
     assert len(arrays) < 12
@@ -64,7 +64,7 @@ def test_a_long_recording_copies_itself_seldom() -> None:
 
 def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     hand = Hand()
-    session = hand.press(sculpting.recording(started(), True), -6.0)
+    session = hand.press(sculpting.set_recording(started(), True), -6.0)
     session = hand.press(sculpting.rewind(hand.press(session)), 6.0)
     keep = session.recording
     assert keep is not None
@@ -76,14 +76,14 @@ def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
     hand = Hand()
     session = hand.press(started())
     (gesture,) = session.gestures
-    session = hand.press(sculpting.recording(session, True), 6.0)
-    assert sculpting.taken_back(session, gesture).recording is None
+    session = hand.press(sculpting.set_recording(session, True), 6.0)
+    assert sculpting.restore_gesture(session, gesture).recording is None
 
 
 def test_a_recording_ends_with_a_reset_that_is_rewound() -> None:
     # Periods are counted anew from a reset on: those before it are not the recording's.
     hand = Hand()
-    session = sculpting.recording(sculpting.reset(hand.press(started())), True)
+    session = sculpting.set_recording(sculpting.reset(hand.press(started())), True)
     session = hand.press(hand.press(session), 6.0)
     for _ in range(3):
         session = sculpting.rewind(session)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.settings.shown_units import SHOWN, in_words, shown, si, unit_of
+from digiclay.settings.shown_units import SHOWN, convert_units, to_shown, to_si, unit_of
 from hypothesis import given
 from hypothesis import strategies as some
 
@@ -21,20 +21,20 @@ def test_a_number_of_six_digits_typed_in_blender_is_that_number_in_si(
 ) -> None:
     _, power = SHOWN[unit]
     meant = float(f"{digits}e{exponent}")
-    assert si(float(np.float32(shown(meant, power))), power) == meant
+    assert to_si(float(np.float32(to_shown(meant, power))), power) == meant
 
 
 @given(value=some.floats(allow_nan=False, allow_infinity=False), power=some.sampled_from([-5, -3, 0, 3, 6]))
 def test_the_number_shown_is_the_si_value_rounded_once(value: float, power: int) -> None:
     # One rounding is half a unit of the last place; what is too large or too small for a float may end.
-    there = shown(value, power)
+    there = to_shown(value, power)
     if math.isfinite(there) and abs(there) > 1e-300:
         assert math.isclose(there, value * 10.0**power, rel_tol=4e-16)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_handed_on_to_be_refused(value: float) -> None:
-    assert repr(si(value, 3)) == repr(value)
+    assert repr(to_si(value, 3)) == repr(value)
 
 
 @pytest.mark.parametrize(
@@ -61,4 +61,4 @@ def test_each_quantity_is_shown_in_the_unit_a_person_reads(unit: str, default: f
     ],
 )
 def test_a_message_is_reworded_where_it_measures_and_nowhere_else(said: str, reads: str) -> None:
-    assert in_words(said) == reads
+    assert convert_units(said) == reads

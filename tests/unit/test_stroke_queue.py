@@ -38,7 +38,7 @@ def finish(session: Running, ticks: int = 200) -> Running:
         if not session.strokes:
             break
         now += TICK
-        session = sculpting.advanced(session, session.pose, now, 100)
+        session = sculpting.advance(session, session.pose, now, 100)
     return session
 
 
@@ -55,7 +55,7 @@ def test_presses_in_quick_succession_all_form_and_count_one_gesture_each() -> No
         session = tap(session, *place)
     done = finish(session)
     assert min(depth_at(done, *place) for place in places) > FORMED
-    assert (done.drawn, len(done.gestures), done.strokes) == (3, 3, ())
+    assert (done.finished_strokes, len(done.gestures), done.strokes) == (3, 3, ())
 
 
 def test_a_quick_stroke_forms_every_column_it_passes() -> None:
@@ -78,8 +78,8 @@ def test_a_stroke_that_rests_and_goes_on_is_one_gesture() -> None:
 def test_at_most_one_stroke_ends_in_a_tick_so_that_each_gets_an_undo_step() -> None:
     session, drawn = tap(tap(started(), -15.0, 0.0), 15.0, 0.0), []
     for now in (1.0, 2.0, 3.0):
-        session = sculpting.advanced(session, session.pose, now, 1000)
-        drawn.append(session.drawn)
+        session = sculpting.advance(session, session.pose, now, 1000)
+        drawn.append(session.finished_strokes)
     # Each takes half a second: both would fit into the first tick.
     assert drawn == [1, 2, 2]
 
@@ -90,7 +90,7 @@ def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the
     (session, _), now = queue_stroke(once, 15e-3, 0.0, DEPTH), once.clock.seen or 0.0
     for _ in range(30):
         now += TICK
-        session = sculpting.advanced(session, session.pose, now, 100)
+        session = sculpting.advance(session, session.pose, now, 100)
     assert np.abs(heights(session) - before).max() > 1e-4
     back = sculpting.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)

@@ -189,10 +189,10 @@ def until(found: Callable[[], bool]) -> Iterator[float | None]:
 def settle(ticks: int = 3) -> Iterator[float | None]:
     """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
     running = part("live.running")
-    start = max((session.moment for session in running.all()), default=0)
+    start = max((session.tick for session in running.list_sessions()), default=0)
     for _ in range(100):
         yield 0.1
-        now = max((session.moment for session in running.all()), default=start + ticks)
+        now = max((session.tick for session in running.list_sessions()), default=start + ticks)
         if now >= start + ticks:
             return
     raise AssertionError("The session does not tick any more")
@@ -202,23 +202,27 @@ def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
     evaluate()
     bridge, running = part("bridge"), part("live.running")
-    found: dict[str, Any] = {"beds": len(beds()), "sessions": len(running.all()), "said": running.said()}
+    found: dict[str, Any] = {
+        "beds": len(beds()),
+        "sessions": len(running.list_sessions()),
+        "said": running.last_message(),
+    }
     for bed in beds()[:1]:
-        session = running.of(bed)
+        session = running.find(bed)
         found["kept"] = len(bed.get("digiclay_state", b""))
         if not bed.data.is_editmode:  # a mesh that is being edited cannot be read
             cells = bridge.read_cells(bed.data)
             found["heights"] = [float(cells["height"].min()), float(cells["height"].max())]
             found["modes"] = np.bincount(cells["mode"], minlength=8).tolist()
         tip = part("device.view").fingertip_of(bed)
-        if tip is not None and not (session and session.waits):
+        if tip is not None and not (session and session.blocking_reason):
             found["pose"] = bridge.pose(tip).tolist()
         if session is not None:
             found |= {
                 "period": session.state.period,
                 "factor": session.factor,
                 "paused": session.paused,
-                "waits": session.waits,
+                "waits": session.blocking_reason,
                 "gestures": len(session.gestures),
                 "force": float(session.trace.force[-1]) if len(session.trace.rows) else 0.0,
             }

@@ -48,7 +48,7 @@ def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | N
     running = blender.part("live.running")
     yield from blender.until(lambda: process.poll() is not None)
     yield 0.5
-    yield from blender.until(lambda: not any(session.strokes for session in running.all()))
+    yield from blender.until(lambda: not any(session.strokes for session in running.list_sessions()))
     yield from blender.settle(10)
 
 
@@ -56,12 +56,12 @@ def note(blender: Any, name: str) -> None:
     """Write down the heights, how many strokes the finger has finished, and how the view is turned."""
     blender.look(name)
     bed = blender.beds()[0]
-    session = blender.part("live.running").of(bed)
+    session = blender.part("live.running").find(bed)
     area, _ = blender.view()
     height = blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
     blender.SEEN[name] |= {
         "bed": (1e3 * height).round(3).tolist(),
-        "drawn": session.drawn if session else 0,
+        "drawn": session.finished_strokes if session else 0,
         "view": list(area.spaces.active.region_3d.view_rotation),
         "distance": area.spaces.active.region_3d.view_distance,
     }
@@ -152,7 +152,9 @@ def taken_back(blender: Any) -> Iterator[float | None]:
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
         start, end = ends(blender)
         process = hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "sleep 2")
-        yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in running.all()))
+        yield from blender.until(
+            lambda: any(s.strokes and s.strokes[0].reached for s in running.list_sessions())
+        )
         yield from finish(blender, hand(f"key {key} sleep 0.2"))
         hand("mouseup 1")
         yield from finish(blender, process)

@@ -59,7 +59,9 @@ def script(blender: Any) -> Iterator[float | None]:
     yield None
     yield from blender.settle()
     blender.look("in another scene")
-    blender.SEEN["in another scene"]["waits"] = blender.part("live.running").all()[0].waits
+    blender.SEEN["in another scene"]["waits"] = (
+        blender.part("live.running").list_sessions()[0].blocking_reason
+    )
     blender.window().scene = scene
     yield from blender.settle()
     blender.look("scene back")
@@ -91,7 +93,7 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.ops.ed.undo_push(message="Before")
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.key("DEL", blender.middle())
-    yield from blender.until(lambda: not blender.part("live.running").all())
+    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
     blender.look("all deleted")
     blender.key("Z", blender.middle(), ctrl=True)
     yield 1.0

@@ -48,7 +48,7 @@ def script(blender: Any) -> Iterator[float | None]:
         yield from ridge(blender)
         yield from saved(blender, earlier)
         blender.key("ESC", blender.middle())
-        yield from blender.until(lambda: not blender.part("live.running").all())
+        yield from blender.until(lambda: not blender.part("live.running").list_sessions())
         yield 1.0
         note(blender, "stopped")
         yield from blender.open_sidebar("Look at Takes")
@@ -115,7 +115,7 @@ def replayed(blender: Any) -> Iterator[float | None]:
     note(blender, "replay stopped")
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     end = blender.part("recorded.takes").read(blender.beds()[0], "1").end
-    yield from blender.until(lambda: blender.part("live.bed_state").kept(blender.beds()[0]) == end)
+    yield from blender.until(lambda: blender.part("live.bed_state").read_snapshot(blender.beds()[0]) == end)
     yield 1.0
     note(blender, "replayed")
 
@@ -172,7 +172,7 @@ def note(blender: Any, name: str) -> None:
         replay = bpy.ops.digiclay.take_replay.poll()
     height = blender.part("bridge").read_cells(bed.data)["height"]
     blender.SEEN[name] |= {
-        "takes": [list(one) for one in blender.part("recorded.takes").entries(bed)],
+        "takes": [list(one) for one in blender.part("recorded.takes").list_takes(bed)],
         "is baked": blender.part("recorded.bake").is_baked(bed),
         "replay can be pressed": replay,
         "frame": blender.window().scene.frame_current,

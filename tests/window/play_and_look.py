@@ -113,8 +113,10 @@ def windows(blender: Any) -> Iterator[float | None]:
     blender.look("started in the second")
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
-    yield from closed(blender, "its own window closed", lambda: not blender.part("live.running").all())
-    kept = blender.part("recorded.takes").entries
+    yield from closed(
+        blender, "its own window closed", lambda: not blender.part("live.running").list_sessions()
+    )
+    kept = blender.part("recorded.takes").list_takes
     blender.SEEN["kept when its window was closed"] = [entry.name for entry in kept(blender.beds()[0])]
     bpy.ops.ed.undo()
     yield 0.5
@@ -149,7 +151,9 @@ def render(blender: Any) -> Iterator[float | None]:
     blender.SEEN["waits in a render"] = waits
 
     def rendered() -> bool:
-        waits.extend({session.waits for session in blender.part("live.running").all()} - set(waits))
+        waits.extend(
+            {session.blocking_reason for session in blender.part("live.running").list_sessions()} - set(waits)
+        )
         return not bpy.app.is_job_running("RENDER")
 
     yield from blender.until(rendered)
@@ -168,7 +172,7 @@ def views(blender: Any) -> Iterator[float | None]:
     blender.shot("play_orthographic")
     blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
     yield 1.0
-    blender.part("device.display").pick(blender.beds()[0], [312])
+    blender.part("device.display").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield 1.0
     area, _ = blender.view()

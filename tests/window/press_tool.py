@@ -35,7 +35,7 @@ def come(blender: Any) -> Iterator[float | None]:
     for _ in range(480):
         yield 0.25
         now = tuple(blender.fingertip().location)
-        moment = max((session.moment for session in blender.part("live.running").all()), default=0)
+        moment = max((session.tick for session in blender.part("live.running").list_sessions()), default=0)
         if now != last:
             last, still, since = now, 0, moment
             continue
@@ -66,7 +66,7 @@ def note(blender: Any, name: str) -> None:
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
         "overlay": blender.part("overlay.views").shown(),
         "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
-        "picked": list(blender.part("device.display").picked(blender.beds()[0])),
+        "picked": list(blender.part("device.display").picked_pins(blender.beds()[0])),
     }
 
 

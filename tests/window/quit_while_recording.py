@@ -16,7 +16,7 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.look("loaded")
     yield from blender.open_sidebar()
     blender.shot("closed_file")
-    left = blender.part("live.recovery").file()
+    left = blender.part("live.recovery").file_path()
     bpy.ops.wm.recover_auto_save("EXEC_DEFAULT", filepath=str(left))
     yield 1.0
     blender.SEEN["recovered"] = takes(blender)
@@ -48,4 +48,4 @@ def recorded(blender: Any) -> Iterator[float | None]:
 
 def takes(blender: Any) -> list[str]:
     """Return the names of the bed's takes."""
-    return [entry.name for entry in blender.part("recorded.takes").entries(blender.beds()[0])]
+    return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.beds()[0])]

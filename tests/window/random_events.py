@@ -101,7 +101,7 @@ class Events:
 
     def revive(self) -> None:
         """Have a session run again: what happens to none tells nothing about it."""
-        if self.blender.part("live.running").all():
+        if self.blender.part("live.running").list_sessions():
             return
         if bpy.context.mode != "OBJECT":
             self.operator(bpy.ops.object.mode_set, mode="OBJECT")
@@ -174,7 +174,7 @@ def check(blender: Any) -> None:
         assert height.max() <= session.system.cell.actuator.stroke
         bed = blender.part("live.waiting").find_bed(session.uid, session.name)
         if bed is not None and not session.stale:
-            assert blender.part("live.bed_state").kept(bed) == session.kept
+            assert blender.part("live.bed_state").read_snapshot(bed) == session.snapshot
     for bed in blender.beds():
         if not bed.data.is_editmode:
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
@@ -201,7 +201,7 @@ def script(blender: Any) -> Iterator[float | None]:
         getattr(events, name)()
         yield 0.1
         check(blender)
-        live += bool(blender.part("live.running").all())
+        live += bool(blender.part("live.running").list_sessions())
     blender.SEEN["live"] = live
     blender.shot("session_random")
 

@@ -129,7 +129,8 @@ def _run(scene: Scene, method: str, *, quiet: bool) -> Result:
 def _speeds(scene: Scene) -> Metrics:
     """Measure the largest speeds; None where the slowest is too fast, or the bed too small."""
     found: Metrics = {}
-    for name, way in zip(SPEEDS, (Drag(), Lift()), strict=True):
+    ways: tuple[Drag | Lift, ...] = Drag(), Lift()
+    for name, way in zip(SPEEDS, ways, strict=True):
         try:
             found[name] = find_largest_speed(scene, way, Criterion())
         except ParameterError:

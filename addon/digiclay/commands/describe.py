@@ -10,7 +10,7 @@ from typing import Any
 
 from ..core.base.quantity import Parameters, quantities
 from ..core.control.master_cell import make_master_cell
-from ..core.engine.simulation import System
+from ..core.engine.system import System
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session.memory_limit import available_memory, bytes_needed, count_busy_cells

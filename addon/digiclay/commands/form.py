@@ -22,8 +22,9 @@ from ..core.scene.forming import GESTURES, shaped
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result, run, save
+from ..core.shapes.fitting import Fitted
 from ..core.shapes.height_text import packed
-from ..core.shapes.source_file import Fitted, find_shape, fitted_to, import_reader, sample_shapes
+from ..core.shapes.source_file import find_shape, fitted_to, import_reader, sample_shapes
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
 from .export import formats

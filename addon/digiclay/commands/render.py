@@ -212,10 +212,10 @@ def draw_turntable(
         Of the history; by default the instant of `looks`.
     """
     from ..device.instant import Instant
-    from ..pictures.film import turntable
+    from ..pictures.film import render_turntable
 
     instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
-    return turntable(instant, out, looks, progress=progress, stopped=stopped)
+    return render_turntable(instant, out, looks, progress=progress, stopped=stopped)
 
 
 def draw_film(
@@ -239,11 +239,12 @@ def draw_film(
     stopped : callable, optional
         Whether to stop; asked before each frame.
     """
-    from ..pictures.film import film
+    from ..pictures.film import render_film
 
-    told = {"progress": progress, "stopped": stopped}
     wanted = compute_metrics(history, scene.set_point)["set_point"]
-    return film(history, out, looks, set_point=wanted, **told, **sizes(scene))
+    return render_film(
+        history, out, looks, set_point=wanted, progress=progress, stopped=stopped, **sizes(scene)
+    )
 
 
 def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int:

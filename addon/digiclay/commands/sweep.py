@@ -110,8 +110,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
         if not arguments.quiet:
             tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-            told = [*bundles.describe(), *explain_failed_stacks(records), *notes]
-            print(f"{len(points)} points{tail}", *told, f"written to {arguments.out}", sep="\n")
+            lines = [*bundles.describe(), *explain_failed_stacks(records), *notes]
+            print(f"{len(points)} points{tail}", *lines, f"written to {arguments.out}", sep="\n")
         return 0
 
 

@@ -17,9 +17,9 @@ from ..live import bed_state, running
 from ..overlay import views
 from ..settings import properties
 from . import heat, view
-from .node_arrows import LENGTH
+from .node_tree import LENGTH
 
-__all__ = ["Display", "pick", "picked", "register", "unregister"]
+__all__ = ["Display", "pick_pins", "picked_pins", "register", "unregister"]
 
 COLOURINGS = (
     ("mode", "Mode", "Colour the pins by what they do"),
@@ -29,13 +29,13 @@ COLOURINGS = (
 NONE = -1
 
 
-def picked(bed: Any) -> tuple[int, ...]:
+def picked_pins(bed: Any) -> tuple[int, ...]:
     """Return the pins whose heights the overlay shows, in the order they were picked."""
     display = getattr(bed, "digiclay_display", None)
     return () if display is None else tuple(pin for pin in display.picked if pin != NONE)
 
 
-def pick(bed: Any, pins: Iterable[int]) -> None:
+def pick_pins(bed: Any, pins: Iterable[int]) -> None:
     """Choose the pins whose heights the overlay shows.
 
     Parameters
@@ -60,11 +60,11 @@ def pick(bed: Any, pins: Iterable[int]) -> None:
 
 def _rewrite(bed: Any) -> None:
     """Write the forces, which nothing wanted until now; those kept last where no session runs."""
-    session = running.of(bed)
+    session = running.find(bed)
     if session is not None:
         view.show_state(bed, session.system, session.state)
         return
-    kept = bed_state.kept(bed)
+    kept = bed_state.read_snapshot(bed)
     if kept is not None:
         try:
             system = assemble(properties.scene_of(bed))
@@ -76,7 +76,7 @@ def _rewrite(bed: Any) -> None:
 
 def _colour(display: Any) -> int:
     bed = display.id_data
-    return 1 if view.is_drawn(bed) and view.coloured_by(bed) == "force" else 0
+    return 1 if view.is_drawn(bed) and view.colour_source(bed) == "force" else 0
 
 
 def _set_colour(display: Any, code: int) -> None:
@@ -88,7 +88,7 @@ def _set_colour(display: Any, code: int) -> None:
 
 def _arrows(display: Any) -> bool:
     bed = display.id_data
-    return view.is_drawn(bed) and view.arrows_shown(bed)
+    return view.is_drawn(bed) and view.shows_arrows(bed)
 
 
 def _set_arrows(display: Any, on: bool) -> None:

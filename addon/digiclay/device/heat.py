@@ -42,4 +42,4 @@ def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
     top : float, optional
         From this force on all have the last level, N, above 0.
     """
-    return np.clip(np.ceil(force / top * len(COLOURS)), 0, len(COLOURS)).astype(np.int64)
+    return np.asarray(np.clip(np.ceil(force / top * len(COLOURS)), 0, len(COLOURS)), np.int64)

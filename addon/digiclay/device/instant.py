@@ -146,7 +146,7 @@ def pick_pose(poses: Floats) -> Floats:
 
 
 def read(path: Path, index: int = -1) -> Instant:
-    """Read an instant of a finished_run run.
+    """Read an instant of a finished run.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def read(path: Path, index: int = -1) -> Instant:
     """
     if path.name != "history.npz":
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
-    run = finished_run.read(path.parent, *ARRAYS)
+    run = finished_run.read_run(path.parent, *ARRAYS)
     scene = run.scene
     return Instant.of(
         run.history,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLOURS, Mode
-from .parts import ROLE
+from .roles import ROLE
 
-__all__ = ["DEFAULT", "PALETTES", "WORDS", "shown", "wear", "worn"]
+__all__ = ["DEFAULT", "PALETTES", "WORDS", "colour_of", "has_palette", "set_palette"]
 
 Colour = tuple[float, float, float]
 
@@ -37,18 +37,18 @@ WORDS = {
 }
 
 
-def worn() -> bool:
+def has_palette() -> bool:
     """Return whether the open file has materials of the modes already, which may be the user's own by now."""
     return any(_material(mode) is not None for mode in Mode)
 
 
-def shown(mode: Mode) -> Colour:
+def colour_of(mode: Mode) -> Colour:
     """Return the sRGB a mode has in the open file: that of its material, which may be the user's own."""
     material = _material(mode)
     return COLOURS[mode] if material is None else srgb(material.diffuse_color)
 
 
-def wear(name: str) -> None:
+def set_palette(name: str) -> None:
     """Give the materials of the modes in the open file the colours of a palette."""
     for mode, colour in PALETTES[name].items():
         material = _material(mode)

@@ -14,7 +14,16 @@ from . import heat, primitives
 from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 
-__all__ = ["Sources", "ellipsoid", "fingertip", "marked", "material", "skin", "sources", "stands"]
+__all__ = [
+    "Sources",
+    "ellipsoid",
+    "finger_material",
+    "is_linked",
+    "make_fingertip",
+    "make_sources",
+    "marked",
+    "material",
+]
 
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)
@@ -89,7 +98,7 @@ class Sources(NamedTuple):
     housing: Any
 
 
-def sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
+def make_sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
     """Make what a bed is drawn with; length of the pins, floor and upper edge of the housing in m.
 
     Parameters
@@ -134,7 +143,7 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
     return mesh
 
 
-def fingertip(collection: Any, bed: Any) -> Any:
+def make_fingertip(collection: Any, bed: Any) -> Any:
     """Make the fingertip: an empty to take hold of, and in it an ellipsoid to look at.
 
     The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
@@ -158,7 +167,7 @@ def fingertip(collection: Any, bed: Any) -> Any:
     made[OWNED] = ball[OWNED] = True
     ball.hide_select = True
     ball.material_slots[0].link = "OBJECT"
-    ball.material_slots[0].material = skin(clear=False)
+    ball.material_slots[0].material = finger_material(clear=False)
     return made
 
 
@@ -167,15 +176,15 @@ def ellipsoid(tip: Any) -> Any | None:
     ball = tip.get(BALL)
     if ball is None:  # older files do not have it as a property
         ball = next((child for child in tip.children if child.get(ROLE) == ELLIPSOID), None)
-    return ball if ball is not None and ball.parent == tip and stands(ball) else None
+    return ball if ball is not None and ball.parent == tip and is_linked(ball) else None
 
 
-def stands(thing: Any) -> bool:
+def is_linked(thing: Any) -> bool:
     """Return whether an object stands in any collection: what is deleted but held by a property does not."""
     return bool(thing.users_collection)
 
 
-def skin(clear: bool) -> Any:
+def finger_material(clear: bool) -> Any:
     """Return the fingertip's material: opaque, or clear so that arrows under it are seen."""
     if clear:
         return material("fingertip_clear", SKIN, roughness=0.4, alpha=CLEAR)

@@ -32,7 +32,7 @@ def rebuild(bed: Any) -> Scene:
     ParameterError
         When the settings do not go together; the bed stays as it is.
     """
-    scene = properties.described(bed)
+    scene = properties.read_scene(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
     old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _nodes(bed)]
     made = view.build(instant, bed.users_collection[0], lowest=0.0)
@@ -46,7 +46,7 @@ def rebuild(bed: Any) -> Scene:
         bed[FINGER].parent = bed
     else:
         bridge.resize_fingertip(tip, instant.finger)
-    view.guard(bed)
+    view.hold_parts(bed)
     cases = [child for child in bed.children if child.get(view.ROLE) == view.HOUSING]
     _remove([*cases, *made.children_recursive, made])
     for tree in old_trees:

@@ -13,12 +13,13 @@ from .. import bridge
 from ..compat import bpy, own_curves
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
+from ..core.scene.toml_table import resolve
 from ..settings import properties
 from . import parts, view
 from .instant import Instant, find_ellipsoid
 from .roles import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
 
-__all__ = ["Faults", "adopt", "faults", "follow", "give_fingertip", "mend"]
+__all__ = ["Faults", "find_faults", "follow_visibility", "give_fingertip", "mark_parts", "repair"]
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
@@ -45,7 +46,7 @@ class Faults(NamedTuple):
     strewn: list[Any]
 
 
-def adopt() -> frozenset[int]:
+def mark_parts() -> frozenset[int]:
     """Mark what belongs to the beds there are; return the uids of all objects that are known from now on."""
     for bed in _beds():
         tip = view.fingertip_of(bed)
@@ -53,7 +54,7 @@ def adopt() -> frozenset[int]:
             continue
         if bed.get(FINGER) != tip:  # an older file
             bed[FINGER] = tip
-            view.guard(bed)
+            view.hold_parts(bed)
         ball = parts.ellipsoid(tip)
         if ball is not None and tip.get(BALL) != ball:
             tip[BALL] = ball
@@ -64,7 +65,7 @@ def adopt() -> frozenset[int]:
     return frozenset(thing.session_uid for thing in bpy.data.objects if ROLE in thing)
 
 
-def faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
+def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
     """Return what is to be put right.
 
     Parameters
@@ -74,23 +75,25 @@ def faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Fault
     mended : frozenset of int, optional
         Uids of those of them that may be again as they had come, since undo has gone back to that.
     """
-    bare = [bed for bed in _beds() if view.fingertip_of(bed) is None and _asks(bed, FINGER, known, mended)]
+    bare = [
+        bed for bed in _beds() if view.fingertip_of(bed) is None and _lacks_part(bed, FINGER, known, mended)
+    ]
     tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
-    bare += [tip for tip in tips if parts.stands(tip) and _asks(tip, BALL, known, mended)]
+    bare += [tip for tip in tips if parts.is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
-    left = [thing for thing in mine if parts.stands(thing) and _lost(thing)]
+    left = [thing for thing in mine if parts.is_linked(thing) and _is_orphan(thing)]
     shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
     strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
     return Faults(bare, left, strewn)
 
 
-def mend(found: Faults) -> None:
+def repair(found: Faults) -> None:
     """Put right what was found."""
     for thing in found.strewn:
-        _put_away(thing)
+        _unlink(thing)
     for owner in found.bare:
         if owner.get(ROLE) == BED:
-            _made_whole(owner)
+            _complete(owner)
         else:
             _copy(owner, BALL)
     _remove(found.left)
@@ -111,14 +114,14 @@ def give_fingertip(bed: Any, scene: Scene) -> str:
         for part in filter(None, (tip, tip.get(BALL))):
             bed.users_collection[0].objects.link(part)
         return f"{bed.name} got its fingertip back"
-    made = parts.fingertip(bed.users_collection[0], bed)
+    made = parts.make_fingertip(bed.users_collection[0], bed)
     rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene))
     bridge.place_fingertip(made, rest.fingertip, rest.finger)
-    view.guard(bed)
+    view.hold_parts(bed)
     return f"{bed.name} got a new fingertip"
 
 
-def follow() -> None:
+def follow_visibility() -> None:
     """Have the parts of a bed hidden while it is, and an ellipsoid while its fingertip is."""
     for bed in _beds():
         tip, case = view.fingertip_of(bed), view.housing_of(bed)
@@ -136,11 +139,13 @@ def _beds() -> list[Any]:
     """Return the beds of this file that stand in a collection."""
     every = (thing for thing in bpy.data.objects if thing.get(ROLE) == BED)
     return [
-        thing for thing in every if not thing.library and not thing.override_library and parts.stands(thing)
+        thing
+        for thing in every
+        if not thing.library and not thing.override_library and parts.is_linked(thing)
     ]
 
 
-def _asks(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
+def _lacks_part(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Return whether an object without a part of its own is to get one.
 
     A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
@@ -154,17 +159,17 @@ def _asks(owner: Any, held: str, known: frozenset[int], mended: frozenset[int]) 
     return new or part.parent is not None or owner.session_uid in mended
 
 
-def _lost(part: Any) -> bool:
+def _is_orphan(part: Any) -> bool:
     """Return whether nothing that stands has this part any more."""
     kind, held = (FINGERTIP, BALL) if part.get(ROLE) == ELLIPSOID else (BED, FINGER)
     owner = part.parent
-    if owner is not None and owner.get(ROLE) == kind and parts.stands(owner):
+    if owner is not None and owner.get(ROLE) == kind and parts.is_linked(owner):
         return False
     # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
-    return not any(thing.get(held) == part and parts.stands(thing) for thing in bpy.data.objects)
+    return not any(thing.get(held) == part and parts.is_linked(thing) for thing in bpy.data.objects)
 
 
-def _made_whole(bed: Any) -> None:
+def _complete(bed: Any) -> None:
     """Give a bed a fingertip: a copy of the one it holds and does not own, or a new one."""
     tip = bed.get(FINGER)
     if tip is not None and tip.parent != bed:
@@ -172,13 +177,13 @@ def _made_whole(bed: Any) -> None:
         if tip.get(BALL) is not None:
             _copy(bed[FINGER], BALL)
     try:
-        scene = properties.described(bed)
+        scene = properties.read_scene(bed)
     except DigiclayError:  # settings that do not go together: a session will say so
-        scene = Scene()
+        scene = resolve({})
     give_fingertip(bed, scene)
     if view.is_drawn(bed) and view.housing_of(bed) is None:  # of an older file, where it is an object
-        view.dress(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
-    view.guard(bed)
+        view.add_modifier(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoid(scene)))
+    view.hold_parts(bed)
 
 
 def _copy(owner: Any, held: str) -> None:
@@ -213,7 +218,7 @@ def _remove(found: Iterable[Any]) -> None:
         bpy.data.batch_remove(gone)
 
 
-def _put_away(thing: Any) -> None:
+def _unlink(thing: Any) -> None:
     """Take what beds are drawn with out of all scenes."""
     for scene in bpy.data.scenes:
         for owner in (scene.collection, *scene.collection.children_recursive):
@@ -228,7 +233,7 @@ def _hide_along(owner: Any, part: Any) -> None:
     """Hide a part in every way its owner is hidden, and show it again where it was hidden along."""
     before = now = int(part.get(HIDDEN, 0))
     layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
-    both = [one for one in layers if _in(one, owner) and _in(one, part)]
+    both = [one for one in layers if _is_in_layer(one, owner) and _is_in_layer(one, part)]
     for layer in both:
         hidden, along = owner.hide_get(view_layer=layer), part.hide_get(view_layer=layer)
         if hidden and not along:
@@ -248,6 +253,6 @@ def _hide_along(owner: Any, part: Any) -> None:
         del part[HIDDEN]
 
 
-def _in(layer: Any, thing: Any) -> bool:
+def _is_in_layer(layer: Any, thing: Any) -> bool:
     """Return whether an object stands in a view layer."""
     return bool(layer.objects.get(thing.name) == thing)

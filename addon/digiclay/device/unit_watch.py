@@ -35,35 +35,35 @@ def settle() -> None:
     """Look until nothing has come since."""
     while _PENDING[0]:
         _PENDING[0] = False
-        tend()
+        repair_beds()
 
 
-def tend() -> None:
+def repair_beds() -> None:
     """Put right what is missing or left over; after undo or redo, go on past a step with such."""
     came, _CAME[0] = _CAME[0], ""
     if _KNOWN[0] is not None:
         # In a step that undo has come back to, what was put right since is as it had come.
-        found = unit.faults(_KNOWN[0], frozenset(_MENDED) if came else frozenset())
+        found = unit.find_faults(_KNOWN[0], frozenset(_MENDED) if came else frozenset())
         if any(found):
-            if came and _gone_on(came):
+            if came and _repeat_step(came):
                 return
-            _mend(found)
+            _repair(found)
             bpy.ops.ed.undo_push(message="Complete Beds")
-    _KNOWN[0] = unit.adopt()
-    unit.follow()
+    _KNOWN[0] = unit.mark_parts()
+    unit.follow_visibility()
 
 
-def _mend(found: unit.Faults) -> None:
+def _repair(found: unit.Faults) -> None:
     """Put right what was found, and what that has left over."""
     for _ in range(PASSES):
         _MENDED.update(thing.session_uid for thing in (*found.bare, *found.strewn))
-        unit.mend(found)
-        found = unit.faults(unit.adopt())
+        unit.repair(found)
+        found = unit.find_faults(unit.mark_parts())
         if not any(found):
             return
 
 
-def _gone_on(came: str) -> bool:
+def _repeat_step(came: str) -> bool:
     """Undo or redo one more step; return whether there was one."""
     operator = getattr(bpy.ops.ed, came)
     if operator.poll():
@@ -72,7 +72,7 @@ def _gone_on(came: str) -> bool:
 
 
 @bpy.app.handlers.persistent
-def changed(scene: Any, graph: Any = None) -> None:
+def note_change(scene: Any, graph: Any = None) -> None:
     """Look soon: objects, or what is shown of them, may have come or gone.
 
     Parameters
@@ -81,51 +81,51 @@ def changed(scene: Any, graph: Any = None) -> None:
     graph : bpy.types.Depsgraph, optional
     """
     if graph is None or graph.id_type_updated("SCENE"):
-        _look_soon()
+        _repair_soon()
 
 
 @bpy.app.handlers.persistent
-def undone(*_: Any) -> None:
+def note_undo(*_: Any) -> None:
     """Look soon at what undo has come to."""
     _CAME[0] = "undo"
-    _look_soon()
+    _repair_soon()
 
 
 @bpy.app.handlers.persistent
-def redone(*_: Any) -> None:
+def note_redo(*_: Any) -> None:
     """Look soon at what redo has come to."""
     _CAME[0] = "redo"
-    _look_soon()
+    _repair_soon()
 
 
 @bpy.app.handlers.persistent
-def loaded(*_: Any) -> None:
+def note_load(*_: Any) -> None:
     """Look soon at what another file has: it stays as it is."""
     _KNOWN[0], _CAME[0] = None, ""
     _MENDED.clear()
-    _look_soon()
+    _repair_soon()
 
 
-def _look_soon() -> None:
+def _repair_soon() -> None:
     """Have a look when Blender is done with what it does now."""
     _PENDING[0] = True
-    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
-        bpy.app.timers.register(_look)
+    if not bpy.app.background and not bpy.app.timers.is_registered(_repair_when_idle):
+        bpy.app.timers.register(_repair_when_idle)
 
 
-def _look() -> float | None:
+def _repair_when_idle() -> float | None:
     """Look, unless somebody is at work."""
     windows = bpy.context.window_manager.windows
     if not windows:
         return None
-    if _at_work(windows):
+    if _is_busy(windows):
         return AGAIN
     with bpy.context.temp_override(window=windows[0]):
         settle()
     return None
 
 
-def _at_work(windows: Any) -> bool:
+def _is_busy(windows: Any) -> bool:
     """Return whether an operator is under way that changes data, or something is edited, or rendered."""
     every = (operator for window in windows for operator in window.modal_operators)
     active = (window.view_layer.objects.active for window in windows)
@@ -140,10 +140,10 @@ def _pairs() -> list[tuple[Any, Any]]:
     """Return Blender's lists of handlers with what belongs into them."""
     lists = bpy.app.handlers
     return [
-        (lists.depsgraph_update_post, changed),
-        (lists.undo_post, undone),
-        (lists.redo_post, redone),
-        (lists.load_post, loaded),
+        (lists.depsgraph_update_post, note_change),
+        (lists.undo_post, note_undo),
+        (lists.redo_post, note_redo),
+        (lists.load_post, note_load),
     ]
 
 
@@ -151,7 +151,7 @@ def watch() -> None:
     """Have the handlers called from now on; what is there already is taken as it is."""
     for handler, function in _pairs():
         handler.append(function)
-    loaded()
+    note_load()
 
 
 def register() -> None:
@@ -162,8 +162,8 @@ def register() -> None:
 
 def unregister() -> None:
     """Undo `register`."""
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
+    if bpy.app.timers.is_registered(_repair_when_idle):
+        bpy.app.timers.unregister(_repair_when_idle)
     for handler, function in _pairs():
         if function in handler:
             handler.remove(function)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
@@ -22,17 +23,41 @@ from ..core.engine.state import State
 from ..core.engine.system import System
 from . import parts
 from .instant import Instant
-from .node_arrows import ARROW_LENGTH, ARROWS
-from .node_heat import COLOUR_BY_FORCE, TOP_FORCE
-from .node_tree import CASE, SOURCES, bed_nodes
-from .parts import material, stands
+from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOUR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
+from .parts import is_linked, material
 from .roles import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
 
 __all__ = [
-    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "arrow_length", "arrows_shown",
-    "bed_of", "build", "colour_by", "coloured_by", "dress", "fingertip_of", "guard", "housing_of",
-    "is_bed", "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows",
-    "show_state", "shows_force", "sources_of", "top_colour", "tree_of", "underside", "wants_force",
+    "BED",
+    "COLOURINGS",
+    "ELLIPSOID",
+    "FINGERTIP",
+    "HOUSING",
+    "ROLE",
+    "add_modifier",
+    "arrow_length",
+    "bed_of",
+    "build",
+    "colour_by",
+    "colour_source",
+    "fingertip_of",
+    "hold_parts",
+    "housing_of",
+    "is_bed",
+    "is_drawn",
+    "material",
+    "scale_arrows",
+    "scale_colours",
+    "show",
+    "show_arrows",
+    "show_state",
+    "shows_arrows",
+    "shows_force",
+    "sources_of",
+    "top_colour",
+    "tree_of",
+    "underside",
+    "wants_force",
 ]  # fmt: skip
 
 #: What the colour of a pin can tell.
@@ -62,8 +87,8 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     cells = bridge.points("Digital Clay", len(instant.height))
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = tree_of(instant, lowest)
-    parts.fingertip(collection, bed)
-    guard(bed)
+    parts.make_fingertip(collection, bed)
+    hold_parts(bed)
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
     return bed
@@ -84,16 +109,16 @@ def tree_of(instant: Instant, lowest: float | None = None) -> Any:
     # The deck is so deep that no pin is stretched much more than another: it shows on their caps.
     deck = min(lowest, rim) - 2.5 * instant.pitch
     length = float(np.median(instant.height)) - deck
-    drawn = parts.sources(instant, length, deck, rim)
+    drawn = parts.make_sources(instant, length, deck, rim)
     return bed_nodes(drawn, deck * SCALE, length * SCALE, SCALE * 1e-3)
 
 
-def dress(bed: Any, instant: Instant) -> None:
+def add_modifier(bed: Any, instant: Instant) -> None:
     """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
     _modifier(bed).node_group = tree_of(instant, 0.0)
 
 
-def guard(bed: Any) -> None:
+def hold_parts(bed: Any) -> None:
     """Have what a bed is drawn with stay out of the scene when the bed is appended to another file.
 
     Blender puts an appended collection of objects that stand in no scene into the scene, unless an
@@ -121,7 +146,7 @@ def show_state(bed: Any, system: System, state: State) -> None:
     system : System
     state : State
     """
-    shown = {"mode": state.mode()}
+    shown: dict[str, NDArray[Any]] = {"mode": state.mode()}
     if wants_force(bed):
         shown["force"] = state.row(system.rows.force)
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
@@ -145,7 +170,7 @@ def colour_by(bed: Any, what: str) -> None:
     set_node_setting(_modifier(bed), COLOUR_BY_FORCE, what == "force")
 
 
-def coloured_by(bed: Any) -> str:
+def colour_source(bed: Any) -> str:
     """Return the quantity shown by the colour of the pins: "mode" or "force"."""
     return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
 
@@ -157,7 +182,7 @@ def top_colour(bed: Any) -> float:
 
 def shows_force(bed: Any) -> bool:
     """Return whether the colours of the pins show the force on them."""
-    return is_drawn(bed) and coloured_by(bed) == "force"
+    return is_drawn(bed) and colour_source(bed) == "force"
 
 
 def scale_colours(bed: Any, top: float) -> None:
@@ -184,10 +209,10 @@ def show_arrows(bed: Any, on: bool) -> None:
     tip = fingertip_of(bed)
     ball = parts.ellipsoid(tip) if tip is not None else None
     if ball is not None:
-        ball.material_slots[0].material = parts.skin(clear=bool(on))
+        ball.material_slots[0].material = parts.finger_material(clear=bool(on))
 
 
-def arrows_shown(bed: Any) -> bool:
+def shows_arrows(bed: Any) -> bool:
     """Return whether the bed's forces are drawn as arrows."""
     return bool(node_setting(_modifier(bed), ARROWS))
 
@@ -211,7 +236,7 @@ def scale_arrows(bed: Any, length: float) -> None:
 
 def wants_force(bed: Any) -> bool:
     """Return whether anything drawn needs the force on each pin."""
-    return shows_force(bed) or (is_drawn(bed) and arrows_shown(bed))
+    return shows_force(bed) or (is_drawn(bed) and shows_arrows(bed))
 
 
 def is_drawn(bed: Any) -> bool:
@@ -224,8 +249,8 @@ def is_bed(thing: Any) -> bool:
     return thing is not None and thing.get(ROLE) == BED
 
 
-def bed_of(context: Any) -> Any | None:
-    """Return the bed the active object is or belongs to, be it fingertip, housing or a part of those."""
+def bed_of(context: Any) -> Any:
+    """Return the bed the active object is or belongs to, be it fingertip, housing or a part; None without."""
     thing = getattr(context, "object", None)
     while thing is not None and not is_bed(thing):
         thing = thing.parent
@@ -237,7 +262,7 @@ def fingertip_of(bed: Any) -> Any | None:
     tip = bed.get(FINGER)
     if tip is None:  # older files do not have it as a property
         tip = next((child for child in bed.children if child.get(ROLE) == FINGERTIP), None)
-    return tip if tip is not None and tip.parent == bed and stands(tip) else None
+    return tip if tip is not None and tip.parent == bed and is_linked(tip) else None
 
 
 def housing_of(bed: Any) -> Any | None:
@@ -258,7 +283,8 @@ def sources_of(bed: Any) -> Any | None:
 
 def underside(bed: Any) -> float:
     """Return the height of the housing's underside in the space of its bed, Blender units."""
-    return min(float(vertex.co.z) for vertex in housing_of(bed).data.vertices)
+    housing: Any = housing_of(bed)
+    return min(float(vertex.co.z) for vertex in housing.data.vertices)
 
 
 def _place_fingertip(bed: Any, instant: Instant) -> None:

@@ -10,13 +10,13 @@ from ..bridge import SCALE
 from ..compat import bpy
 from ..core.surface.body import NO_PIN, Body
 
-__all__ = ["thing"]
+__all__ = ["make_object"]
 
 #: Edges sharper than this stay sharp when a curved skin is shaded smooth, rad.
 SHARP = 0.7
 
 
-def thing(body: Body, name: str, *, smooth: bool) -> Any:
+def make_object(body: Body, name: str, *, smooth: bool) -> Any:
     """Return a new object, in no collection yet, with the body in Blender units.
 
     Parameters

@@ -13,12 +13,13 @@ from ..core.engine.system import System
 from ..core.mesh_io.export_model import Model
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
+from ..core.scene.toml_table import resolve
 from ..core.session import snapshot
 from ..core.surface.formed import Formed
 from ..live import bed_state, running
 from ..settings import properties
 
-__all__ = ["forget", "formed", "is_kept", "keep", "model"]
+__all__ = ["clear_reference", "has_reference", "model", "read_formed", "set_reference"]
 
 #: Attribute of the bed's mesh: height of each pin, m, that features are measured from.
 FORMER = "former"
@@ -26,7 +27,7 @@ FORMER = "former"
 SHOWN = 1e-7
 
 
-def formed(bed: Any) -> Formed:
+def read_formed(bed: Any) -> Formed:
     """Return the pins of a bed; before, they were as they were kept, or all at rest.
 
     Raises
@@ -40,28 +41,28 @@ def formed(bed: Any) -> Formed:
         )
     cells = bridge.read_cells(bed.data) | _of_session(bed)
     before: Any = _scene(bed).actuator.rest_height
-    if is_kept(bed):
+    if has_reference(bed):
         kept = np.empty(len(cells["height"]), np.float32)
         bed.data.attributes[FORMER].data.foreach_get("value", kept)
         before = kept.astype(np.float64)
     return Formed.of(cells["position"], cells["height"], before, cells["force"], cells["mode"])
 
 
-def is_kept(bed: Any) -> bool:
+def has_reference(bed: Any) -> bool:
     """Return whether a bed's owner has kept a surface to measure from."""
     found = bed.data.attributes.get(FORMER)
     return found is not None and found.domain == "POINT" and found.data_type == "FLOAT"
 
 
-def keep(bed: Any) -> None:
+def set_reference(bed: Any) -> None:
     """Keep the present surface as the one features are measured from."""
-    height = formed(bed).height
-    forget(bed)
+    height = read_formed(bed).height
+    clear_reference(bed)
     bed.data.attributes.new(FORMER, "FLOAT", "POINT")
     bed.data.attributes[FORMER].data.foreach_set("value", height.astype(np.float32))
 
 
-def forget(bed: Any) -> None:
+def clear_reference(bed: Any) -> None:
     """Measure features from the bed at rest again."""
     found = bed.data.attributes.get(FORMER)
     if found is not None:
@@ -102,10 +103,10 @@ def _of_session(bed: Any) -> dict[str, Any]:
 
 def _state(bed: Any) -> tuple[System, State] | None:
     """Return the state of the bed's session, running or kept, or None."""
-    session = running.of(bed)
+    session = running.find(bed)
     if session is not None:
         return session.system, session.state
-    data = bed_state.kept(bed)
+    data = bed_state.read_snapshot(bed)
     if data is None:
         return None
     try:
@@ -118,6 +119,6 @@ def _state(bed: Any) -> tuple[System, State] | None:
 def _scene(bed: Any) -> Scene:
     """Return the scene of the bed's settings, or the defaults while a setting makes no sense."""
     try:
-        return properties.described(bed)
+        return properties.read_scene(bed)
     except DigiclayError:  # a mesh needs no settings that can be simulated
-        return Scene()
+        return resolve({})

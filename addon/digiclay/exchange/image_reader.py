@@ -57,7 +57,7 @@ def _brightness(image: Any, path: Path) -> NDArray[np.float64]:
         raise _unreadable(path)
     image.pixels.foreach_get(table)
     table = table.reshape(height, width, image.channels)
-    bright: NDArray[np.float64] = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
+    bright = table[..., :3] @ BRIGHTNESS if image.channels > 2 else table[..., 0]
     return np.asarray(bright, np.float64)
 
 

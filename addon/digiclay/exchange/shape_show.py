@@ -18,17 +18,18 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import display_of, display_time, touch_height
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
+from ..core.shapes.fitting import Fitted, fitted
 from ..core.shapes.height_text import packed
 from ..core.shapes.mesh_relief import ShapeMesh, shape_mesh
 from ..core.shapes.relief import Relief
 from ..core.shapes.request import Shape
-from ..core.shapes.source_file import Fitted, fitted, fitted_to
+from ..core.shapes.source_file import fitted_to
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import bed_state, sculpting
 from ..settings import properties
 
-__all__ = ["embedded", "relief_of", "show_file", "show_relief", "surfaced"]
+__all__ = ["embed_heights", "has_surface", "read_relief", "show_file", "show_relief"]
 
 #: Kinds of objects that have a surface.
 SURFACED = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -38,12 +39,12 @@ LONGEST = 60.0
 AWAY = 50.0
 
 
-def surfaced(thing: Any) -> bool:
+def has_surface(thing: Any) -> bool:
     """Return whether an object has a surface that can be displayed."""
     return thing is not None and thing.type in SURFACED and view.ROLE not in thing
 
 
-def relief_of(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
+def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
     """Return the surface of an object, all modifiers included, in the space of a bed, m.
 
     Parameters
@@ -72,7 +73,7 @@ def relief_of(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
         evaluated.to_mesh_clear()
     way = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
     vertices = places.reshape(-1, 3) @ way[:3, :3].T + way[:3, 3]
-    return shape_mesh(thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3), "z", 1.0)
+    return shape_mesh(thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3).astype(np.int64), "z", 1.0)
 
 
 def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
@@ -101,7 +102,7 @@ def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
     return _show(bed, scene, shape, fitted_to(shape, grid(scene.layout), scene.actuator))
 
 
-def embedded(scene: Scene) -> Scene:
+def embed_heights(scene: Scene) -> Scene:
     """Return a scene that has the heights of its shape in it, so that a .blend needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene
@@ -119,11 +120,11 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     count = min(display_time(display), LONGEST) / system.period
     (state,) = deque(periods(system, [finger], begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
-    pose = _lifted(bed, scene, state.row(0))
+    pose = _lift_finger(bed, scene, state.row(0))
     # All that can fail is done: from here on the bed changes.
-    properties.adopt(bed, scene)
-    began, said = sculpting.begun(
-        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), bed_state.moment(bed)
+    properties.write_scene(bed, scene)
+    began, said = sculpting.begin_session(
+        bed.session_uid, bed.name, scene, pose, snapshot.dump(system, state), bed_state.read_tick(bed)
     )
     if said:
         raise DigiclayError(f"{bed.name}: {said}")
@@ -135,7 +136,7 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     return laid, off
 
 
-def _lifted(bed: Any, scene: Scene, heights: Any) -> Any:
+def _lift_finger(bed: Any, scene: Scene, heights: Any) -> Any:
     """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
     tip, finger = view.fingertip_of(bed), find_ellipsoid(scene)
     pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)

@@ -8,16 +8,16 @@ import numpy as np
 
 from .running import Floats, Running
 
-__all__ = ["MOMENT", "POSE", "STATE", "clear", "kept", "moment", "pose", "write"]
+__all__ = ["POSE", "STATE", "TICK", "clear", "read_pose", "read_snapshot", "read_tick", "write"]
 
 #: The state by `core.session.snapshot`, the finger's pose at it, and the tick it is of.
-STATE, POSE, MOMENT = "digiclay_state", "digiclay_pose", "digiclay_moment"
+STATE, POSE, TICK = "digiclay_state", "digiclay_pose", "digiclay_moment"
 
 
 def write(bed: Any, running: Running, before: Running | None = None) -> None:
     """Write a session into its bed's properties.
 
-    The moment changes with every tick, even while nothing moves: it tells which tick it was that
+    The tick is counted on even while nothing moves: it tells which one it was that
     undo has come back to.
 
     Parameters
@@ -27,10 +27,10 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
     before : Running, optional
         What was written last; what has not changed since is left alone.
     """
-    bed[MOMENT] = running.moment
-    if before is not None and running.kept is before.kept:
+    bed[TICK] = running.tick
+    if before is not None and running.snapshot is before.snapshot:
         return
-    for name, data in ((STATE, running.kept), (POSE, running.pose.tobytes())):
+    for name, data in ((STATE, running.snapshot), (POSE, running.pose.tobytes())):
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
         if name in bed:
@@ -40,18 +40,18 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
 
 def clear(bed: Any) -> None:
     """Forget all that is kept: the bed is at rest."""
-    for name in (STATE, POSE, MOMENT):
+    for name in (STATE, POSE, TICK):
         if name in bed:
             del bed[name]
 
 
-def kept(bed: Any) -> bytes | None:
+def read_snapshot(bed: Any) -> bytes | None:
     """Return the kept state, or None for a bed at rest; it may be anything a file can hold."""
     value = bed.get(STATE)
     return value if value is None or isinstance(value, bytes) else b""
 
 
-def pose(bed: Any) -> Floats | None:
+def read_pose(bed: Any) -> Floats | None:
     """Return the finger's pose (7,) at the kept state, or None where there is none that can be used."""
     value = bed.get(POSE)
     if not isinstance(value, bytes) or len(value) != 7 * 8:
@@ -61,7 +61,7 @@ def pose(bed: Any) -> Floats | None:
     return at if np.isfinite(at).all() and abs(turned - 1.0) < 1e-6 else None
 
 
-def moment(bed: Any) -> int:
+def read_tick(bed: Any) -> int:
     """Return the tick the kept state is of; 0 where none is kept."""
-    value = bed.get(MOMENT)
+    value = bed.get(TICK)
     return value if isinstance(value, int) and value > 0 else 0

@@ -1,4 +1,4 @@
-"""Blender's handlers for live sessions: undo, redo, save, load, and removal of the extension.
+"""Keys and handlers of live sessions: undo, redo, save, load, and removal of the extension.
 
 The handlers are there only while a session runs.
 """
@@ -10,52 +10,64 @@ from typing import Any
 
 from ..compat import bpy
 from ..overlay import views
-from . import keys, loop, recovery, running, tick
+from . import loop, recovery, running, tick
 from .running import Running
 from .stroke_queue import drop_strokes
 
-__all__ = ["STOPPED", "abandoned", "end", "end_all", "register", "unregister", "watch"]
+__all__ = ["KEYS", "STOPPED", "end", "end_all", "end_with_file", "register", "unregister", "watch"]
 
 #: Ticks until the state undo has put into a bed is taken up, that one included.
 STALE = 2
 #: What is told of a session the user has ended.
 STOPPED = "was stopped; the bed keeps its state"
+#: Blender's keymaps: their names and the editors they are of.
+VIEW, WINDOW = ("3D View", "VIEW_3D"), ("Window", "EMPTY")
+#: Keymap, operator, key, and whether Shift is held: None, whatever is held. Without a session the operators
+#: decline, and the key does what it always does.
+KEYS = (
+    (VIEW, "digiclay.session_pause", "P", False),
+    (VIEW, "digiclay.session_step", "P", True),
+    (VIEW, "digiclay.session_rewind", "BACK_SPACE", False),
+    (VIEW, "digiclay.session_reset", "BACK_SPACE", True),
+    (WINDOW, "digiclay.session_escape", "ESC", None),
+)
+_ADDED: list[tuple[Any, Any]] = []
 
 
 @bpy.app.handlers.persistent
-def take_up(*_: Any) -> None:
+def reload_states(*_: Any) -> None:
     """Have every session take up, two ticks later, what undo or redo has put into its bed."""
-    for session in running.all():
+    for session in running.list_sessions():
         running.put(replace(drop_strokes(session), stale=STALE))
 
 
 @bpy.app.handlers.persistent
-def saving(*_: Any) -> None:
+def write_recordings(*_: Any) -> None:
     """Have the file that is about to be saved hold what is being recorded."""
-    recovery.lend()
+    recovery.write_recovery()
 
 
 @bpy.app.handlers.persistent
-def saved(path: str, *_: Any) -> None:
+def finish_saving(path: str, *_: Any) -> None:
     """Go on recording after the file was saved."""
-    recovery.take_back(path)
+    recovery.clear_recovery(path)
 
 
 @bpy.app.handlers.persistent
-def not_saved(*_: Any) -> None:
+def cancel_saving(*_: Any) -> None:
     """Go on recording after the file could not be saved."""
-    recovery.take_back()
+    recovery.clear_recovery()
 
 
 @bpy.app.handlers.persistent
-def leave(*_: Any) -> None:
+def end_for_loading(*_: Any) -> None:
     """End all sessions: the file they are of is about to be closed."""
-    abandoned("ended: another file was loaded")
+    end_with_file("ended: another file was loaded")
 
 
 def watch() -> None:
     """Have the handlers called from now on."""
-    for handler, function in _pairs():
+    for handler, function in _handler_pairs():
         if function not in handler:
             handler.append(function)
 
@@ -70,13 +82,13 @@ def end(how: str, *sessions: Running) -> None:
     *sessions : Running
         All that run if none is given. The last one takes loop and handlers along.
     """
-    recovery.take_back()
-    sessions = sessions or running.all()
+    recovery.clear_recovery()
+    sessions = sessions or running.list_sessions()
     words = [f"The session of {', '.join(session.name for session in sessions)} {how}"]
     words += filter(None, [tick.stop(session.uid) for session in sessions])
     if sessions:
-        running.say(". ".join(words))
-    if not running.all():
+        running.set_message(". ".join(words))
+    if not running.list_sessions():
         loop.end()
         unwatch()
     views.follow()
@@ -84,46 +96,67 @@ def end(how: str, *sessions: Running) -> None:
 
 def end_all(how: str) -> None:
     """End all sessions; one undo step holds what they came to."""
-    some = bool(running.all())
+    some = bool(running.list_sessions())
     end(how)
     if some:
         bpy.ops.ed.undo_push(message="Stop Session")
 
 
-def abandoned(how: str) -> None:
+def end_with_file(how: str) -> None:
     """End all sessions since their file goes away; what it does not have of a recording can be recovered."""
-    unsaved = recovery.unsaved()
+    unsaved = recovery.has_unsaved()
     end(how)
     if unsaved:
-        running.say(f"{running.said()}. {recovery.leave()}")
+        running.set_message(f"{running.last_message()}. {recovery.save_copy()}")
 
 
 def unwatch() -> None:
     """Take the handlers back."""
-    for handler, function in _pairs():
+    for handler, function in _handler_pairs():
         if function in handler:
             handler.remove(function)
 
 
-def _pairs() -> list[tuple[Any, Any]]:
+def _handler_pairs() -> list[tuple[Any, Any]]:
     """Return Blender's lists of handlers with what belongs into them."""
     lists = bpy.app.handlers
     return [
-        (lists.undo_post, take_up),
-        (lists.redo_post, take_up),
-        (lists.save_pre, saving),
-        (lists.save_post, saved),
-        (lists.save_post_fail, not_saved),
-        (lists.load_pre, leave),
+        (lists.undo_post, reload_states),
+        (lists.redo_post, reload_states),
+        (lists.save_pre, write_recordings),
+        (lists.save_post, finish_saving),
+        (lists.save_post_fail, cancel_saving),
+        (lists.load_pre, end_for_loading),
     ]
 
 
+def _add_keys() -> None:
+    """Add the keys; without a window there is no keymap to add them to."""
+    configuration = bpy.context.window_manager.keyconfigs.addon
+    if configuration is None:
+        return
+    for (name, space), operator, key, shift in KEYS:
+        keymap = configuration.keymaps.new(name=name, space_type=space)
+        held = {"any": True} if shift is None else {"shift": shift}
+        item = keymap.keymap_items.new(operator, key, "PRESS", **held)
+        if operator == "digiclay.session_reset":
+            item.properties.running_only = True
+        _ADDED.append((keymap, item))
+
+
+def _remove_keys() -> None:
+    """Take the keys away."""
+    for keymap, item in _ADDED:
+        keymap.keymap_items.remove(item)
+    _ADDED.clear()
+
+
 def register() -> None:
-    """Register the keys; handlers follow with the first session."""
-    keys.register()
+    """Add the keys; handlers follow with the first session."""
+    _add_keys()
 
 
 def unregister() -> None:
     """End what runs, and take back all that was registered."""
     end_all("ended: the extension was disabled")
-    keys.unregister()
+    _remove_keys()

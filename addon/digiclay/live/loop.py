@@ -9,7 +9,17 @@ from .. import preferences
 from ..compat import bpy
 from . import running
 
-__all__ = ["aside", "begin", "drawn", "due", "end", "runs", "step_aside", "take_over", "token"]
+__all__ = [
+    "begin",
+    "end",
+    "is_aside",
+    "is_due",
+    "is_running",
+    "redraw_numbers",
+    "step_aside",
+    "take_over",
+    "token",
+]
 
 #: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
 GONE = 5.0
@@ -28,7 +38,7 @@ def token() -> int:
     return int(_LOOP["token"]) if _LOOP else 0
 
 
-def runs() -> bool:
+def is_running() -> bool:
     """Return whether there is a loop, and it ticks."""
     return bool(_LOOP) and time.perf_counter() - float(_LOOP["ticked"]) < GONE
 
@@ -38,7 +48,7 @@ def begin(context: Any) -> int:
     end()
     _COUNT[0] += 1
     timer = context.window_manager.event_timer_add(
-        1.0 / preferences.of(context).redraw_rate, window=context.window
+        1.0 / preferences.get(context).redraw_rate, window=context.window
     )
     _LOOP.update(timer=timer, token=_COUNT[0], ticked=time.perf_counter(), numbers=0.0)
     bpy.types.STATUSBAR_HT_header.prepend(draw)
@@ -56,7 +66,7 @@ def take_over() -> None:
     _LOOP.pop("aside", None)
 
 
-def aside() -> bool:
+def is_aside() -> bool:
     """Return whether there is a loop that no operator drives for the moment."""
     return "aside" in _LOOP
 
@@ -71,16 +81,16 @@ def end() -> None:
     redraw_status()
 
 
-def due(context: Any, now: float) -> bool:
+def is_due(context: Any, now: float) -> bool:
     """Return whether to tick now: no more often than preferred, though other timers may run as well."""
-    wanted = (1.0 - EARLY) / preferences.of(context).redraw_rate
+    wanted = (1.0 - EARLY) / preferences.get(context).redraw_rate
     if now - float(_LOOP["ticked"]) < wanted:
         return False
     _LOOP["ticked"] = now
     return True
 
 
-def drawn(context: Any, now: float) -> None:
+def redraw_numbers(context: Any, now: float) -> None:
     """Have the sidebars drawn anew, now and then: numbers that change too quickly cannot be read."""
     if now - float(_LOOP["numbers"]) < NUMBERS:
         return
@@ -101,7 +111,7 @@ def redraw_status() -> None:
 
 def draw(header: Any, context: Any) -> None:
     """Draw the keys of a running session in the status bar."""
-    sessions = running.all()
+    sessions = running.list_sessions()
     row = header.layout.row()
     paused = all(session.paused for session in sessions)
     row.label(text="Digital Clay paused" if paused else "Digital Clay", icon="PAUSE" if paused else "PLAY")

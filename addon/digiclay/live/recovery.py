@@ -16,22 +16,22 @@ from ..recorded import takes
 from . import running
 from .waiting import find_bed
 
-__all__ = ["file", "leave", "lend", "take_back", "unsaved"]
+__all__ = ["clear_recovery", "file_path", "has_unsaved", "save_copy", "write_recovery"]
 
 #: Takes that stand in beds for the moment of saving: uid and name of the bed, number of the take.
-_LENT: list[tuple[int, str, str]] = []
+_WRITTEN: list[tuple[int, str, str]] = []
 
 
-def lend() -> None:
+def write_recovery() -> None:
     """Put what is being recorded into the beds, as takes: the file is about to be saved."""
-    take_back()
-    for session in running.all():
-        bed, take = find_bed(session.uid, session.name), takes.recorded(session)
+    clear_recovery()
+    for session in running.list_sessions():
+        bed, take = find_bed(session.uid, session.name), takes.read_recording(session)
         if bed is not None and take is not None:
-            _LENT.append((session.uid, session.name, takes.keep(bed, take).number))
+            _WRITTEN.append((session.uid, session.name, takes.add(bed, take).number))
 
 
-def take_back(path: str = "") -> None:
+def clear_recovery(path: str = "") -> None:
     """Take it out of the beds again, since the recordings go on.
 
     Parameters
@@ -39,33 +39,35 @@ def take_back(path: str = "") -> None:
     path : str
         The file that has been saved; empty when that has failed, or is not known.
     """
-    while _LENT:
-        uid, name, number = _LENT.pop()
+    while _WRITTEN:
+        uid, name, number = _WRITTEN.pop()
         bed = find_bed(uid, name)
-        if bed is None or number not in [entry.number for entry in takes.entries(bed)]:
+        if bed is None or number not in [entry.number for entry in takes.list_takes(bed)]:
             continue  # undone in the meantime
         takes.remove(bed, number)
-        session = running.of(bed)
+        session = running.find(bed)
         # A copy saved elsewhere is not the file Blender asks about before it closes it.
-        if path and path == bpy.data.filepath:
+        if session and session.recording and path and path == bpy.data.filepath:
             keep = replace(session.recording, saved=session.recording.count)
             running.put(replace(session, recording=keep))
 
 
-def unsaved() -> bool:
+def has_unsaved() -> bool:
     """Return whether something was recorded that the file does not have."""
-    return any(session.recording is not None and session.recording.unsaved for session in running.all())
+    return any(
+        session.recording is not None and session.recording.unsaved for session in running.list_sessions()
+    )
 
 
-def file() -> Path:
+def file_path() -> Path:
     """Return the file that is left; the next one replaces it."""
     return Path(bpy.app.tempdir).parent / "digiclay_recording.blend"
 
 
-def leave() -> str:
+def save_copy() -> str:
     """Leave the open file, as it is now, for recovery; return words about it."""
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(file()), copy=True, check_existing=False)
+        bpy.ops.wm.save_as_mainfile(filepath=str(file_path()), copy=True, check_existing=False)
     except RuntimeError as error:
         return f"It could not be left for recovery: {str(error).removeprefix('Error: ').strip()}"
-    return f"It can be had back with File > Recover > Auto Save: {file().name}"
+    return f"It can be had back with File > Recover > Auto Save: {file_path().name}"

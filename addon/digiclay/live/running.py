@@ -16,7 +16,17 @@ from ..core.session.live_periods import Clock
 from ..core.session.recent_trace import Trace
 from .stroke import Stroke
 
-__all__ = ["Gesture", "Recording", "Running", "all", "drop", "of", "put", "said", "say"]
+__all__ = [
+    "Gesture",
+    "Recording",
+    "Running",
+    "drop",
+    "find",
+    "last_message",
+    "list_sessions",
+    "put",
+    "set_message",
+]
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +36,7 @@ class Gesture:
     """Start of a gesture: period, snapshot (`core.session.snapshot`), and pose of the fingertip (7,)."""
 
     period: int
-    kept: bytes
+    snapshot: bytes
     pose: Floats
 
 
@@ -55,11 +65,11 @@ class Recording:
     saved: int = 0
 
     @classmethod
-    def begun(cls, kept: bytes, period: int, pose: Floats, moment: int) -> Recording:
+    def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int) -> Recording:
         """Return a recording that has nothing but its start."""
         rows = np.empty((256, pose.size + 1))
-        rows[0] = *pose.ravel(), moment
-        return cls(kept, period, rows, 1)
+        rows[0] = *pose.ravel(), tick
+        return cls(snapshot, period, rows, 1)
 
     @property
     def path(self) -> Floats:
@@ -71,7 +81,7 @@ class Recording:
         """Whether something was recorded that the file does not have."""
         return self.count > max(self.saved, 1)
 
-    def extended(self, path: Floats, moment: int) -> Recording:
+    def extend(self, path: Floats, tick: int) -> Recording:
         """Return the recording with the poses of some more periods, shape (k, f, 7)."""
         end = self.count + len(path)
         rows = self.rows
@@ -79,15 +89,15 @@ class Recording:
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
         rows[self.count : end, :-1] = path.reshape(len(path), -1)
-        rows[self.count : end, -1] = moment
+        rows[self.count : end, -1] = tick
         return replace(self, rows=rows, count=end)
 
-    def at(self, moment: int, period: int) -> Recording | None:
+    def cut_at_tick(self, tick: int, period: int) -> Recording | None:
         """Return the recording as it was at a moment undo came back to; None when it did not lead there."""
-        count = int(np.searchsorted(self.rows[: self.count, -1], moment, side="right"))
+        count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 
-    def until(self, period: int) -> Recording | None:
+    def cut_at_period(self, period: int) -> Recording | None:
         """Return the recording up to a period of its own; None when that is before its start."""
         count = period - self.first + 1
         return self._first(count) if 0 < count <= self.count else None
@@ -111,15 +121,15 @@ class Running:
     system : System
     state : State
         Used up by the next tick: read what you need, keep nothing of it.
-    kept : bytes
+    snapshot : bytes
         The state by `core.session.snapshot`; also in the bed's property.
     pose : ndarray (7,)
         The fingertip's, up to which the session has followed it.
-    moment : int
+    tick : int
         Counts ticks and never goes back, not even by undo.
     paused : bool
         By the user.
-    waits : str
+    blocking_reason : str
         Why the session stands still although it is not paused; empty: it does not.
     stale : int
         Ticks until the state undo or redo has put into the bed is taken up; 0: there is none.
@@ -133,9 +143,9 @@ class Running:
         Latest estimate.
     gestures : tuple of Gesture
         The last ones, oldest first.
-    coming : Gesture or None
+    next_gesture : Gesture or None
         The gesture that begins if the finger touches.
-    rested : float
+    rest_time : float
         How long the finger has not moved, s of simulated time.
     recording : Recording or None
     strokes : tuple of Stroke
@@ -143,7 +153,7 @@ class Running:
         these, wherever the fingertip is.
     stroke_start : Gesture or None
         Where the first of them began.
-    drawn : int
+    finished_strokes : int
         How many strokes the finger has finished.
     """
 
@@ -152,24 +162,24 @@ class Running:
     scene: Scene
     system: System
     state: State
-    kept: bytes
+    snapshot: bytes
     pose: Floats
-    moment: int
+    tick: int
     clock: Clock
     trace: Trace
     monitor: ErrorMonitor | None
     errors: Errors | None = None
     paused: bool = False
-    waits: str = ""
+    blocking_reason: str = ""
     stale: int = 0
     steps: int = 0
     gestures: tuple[Gesture, ...] = ()
-    coming: Gesture | None = None
-    rested: float = 0.0
+    next_gesture: Gesture | None = None
+    rest_time: float = 0.0
     recording: Recording | None = None
     strokes: tuple[Stroke, ...] = ()
     stroke_start: Gesture | None = None
-    drawn: int = 0
+    finished_strokes: int = 0
 
     @property
     def factor(self) -> float:
@@ -186,12 +196,12 @@ class Running:
 _SESSIONS: dict[int, Running] = {}
 
 
-def of(bed: Any) -> Running | None:
+def find(bed: Any) -> Running | None:
     """Return the session of a bed's object, or None."""
     return _SESSIONS.get(bed.session_uid) if bed is not None else None
 
 
-def all() -> tuple[Running, ...]:
+def list_sessions() -> tuple[Running, ...]:
     """Return all sessions, in the order they were started."""
     return tuple(_SESSIONS.values())
 
@@ -210,11 +220,11 @@ def drop(uid: int) -> Running | None:
 _SAID = [""]
 
 
-def say(words: str) -> None:
+def set_message(words: str) -> None:
     """Keep the last message, for the Session panel."""
     _SAID[0] = words
 
 
-def said() -> str:
+def last_message() -> str:
     """Return the last message."""
     return _SAID[0]

@@ -32,15 +32,15 @@ from .running import Gesture, Recording, Running
 from .stroke_queue import drop_strokes, take_path
 
 __all__ = [
-    "adapted",
-    "advanced",
-    "begun",
-    "recording",
+    "advance",
+    "begin_session",
+    "change_scene",
     "request_step",
     "reset",
-    "restored",
+    "restore",
+    "restore_gesture",
     "rewind",
-    "taken_back",
+    "set_recording",
     "withdraw_stroke",
 ]  # fmt: skip
 
@@ -57,8 +57,8 @@ REST = 0.5
 STILL = 2e-6
 
 
-def begun(
-    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, moment: int = 0
+def begin_session(
+    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0
 ) -> tuple[Running, str]:
     """Begin a session, from a kept state if there is one.
 
@@ -74,17 +74,17 @@ def begun(
         When the scene's parts do not go together.
     """
     system = assemble(scene)
-    state, said = _taken_up(system, kept)
+    state, said = _load_state(system, kept)
     pose = clamp_pose(pose, system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
-        uid, name, scene, system, state, now, pose, moment + 1, Clock(),
-        trace_begun(system.period), accuracy.start(scene), coming=Gesture(state.period, now, pose),
+        uid, name, scene, system, state, now, pose, tick + 1, Clock(),
+        trace_begun(system.period), accuracy.start(scene), next_gesture=Gesture(state.period, now, pose),
     )  # fmt: skip
     return running, said
 
 
-def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
+def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
     """Return the state to go on from, and what could not be taken up."""
     if kept is None:
         return begin(system), ""
@@ -98,7 +98,7 @@ def _taken_up(system: System, kept: bytes | None) -> tuple[State, str]:
     return begin(system), refused
 
 
-def advanced(
+def advance(
     running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None
 ) -> Running:
     """Let a session follow the finger up to now; nothing is simulated while it is paused.
@@ -119,7 +119,7 @@ def advanced(
     Raises
     ------
     DivergenceError
-        The session is used up then: `restored` takes it up again.
+        The session is used up then: `restore` takes it up again.
     """
     if pins is not None:
         running = replace(running, trace=picked(running.trace, pins, running.system.grid.count))
@@ -127,8 +127,8 @@ def advanced(
         count, clock = running.steps, running.clock.stopped()
     else:
         count, clock = periods_due(running.clock, now, running.system.period, most)
-    running = replace(running, clock=clock, steps=0, moment=running.moment + 1)
-    return followed(running, pose, count) if count else running
+    running = replace(running, clock=clock, steps=0, tick=running.tick + 1)
+    return follow_finger(running, pose, count) if count else running
 
 
 def request_step(running: Running) -> Running:
@@ -136,14 +136,14 @@ def request_step(running: Running) -> Running:
     return replace(running, paused=True, steps=running.steps + 1)
 
 
-def followed(running: Running, pose: Floats, count: int) -> Running:
-    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advanced`."""
+def follow_finger(running: Running, pose: Floats, count: int) -> Running:
+    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advance`."""
     system, state, monitor = running.system, running.state, running.monitor
     if running.strokes:
         running, path = take_path(running, count)
     else:
         pose = clamp_pose(pose, system.cell.actuator.stroke)
-        running = _about_to_touch(running, pose, count)
+        running = _mark_gesture_start(running, pose, count)
         path = interpolate_path(running.pose[None], pose[None], count)[:, 0]
     rows, errors, paths = [], running.errors, wrap_one(path)
     started = time.perf_counter()
@@ -158,33 +158,34 @@ def followed(running: Running, pose: Floats, count: int) -> Running:
                 rows.append(row(system, state, running.scene.set_point, running.trace.pins))
     clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
-        running, state=state, kept=snapshot.dump(system, state), pose=path[-1], clock=clock, monitor=monitor,
+        running, state=state, snapshot=snapshot.dump(system, state), pose=path[-1],
+        clock=clock, monitor=monitor,
         errors=errors, trace=extended(running.trace, rows),
-        recording=running.recording and running.recording.extended(paths[1:], running.moment),
+        recording=running.recording and running.recording.extend(paths[1:], running.tick),
     )  # fmt: skip
-    return _touched(gone)
+    return _count_gesture(gone)
 
 
-def _about_to_touch(running: Running, pose: Floats, count: int) -> Running:
+def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     """Keep where a gesture begins: at a finger that moves after a rest, or that does not touch."""
     moved = float(np.abs(pose - running.pose).max()) > STILL
-    rested = 0.0 if moved else running.rested + count * running.system.period
-    coming = running.coming
-    free = coming is None and felt(running.system, running.state) == 0.0
-    if free or (moved and running.rested >= REST):
-        coming = Gesture(running.state.period, running.kept, running.pose)
-    return replace(running, rested=rested, coming=coming)
+    rest_time = 0.0 if moved else running.rest_time + count * running.system.period
+    next_gesture = running.next_gesture
+    free = next_gesture is None and felt(running.system, running.state) == 0.0
+    if free or (moved and running.rest_time >= REST):
+        next_gesture = Gesture(running.state.period, running.snapshot, running.pose)
+    return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
-def _touched(running: Running) -> Running:
+def _count_gesture(running: Running) -> Running:
     """Count a gesture that has touched among the last ones."""
-    if running.coming is None or felt(running.system, running.state) == 0.0:
+    if running.next_gesture is None or felt(running.system, running.state) == 0.0:
         return running
-    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.kept)))
-    return replace(running, gestures=(*running.gestures, running.coming)[-room:], coming=None)
+    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
+    return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)
 
 
-def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | None = None) -> Running:
+def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None = None) -> Running:
     """Return the session with another state of its bed: after undo or redo, or when it diverged.
 
     Parameters
@@ -194,21 +195,21 @@ def restored(running: Running, kept: bytes | None, pose: Floats, moment: int | N
         None: the bed was at rest.
     pose : ndarray (7,)
         The finger's at that state.
-    moment : int, optional
+    tick : int, optional
         When it was that state; a recording goes back to it, or ends if it did not lead there.
     """
-    state, _ = _taken_up(running.system, kept)
+    state, _ = _load_state(running.system, kept)
     now = snapshot.dump(running.system, state)
     keep = running.recording
     if keep is not None:
-        keep = keep.at(running.moment if moment is None else moment, state.period)
+        keep = keep.cut_at_tick(running.tick if tick is None else tick, state.period)
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
     free = felt(running.system, state) == 0.0
     return replace(
-        running, state=state, kept=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
+        running, state=state, snapshot=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
         clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
-        recording=keep, gestures=gestures, moment=running.moment + 1, rested=0.0,
-        coming=Gesture(state.period, now, pose) if free else None,
+        recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
+        next_gesture=Gesture(state.period, now, pose) if free else None,
     )  # fmt: skip
 
 
@@ -219,7 +220,7 @@ def rewind(running: Running) -> Running:
     if not running.gestures:
         return running
     *earlier, last = running.gestures
-    return taken_back(replace(running, gestures=tuple(earlier)), last)
+    return restore_gesture(replace(running, gestures=tuple(earlier)), last)
 
 
 def withdraw_stroke(running: Running) -> Running:
@@ -228,53 +229,59 @@ def withdraw_stroke(running: Running) -> Running:
     if last.height is None:
         return replace(running, strokes=tuple(earlier))
     assert running.stroke_start is not None
-    return drop_strokes(taken_back(running, running.stroke_start))
+    return drop_strokes(restore_gesture(running, running.stroke_start))
 
 
-def taken_back(running: Running, gesture: Gesture) -> Running:
+def restore_gesture(running: Running, gesture: Gesture) -> Running:
     """Bring state and finger back to where a gesture began; a recording that began before goes back too.
 
     A finger that touched there already has to move on before it makes another gesture: else it counted at
     once, and could be taken back for ever without a way to those before it.
     """
+    back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
     keep = running.recording
-    back = restored(replace(running, recording=None), gesture.kept, gesture.pose)
     # The gesture a reset leaves behind has periods of another count.
-    counts = keep is not None and gesture.period == back.state.period
-    coming = gesture if back.coming is not None else None
-    return replace(back, coming=coming, rested=REST, recording=keep.until(gesture.period) if counts else None)
+    if keep is not None:
+        keep = keep.cut_at_period(gesture.period) if gesture.period == back.state.period else None
+    next_gesture = gesture if back.next_gesture is not None else None
+    return replace(back, next_gesture=next_gesture, rest_time=REST, recording=keep)
 
 
 def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
     # Before period 0, at which the first gesture after the reset may begin.
-    before = Gesture(-1, running.kept, running.pose)
+    before = Gesture(-1, running.snapshot, running.pose)
     pose = running.pose.copy()
     pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restored(replace(drop_strokes(running), gestures=()), None, pose, moment=-1)
+    back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
-def adapted(running: Running, scene: Scene) -> tuple[Running, str]:
-    """Let the session go on with other parameters; see `begun` for what is returned and raised."""
+def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
+    """Let the session go on with other parameters; see `begin_session` for what is returned and raised."""
     if scene == running.scene:
         return running, ""
-    other, said = begun(running.uid, running.name, scene, running.pose, running.kept, running.moment)
-    kept_on = {"drawn": running.drawn}
-    if not said:
-        kept_on |= {
-            "recording": None,
-            "gestures": running.gestures,
-            "strokes": running.strokes,
-            "stroke_start": running.stroke_start,
-        }
+    other, said = begin_session(
+        running.uid, running.name, scene, running.pose, running.snapshot, running.tick
+    )
     trace = picked(other.trace, running.trace.pins, other.system.grid.count)
-    return replace(other, paused=running.paused, waits=running.waits, trace=trace, **kept_on), said
+    other = replace(
+        other,
+        paused=running.paused,
+        blocking_reason=running.blocking_reason,
+        trace=trace,
+        finished_strokes=running.finished_strokes,
+    )
+    if not said:
+        other = replace(
+            other, gestures=running.gestures, strokes=running.strokes, stroke_start=running.stroke_start
+        )
+    return other, said
 
 
-def recording(running: Running, on: bool) -> Running:
+def set_recording(running: Running, on: bool) -> Running:
     """Begin to record the finger's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
-    begin_at = Recording.begun(running.kept, running.state.period, running.pose, running.moment)
+    begin_at = Recording.begin(running.snapshot, running.state.period, running.pose, running.tick)
     return replace(running, recording=begin_at)

@@ -124,7 +124,7 @@ class Stroke:
 
 def start(number: int, x: float, y: float, depth: float) -> Stroke:
     """Return the stroke of a mouse that goes down at a place, m."""
-    return Stroke(number, (Sample(0.0, x, y, _pressable(depth)),))
+    return Stroke(number, (Sample(0.0, x, y, _limit_depth(depth)),))
 
 
 def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Stroke:
@@ -140,7 +140,7 @@ def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Strok
     """
     if not stroke.held:
         return stroke
-    samples = (*stroke.samples, Sample(time, x, y, _pressable(depth)))
+    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth)))
     together = time - stroke.heard < BURST and stroke.burst > 0
     first = stroke.burst if together else len(samples) - 1
     start = max(samples[first - 1].time, time - DRAWING)
@@ -158,7 +158,7 @@ def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
     return draw(stroke, time, last.x, last.y, last.depth + by)
 
 
-def _pressable(depth: float) -> float:
+def _limit_depth(depth: float) -> float:
     return min(max(depth, SHALLOWEST), DEEPEST)
 
 
@@ -214,11 +214,12 @@ def _step(
 ) -> tuple[Stroke, Place]:
     """Return the stroke after a control period, and where the finger is then."""
     assert stroke.height is not None
+    height = stroke.height
     x, y, z = pose[:3].tolist()
     # It waits for moves that may have been made, or it would stop short and then make haste.
     if not stroke.held or stroke.clock < stroke.known:
         stroke = replace(stroke, clock=max(stroke.clock + period, now - stroke.began - LATE))
-    safe = float(stroke.height.max()) + CLEARANCE
+    safe = float(height.max()) + CLEARANCE
     if stroke.phase == ABOVE:
         return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
     if stroke.phase == LEAVING:
@@ -226,7 +227,7 @@ def _step(
         return (replace(stroke, phase=DONE) if z >= safe - NEAR else stroke), (x, y, z)
     if stroke.phase == DRAGGING:
         stroke, x, y = _drag(stroke, x, y, DRAG * period)
-    surface = ground(grid, stroke.height, x, y, finger.width / 2)
+    surface = ground(grid, height, x, y, finger.width / 2)
     # Pins bottom out on the bed's floor.
     lowest = max(0.0, surface - stroke.samples[stroke.reached].depth)
     z = _sink(z, surface, lowest, period)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 def queue_stroke(running: Running, x: float, y: float, depth: float) -> tuple[Running, int]:
     """Queue the stroke of a mouse that goes down at a place, m; return its number as well."""
-    number = 1 + (running.strokes[-1].number if running.strokes else running.drawn)
+    number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
     return replace(running, strokes=(*running.strokes, start(number, x, y, depth))), number
 
 
@@ -58,8 +58,8 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
     """
     system, first = running.system, running.strokes[0]
     if first.height is None:
-        begun = Gesture(running.state.period, running.kept, running.pose)
-        running = replace(running, coming=begun, stroke_start=begun)
+        begun = Gesture(running.state.period, running.snapshot, running.pose)
+        running = replace(running, next_gesture=begun, stroke_start=begun)
     finger = find_ellipsoid(running.scene)
     height = running.state.row(0)
     now = running.clock.seen or first.began
@@ -67,5 +67,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
-        running = replace(running, strokes=left[1:], stroke_start=None, drawn=running.drawn + 1)
+        running = replace(
+            running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1
+        )
     return running, path

@@ -22,7 +22,7 @@ from .running import Floats, Running
 from .stroke_queue import drop_strokes
 from .waiting import blocking_reason, find_bed
 
-__all__ = ["Note", "place", "show", "start", "stop", "tick", "withdraw_strokes"]
+__all__ = ["Note", "place_finger", "show", "start", "stop", "tick", "withdraw_strokes"]
 
 #: Ticks from one look at the bed's settings to the next.
 LOOK = 8
@@ -32,7 +32,7 @@ class Note(NamedTuple):
     """Message to the user: level of Blender's operator reports, and text."""
 
     level: str
-    words: str
+    message: str
 
 
 def start(context: Any, bed: Any) -> list[Note]:
@@ -56,9 +56,9 @@ def start(context: Any, bed: Any) -> list[Note]:
     why = blocking_reason(context, bed, scene.cells)
     if why:
         raise DigiclayError(f"The session of {bed.name} cannot start: {why}.")
-    begun, said = sculpting.begun(
+    begun, said = sculpting.begin_session(
         bed.session_uid, bed.name, scene, bridge.pose(view.fingertip_of(bed)),
-        bed_state.kept(bed), bed_state.moment(bed),
+        bed_state.read_snapshot(bed), bed_state.read_tick(bed),
     )  # fmt: skip
     show(bed, begun)
     return [*notes, Note("WARNING", f"{bed.name}: {said}")] if said else notes
@@ -68,7 +68,7 @@ def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and what was recorded as a take; return words about that."""
     ended = running.drop(uid)
     bed = find_bed(uid, ended.name) if ended else None
-    return takes.keep_recorded(bed, ended) if ended is not None and bed is not None else ""
+    return takes.keep_recording(bed, ended) if ended is not None and bed is not None else ""
 
 
 def show(bed: Any, session: Running) -> None:
@@ -78,7 +78,7 @@ def show(bed: Any, session: Running) -> None:
     view.show_state(bed, session.system, session.state)
 
 
-def place(context: Any, bed: Any, session: Running) -> None:
+def place_finger(context: Any, bed: Any, session: Running) -> None:
     """Put the fingertip where a session has it; one that is animated or constrained goes its own way."""
     tip = view.fingertip_of(bed)
     if tip is not None:
@@ -88,31 +88,31 @@ def place(context: Any, bed: Any, session: Running) -> None:
 
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
     """Take back the last unfinished stroke of one session, or of each; return whether there was one."""
-    busy = [session for session in running.all() if session.strokes and uid in (None, session.uid)]
+    busy = [session for session in running.list_sessions() if session.strokes and uid in (None, session.uid)]
     for session in busy:
         bed = find_bed(session.uid, session.name)
         if bed is not None:
             back = sculpting.withdraw_stroke(session)
             show(bed, back)
-            place(context, bed, back)
+            place_finger(context, bed, back)
     return bool(busy)
 
 
 def tick(context: Any, now: float) -> list[Note]:
     """Advance every session to the current time of a monotonic clock, s; return the messages."""
     notes: list[Note] = []
-    most = preferences.of(context).most_periods
-    for session in running.all():
+    most = preferences.get(context).most_periods
+    for session in running.list_sessions():
         bed = find_bed(session.uid, session.name)
         if bed is None:
             running.drop(session.uid)
             notes.append(Note("WARNING", f"The session of {session.name} ended: its bed was deleted"))
             continue
-        notes += _ticked(context, bed, session, now, most)
+        notes += _advance_session(context, bed, session, now, most)
     return notes
 
 
-def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> list[Note]:
+def _advance_session(context: Any, bed: Any, session: Running, now: float, most: int) -> list[Note]:
     """Advance one session."""
     if session.stale > 1:
         # What undo has put back has no place in the world until Blender has evaluated it, which it
@@ -120,61 +120,61 @@ def _ticked(context: Any, bed: Any, session: Running, now: float, most: int) -> 
         running.put(replace(session, stale=session.stale - 1))
         return []
     before = session
-    why, session, said = _looked(context, bed, session)
+    why, session, said = _read_changes(context, bed, session)
     notes = [Note("WARNING", f"{bed.name}: {said}")] if said else []
     if why:
-        waiting = replace(session, waits=why, clock=session.clock.stopped(), name=bed.name)
-        running.put(replace(waiting, moment=waiting.moment + 1))
-        bed_state.write(bed, running.of(bed) or waiting, session)
-        told = why == before.waits
+        waiting = replace(session, blocking_reason=why, clock=session.clock.stopped(), name=bed.name)
+        running.put(replace(waiting, tick=waiting.tick + 1))
+        bed_state.write(bed, running.find(bed) or waiting, session)
+        told = why == before.blocking_reason
         return notes if told else [*notes, Note("WARNING", f"The session of {bed.name} waits: {why}")]
-    if before.waits:
+    if before.blocking_reason:
         notes.append(Note("INFO", f"The session of {bed.name} goes on"))
-    session = replace(session, waits="", name=bed.name)
-    seen = _seen(session)
+    session = replace(session, blocking_reason="", name=bed.name)
+    seen = _visible_rows(session)
     try:
-        later = sculpting.advanced(
-            session, bridge.pose(view.fingertip_of(bed)), now, most, display.picked(bed)
+        later = sculpting.advance(
+            session, bridge.pose(view.fingertip_of(bed)), now, most, display.picked_pins(bed)
         )
     except DivergenceError as error:
-        back = sculpting.restored(session, session.kept, session.pose)
+        back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
         notes.append(Note("ERROR", f"The session of {bed.name} is paused: {error}"))
     running.put(later)
     if session.strokes:
-        place(context, bed, later)
+        place_finger(context, bed, later)
     bed_state.write(bed, later, before)
     # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
-    if before.stale or said or not np.array_equal(seen, _seen(later)):
+    if before.stale or said or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)
     return notes
 
 
-def _seen(session: Running) -> Floats:
+def _visible_rows(session: Running) -> Floats:
     """Return all that can be seen of a session's cells, shape (3, n)."""
     state = session.state
     return np.array([state.row(0), state.row(session.system.rows.force), state.mode()])
 
 
-def _looked(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
+def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
     """Detect changes by the user; return the reason to wait, the session, and the messages."""
     why, said = blocking_reason(context, bed, session.system.grid.count), ""
     if why:
         return why, session, said
     try:
-        if session.stale or session.waits or session.moment % LOOK == 0:
+        if session.stale or session.blocking_reason or session.tick % LOOK == 0:
             scene = properties.scene_of(bed)
             if scene != session.scene:
                 before = session
-                session, said = sculpting.adapted(before, scene)
+                session, said = sculpting.change_scene(before, scene)
                 # A take is of one scene: what was recorded under the former one is not lost.
-                said = ". ".join(filter(None, (said, takes.keep_recorded(bed, before))))
+                said = ". ".join(filter(None, (said, takes.keep_recording(bed, before))))
                 bridge.resize_fingertip(view.fingertip_of(bed), find_ellipsoid(scene))
         if session.stale:
-            at, moment = bed_state.pose(bed), bed_state.moment(bed)
-            at = session.pose if at is None else at
+            pose, tick_read = bed_state.read_pose(bed), bed_state.read_tick(bed)
+            pose = session.pose if pose is None else pose
             recorded = session.recording is not None
-            session = sculpting.restored(session, bed_state.kept(bed), at, moment)
+            session = sculpting.restore(session, bed_state.read_snapshot(bed), pose, tick_read)
             if recorded and session.recording is None:
                 said = "The recording ended: undo went back to before it, or redo to what it did not lead to"
     except DigiclayError as error:

@@ -31,10 +31,10 @@ def find_bed(uid: int, name: str) -> Any | None:
     if bed is None or not view.is_bed(bed):
         return None
     # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
-    return bed if _shown(bpy.context, bed) or bed.users_scene else None
+    return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
 
 
-def _shown(context: Any, thing: Any) -> bool:
+def _is_shown(context: Any, thing: Any) -> bool:
     """Return whether some window shows a scene the object stands in."""
     layers = (window.view_layer for window in context.window_manager.windows)
     return any(layer.objects.get(thing.name) == thing for layer in layers)
@@ -52,7 +52,7 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     """
     if bpy.app.is_job_running("RENDER"):
         return "a render is under way"
-    if not _shown(context, bed):
+    if not _is_shown(context, bed):
         return "no window shows its scene, or its collection is left out: show it to go on"
     # A mesh can also be edited through another object that shares it.
     if bed.mode != "OBJECT" or (bed.type == "MESH" and bed.data.is_editmode):
@@ -66,7 +66,7 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
         return (
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
         )
-    if not _shown(context, tip):
+    if not _is_shown(context, tip):
         return "its fingertip stands in no scene shown: link it to a collection to go on"
     try:
         bridge.uniform(bed)
@@ -81,8 +81,8 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
 def active_session(context: Any) -> tuple[Any, Running] | None:
     """Return the bed that is active, or the only one that runs, and its session; None without."""
     bed = view.bed_of(context)
-    session = running.of(bed)
-    if session is None and bed is None and len(running.all()) == 1:
-        (session,) = running.all()
+    session = running.find(bed)
+    if session is None and bed is None and len(running.list_sessions()) == 1:
+        (session,) = running.list_sessions()
         bed = find_bed(session.uid, session.name)
     return (bed, session) if bed is not None and session is not None else None

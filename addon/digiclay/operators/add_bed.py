@@ -14,9 +14,9 @@ from ..device.instant import Instant, find_ellipsoid
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.declared import title
-from ..settings.devices import device
+from ..settings.devices import make_scene
 from ..settings.groups import PRESET_WORDS, method_items
-from ..settings.shown_units import SHOWN, si
+from ..settings.shown_units import SHOWN, to_si
 from .action import Action
 from .poll_messages import baked, edited, no_bed, session_runs
 
@@ -98,10 +98,10 @@ class AddBed(Action, bpy.types.Operator):
         layout = Layout(
             rows=self.rows,
             columns=self.columns,
-            pitch=si(self.pitch, SHOWN["m"][1]),
+            pitch=to_si(self.pitch, SHOWN["m"][1]),
             arrangement=self.arrangement,
         )
-        bed = add(context, device(self.preset, layout, self.method))
+        bed = add(context, make_scene(self.preset, layout, self.method))
         bed.scale = (self.scale,) * 3
         place_at_cursor(context, bed)
 
@@ -137,11 +137,11 @@ def add(context: Any, scene: Scene) -> Any:
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
     """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
-    coloured = palettes.worn()
+    coloured = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
     if not coloured:
-        palettes.wear(preferences.of(context).palette)
-    properties.adopt(bed, scene)
+        palettes.set_palette(preferences.get(context).palette)
+    properties.write_scene(bed, scene)
     return bed
 
 

@@ -68,16 +68,16 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
             made = properties.scene_of(bed)
             period = made.simulation.control_period
             poses = np.empty((0, 1, 7))
-            for step in bake.sampled(scene, bed, self.first, self.last, period):
-                if isinstance(step, float):
-                    yield 0.3 * step
+            for read in bake.sample_path(scene, bed, self.first, self.last, period):
+                if isinstance(read, float):
+                    yield 0.3 * read
                 else:
-                    poses = step
+                    poses = read
             system = assemble(made)
             # How a path ends is not known before it is simulated, and nobody asks.
             take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
         rate = scene.render.fps / scene.render.fps_base
-        for step in bake.moments_of(take, rate):
+        for step in bake.simulate_frames(take, rate):
             if isinstance(step, float):
                 yield 0.3 + 0.7 * step
             else:

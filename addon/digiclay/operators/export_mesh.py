@@ -8,7 +8,7 @@ from ..core.mesh_io.export_model import bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
-from .mesh_options import SurfaceOptions, chosen, sentence
+from .mesh_options import SurfaceOptions, chosen_bed, sentence
 
 __all__ = ["ExportMenu", "ExportMesh", "entry"]
 
@@ -68,7 +68,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
             self.file_format = _told_by(self.filepath) or self.file_format
         self.shown = self.file_format
         wanted = str(self._file())
-        changed = wanted != self.filepath
+        changed: bool = wanted != self.filepath
         self.filepath = wanted
         return changed
 
@@ -91,8 +91,8 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         if not self.properties.is_property_set("file_format"):
             self.file_format = _told_by(self.filepath) or self.file_format
         target = self._file()
-        bed = chosen(context)
-        made = bodies(formed_bed.formed(bed), self.model(bed), self.finding())
+        bed = chosen_bed(context)
+        made = bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
         files = [(target, made)]
         if self.separate and self.kind == "features":
             ending = suffix(self.file_format)

@@ -7,7 +7,7 @@ from ..core.mesh_io.export_model import features
 from ..core.surface.features import summary
 from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
-from .mesh_options import FindingOptions, SurfaceAction, chosen
+from .mesh_options import FindingOptions, SurfaceAction, chosen_bed
 from .poll_messages import no_surface
 
 __all__ = ["FindFeatures", "ForgetSurface", "KeepSurface"]
@@ -22,8 +22,8 @@ class FindFeatures(FindingOptions, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Find them."""
-        bed = chosen(context)
-        found = features(formed_bed.formed(bed), formed_bed.model(bed), self.finding())
+        bed = chosen_bed(context)
+        found = features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
         lines = [summary(found)]
         for one in found:
             extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
@@ -43,7 +43,7 @@ class KeepSurface(SurfaceAction, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Keep the surface."""
-        formed_bed.keep(chosen(context))
+        formed_bed.set_reference(chosen_bed(context))
 
 
 class ForgetSurface(SurfaceAction, bpy.types.Operator):
@@ -60,10 +60,10 @@ class ForgetSurface(SurfaceAction, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Forget the surface."""
-        formed_bed.forget(chosen(context))
+        formed_bed.clear_reference(chosen_bed(context))
 
 
 def _from_rest(context: Any) -> str:
     """No surface was kept to measure features from."""
-    kept = formed_bed.is_kept(chosen(context))
+    kept = formed_bed.has_reference(chosen_bed(context))
     return "" if kept else "Features are measured from the bed at rest already"

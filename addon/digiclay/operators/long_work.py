@@ -65,7 +65,7 @@ class LongWork(Action):
             return {"CANCELLED"}
         context.window_manager.progress_update(100.0 * share)
         said = f"{self.bl_label}: {100.0 * share:.0f} %     Esc: stop"
-        status.tell(context, said)
+        status.show(context, said)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:

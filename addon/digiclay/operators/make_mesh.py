@@ -10,7 +10,7 @@ from ..compat import bpy
 from ..core.mesh_io.export_model import bodies
 from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
-from .mesh_options import SurfaceOptions, chosen
+from .mesh_options import SurfaceOptions, chosen_bed
 from .poll_messages import edited, no_surface
 
 __all__ = ["MakeMesh"]
@@ -48,8 +48,8 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Make the objects, and select them."""
-        bed = chosen(context)
-        formed = formed_bed.formed(bed)
+        bed = chosen_bed(context)
+        formed = formed_bed.read_formed(bed)
         made = bodies(formed, self.model(bed), self.finding())
         width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
         smooth = self.skin != "bilinear" and self.kind != "pins"
@@ -57,7 +57,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         things = []
         for body in made:
             name = f"{bed.name} {body.name if self.kind == 'features' else self.kind}"
-            new = body_mesh.thing(body, name, smooth=smooth)
+            new = body_mesh.make_object(body, name, smooth=smooth)
             new[MADE] = True
             context.collection.objects.link(new)
             new.matrix_world = where

@@ -13,7 +13,7 @@ from ..exchange import formed_bed
 from .action import Action
 from .poll_messages import no_surface
 
-__all__ = ["FindingOptions", "SurfaceAction", "SurfaceOptions", "chosen", "sentence"]
+__all__ = ["FindingOptions", "SurfaceAction", "SurfaceOptions", "chosen_bed", "sentence"]
 
 MODEL, FINDING = quantities(Model), quantities(Finding)
 
@@ -117,7 +117,7 @@ class SurfaceOptions(FindingOptions):
         column.prop(self, "smallest")
 
 
-def chosen(context: Any) -> Any:
+def chosen_bed(context: Any) -> Any:
     """Return the bed to work on.
 
     Raises

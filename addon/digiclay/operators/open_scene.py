@@ -42,7 +42,7 @@ class AddSceneAction(Action):
 
     def add_scene(self, context: Any, scene: Scene) -> None:
         """Add the bed of a scene, its finger where its path begins."""
-        scene = shape_show.embedded(scene)
+        scene = shape_show.embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
@@ -52,7 +52,7 @@ class AddSceneAction(Action):
         context.view_layer.update()
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
-            takes.keep(bed, taken, scene.name)
+            takes.add(bed, taken, scene.name)
             words += f" Its session is the take {scene.name!r}."
         elif self.take:
             words += " Its session is too long to be simulated here: use 'digiclay run'."
@@ -114,6 +114,7 @@ class AddSample(AddSceneAction, bpy.types.Operator):
 class Entries:
     """Menu of samples."""
 
+    layout: Any
     kind = ""
 
     def draw(self, context: Any) -> None:

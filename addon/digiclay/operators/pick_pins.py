@@ -33,13 +33,13 @@ class PickPins(Polled, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
         self.changed = False
-        status.tell(context, KEYS)
+        status.show(context, KEYS)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under a click; what is no click goes on to the view."""
-        status.tell(context, KEYS)
+        status.show(context, KEYS)
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
             status.clear()
             return {"FINISHED"} if self.changed else {"CANCELLED"}
@@ -58,13 +58,13 @@ class PickPins(Polled, bpy.types.Operator):
         if region is None:
             return {"PASS_THROUGH"}
         with context.temp_override(area=area, region=region):
-            found = aim.target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
+            found = aim.find_target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
         if found is None or found.bed != bed_of(context):
             return {"PASS_THROUGH"}
-        present = display.picked(found.bed)
+        present = display.picked_pins(found.bed)
         pins = [pin for pin in present if pin != found.pin]
         try:
-            display.pick(found.bed, pins if found.pin in present else [*pins, found.pin])
+            display.pick_pins(found.bed, pins if found.pin in present else [*pins, found.pin])
         except DigiclayError as error:
             self.report({"WARNING"}, str(error))
         else:
@@ -92,8 +92,10 @@ class ClearPins(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """There must be picked pins."""
-        return no_bed(context, NO_BED) or ("" if display.picked(bed_of(context)) else "No pins are picked")
+        return no_bed(context, NO_BED) or (
+            "" if display.picked_pins(bed_of(context)) else "No pins are picked"
+        )
 
     def perform(self, context: Any) -> None:
         """Drop them."""
-        display.pick(bed_of(context), ())
+        display.pick_pins(bed_of(context), ())

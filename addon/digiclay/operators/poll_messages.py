@@ -26,7 +26,7 @@ def no_bed(context: Any, message: str = "Select a bed or its fingertip first") -
 
 def session_runs(context: Any, message: str = "Stop the session first") -> str:
     """A session runs on the bed."""
-    return message if running.of(bed_of(context)) is not None else ""
+    return message if running.find(bed_of(context)) is not None else ""
 
 
 def edited(context: Any, message: str = "Go back to Object Mode first") -> str:
@@ -51,7 +51,7 @@ def baked(
 
 def no_take(context: Any) -> str:
     """Nothing was recorded with the bed."""
-    return "" if takes.entries(bed_of(context)) else "The bed has no take: record one in a session first"
+    return "" if takes.list_takes(bed_of(context)) else "The bed has no take: record one in a session first"
 
 
 def no_surface(context: Any) -> str:

@@ -8,7 +8,7 @@ from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
 from ..device.view import bed_of
 from ..settings import own_presets, properties
-from ..settings.devices import laid_out
+from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from .action import Action
 from .poll_messages import no_bed
@@ -42,8 +42,8 @@ class ApplyPreset(Action, bpy.types.Operator):
         if self.preset in PRESETS:
             settings.preset, settings.own_preset = self.preset, ""
         else:
-            layout = properties.described(bed).layout
-            properties.adopt(bed, laid_out(load(own_presets.path(self.preset)), layout))
+            layout = properties.read_scene(bed).layout
+            properties.write_scene(bed, change_layout(load(own_presets.path(self.preset)), layout))
             settings.own_preset = self.preset
 
 
@@ -67,12 +67,13 @@ class SavePreset(Action, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the name."""
         self.name = bed_of(context).digiclay.own_preset
-        return context.window_manager.invoke_props_dialog(self)
+        result: set[str] = context.window_manager.invoke_props_dialog(self)
+        return result
 
     def perform(self, context: Any) -> None:
         """Save it."""
         bed = bed_of(context)
-        file = own_presets.save(self.name, replace(properties.described(bed), name=self.name.strip()))
+        file = own_presets.save(self.name, replace(properties.read_scene(bed), name=self.name.strip()))
         bed.digiclay.own_preset = file.stem
         self.report({"INFO"}, f"Saved as {file}")
 
@@ -90,7 +91,8 @@ class RemovePreset(Action, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Make sure."""
-        return context.window_manager.invoke_confirm(self, event)
+        result: set[str] = context.window_manager.invoke_confirm(self, event)
+        return result
 
     def perform(self, context: Any) -> None:
         """Remove it; the bed keeps its parameters."""

@@ -59,7 +59,7 @@ class Press(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""
-        found = aim.target(context, (event.mouse_region_x, event.mouse_region_y))
+        found = aim.find_target(context, (event.mouse_region_x, event.mouse_region_y))
         if found is None:
             return {"PASS_THROUGH"}
         try:
@@ -84,7 +84,7 @@ class Press(Polled, bpy.types.Operator):
     def modal(self, context: Any, event: Any) -> set[str]:
         """Draw the stroke on; whatever is not for it goes on to Blender, to turn the view for instance."""
         bed = _bed(self.uid)
-        session = running.of(bed)
+        session = running.find(bed)
         stroke = session and find_stroke(session, self.number)
         if stroke is None:
             if bed is None or session is None:
@@ -127,7 +127,7 @@ class Press(Polled, bpy.types.Operator):
             return
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
-            point = aim.meets(bpy.context, bed, self.grid, self.height, xy)
+            point = aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
         if point is not None and event.value != "PRESS":
             x, y = float(point[0]), float(point[1])
             self._change(partial(draw, time=self._time(), x=x, y=y, depth=self.full * self.pressure))
@@ -139,7 +139,7 @@ class Press(Polled, bpy.types.Operator):
 
     def _change(self, change: Any) -> None:
         """Put a changed stroke into the session's queue."""
-        session = running.of(_bed(self.uid))
+        session = running.find(_bed(self.uid))
         if session is not None:
             running.put(change_stroke(session, self.number, change))
 
@@ -161,7 +161,7 @@ class Press(Polled, bpy.types.Operator):
 
     def _tell(self, context: Any) -> None:
         """Show depth and keys in the status bar."""
-        status.tell(context, KEYS.format(1e3 * self.full * self.pressure))
+        status.show(context, KEYS.format(1e3 * self.full * self.pressure))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar."""
@@ -182,10 +182,10 @@ def _session(context: Any, bed: Any) -> running.Running:
     DigiclayError, RuntimeError
         When it cannot be started, with the reason.
     """
-    if running.of(bed) is None:
+    if running.find(bed) is None:
         context.view_layer.objects.active = bed
         bpy.ops.digiclay.session("INVOKE_DEFAULT")
-    session = running.of(bed)
+    session = running.find(bed)
     if session is None:
         raise DigiclayError(f"The session of {bed.name} could not be started; its panel says why.")
     return session

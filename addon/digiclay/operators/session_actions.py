@@ -29,11 +29,12 @@ class OfSession(Action):
         """A session is needed."""
         return no_session(context)
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Any) -> set[str] | None:
         """Change the session."""
         active = active_session(context)
         assert active is not None  # so says the poll
         self.change(context, *active)
+        return None
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Change a session."""
@@ -92,10 +93,10 @@ class RewindSession(OfSession, bpy.types.Operator):
         """Go back, the fingertip along with the bed."""
         back = sculpting.rewind(session)
         if session.recording is not None and back.recording is None:
-            kept = takes.keep_recorded(bed, session)
+            kept = takes.keep_recording(bed, session)
             self.report({"INFO"}, kept or "The recording ended: the gesture began before it")
         tick.show(bed, back)
-        tick.place(context, bed, back)
+        tick.place_finger(context, bed, back)
 
 
 class ResetSession(OfSession, bpy.types.Operator):
@@ -130,10 +131,10 @@ class ResetSession(OfSession, bpy.types.Operator):
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Begin anew, the recording kept as a take."""
-        kept = takes.keep_recorded(bed, session)
+        kept = takes.keep_recording(bed, session)
         back = sculpting.reset(session)
         tick.show(bed, back)
-        tick.place(context, bed, back)
+        tick.place_finger(context, bed, back)
         if kept:
             self.report({"INFO"}, kept)
 
@@ -147,7 +148,7 @@ def _no_gesture(context: Any) -> str:
 
 def _at_rest(context: Any) -> str:
     """There is nothing to bring back."""
-    return "The bed is at rest already" if bed_state.kept(bed_of(context)) is None else ""
+    return "The bed is at rest already" if bed_state.read_snapshot(bed_of(context)) is None else ""
 
 
 def _bring_to_rest(bed: Any) -> None:

@@ -13,7 +13,7 @@ from ..compat import bpy
 from ..live import handlers, loop, recovery, running, tick
 from .action import Action, Polled
 
-__all__ = ["Escape", "GoOn", "Looping"]
+__all__ = ["Escape", "GoOn", "LoopMixin"]
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -21,14 +21,14 @@ EVERY, MOMENT = 20.0, 0.1
 CLOSED = "ended: its window was closed"
 
 
-class Looping(Polled):
+class LoopMixin(Polled):
     """Mixin of the modal operators for the sessions of a window."""
 
-    def begun(self, context: Any) -> set[str]:
+    def drive(self, context: Any) -> set[str]:
         """Begin to drive the loop that there is."""
         loop.take_over()
         self.token, self.since = loop.token(), time.perf_counter()
-        self.newer = _others(context)
+        self.newer = _other_operators(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -36,23 +36,23 @@ class Looping(Polled):
         """Tick with the timer; leave every other event to whoever it is for."""
         if self.token != loop.token():
             return {"CANCELLED"}
-        if _undoes(context, event) and tick.withdraw_strokes(context):
+        if _is_undo_key(context, event) and tick.withdraw_strokes(context):
             return {"RUNNING_MODAL"}
-        if event.type == "ESC" and event.value == "PRESS" and not self.newer & _others(context):
+        if event.type == "ESC" and event.value == "PRESS" and not self.newer & _other_operators(context):
             return {"FINISHED"} if _stop(context) else {"RUNNING_MODAL"}
         now = time.perf_counter()
-        if event.type != "TIMER" or not loop.due(context, now):
+        if event.type != "TIMER" or not loop.is_due(context, now):
             return {"PASS_THROUGH"}
-        drawn = _drawn()
+        drawn = _count_strokes()
         self.tell(tick.tick(context, now))
-        if _drawn() > drawn:
+        if _count_strokes() > drawn:
             bpy.ops.ed.undo_push(message="Press")
-        loop.drawn(context, now)
-        if not running.all():
+        loop.redraw_numbers(context, now)
+        if not running.list_sessions():
             handlers.end_all(handlers.STOPPED)
             return {"FINISHED"}
-        if now - self.since > EVERY and _saves(context) and not _others(context):
-            _go_on_later(self.token, context.window)
+        if now - self.since > EVERY and _autosaves(context) and not _other_operators(context):
+            _resume_later(self.token, context.window)
             return {"FINISHED", "PASS_THROUGH"}
         return {"PASS_THROUGH"}
 
@@ -62,18 +62,18 @@ class Looping(Polled):
             return
         # A window that was closed is listed no more; when Blender quits, all still are.
         if context.window in context.window_manager.windows[:]:
-            handlers.abandoned("ended: Blender quits")
+            handlers.end_with_file("ended: Blender quits")
         else:
             handlers.end_all(CLOSED)
 
     def tell(self, notes: list[tick.Note]) -> None:
         """Report the messages, and keep them for the panel."""
         for note in notes:
-            self.report({note.level}, note.words)
-            running.say(note.words)
+            self.report({note.level}, note.message)
+            running.set_message(note.message)
 
 
-class GoOn(Looping, bpy.types.Operator):
+class GoOn(LoopMixin, bpy.types.Operator):
     """Continue the sessions after Blender's auto save"""
 
     bl_idname = "digiclay.session_go_on"
@@ -83,11 +83,11 @@ class GoOn(Looping, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """Sessions without an operator that drives them are needed."""
-        return "" if running.all() and context.window is not None else "No session runs"
+        return "" if running.list_sessions() and context.window is not None else "No session runs"
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Drive the loop again."""
-        return self.begun(context)
+        return self.drive(context)
 
 
 class Escape(Action, bpy.types.Operator):
@@ -100,16 +100,16 @@ class Escape(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """At any other time Esc is for whoever else it is for."""
-        return "" if loop.aside() else "The session takes the key itself"
+        return "" if loop.is_aside() else "The session takes the key itself"
 
     def perform(self, context: Any) -> None:
         """Stop them, as Esc does at any other time."""
         _stop(context)
 
 
-def _drawn() -> int:
+def _count_strokes() -> int:
     """Return how many strokes the fingers of all sessions have finished."""
-    return sum(session.drawn for session in running.all())
+    return sum(session.finished_strokes for session in running.list_sessions())
 
 
 def _stop(context: Any) -> bool:
@@ -120,28 +120,28 @@ def _stop(context: Any) -> bool:
     return True
 
 
-def _undoes(context: Any, event: Any) -> bool:
+def _is_undo_key(context: Any, event: Any) -> bool:
     """Return whether an event is the user's key for Undo while a stroke is unfinished: it has no step yet."""
-    if event.value != "PRESS" or not any(session.strokes for session in running.all()):
+    if event.value != "PRESS" or not any(session.strokes for session in running.list_sessions()):
         return False
     keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
     items = keymap.keymap_items if keymap else ()
-    return any(item.idname == "ed.undo" and item.active and _struck(item, event) for item in items)
+    return any(item.idname == "ed.undo" and item.active and _matches_key(item, event) for item in items)
 
 
-def _struck(item: Any, event: Any) -> bool:
+def _matches_key(item: Any, event: Any) -> bool:
     """Return whether an event is the key of a keymap's item, with the keys held that it wants."""
     return item.type == event.type and all(
         bool(getattr(item, held)) == getattr(event, held) for held in ("ctrl", "shift", "alt", "oskey")
     )
 
 
-def _saves(context: Any) -> bool:
+def _autosaves(context: Any) -> bool:
     """Return whether Blender saves by itself."""
     return bool(context.preferences.filepaths.use_auto_save_temporary_files)
 
 
-def _others(context: Any) -> frozenset[int]:
+def _other_operators(context: Any) -> frozenset[int]:
     """Return the modal operators of all windows but those that drive sessions."""
     own = ("DIGICLAY_OT_session", "DIGICLAY_OT_session_go_on")
     windows = context.window_manager.windows
@@ -149,19 +149,19 @@ def _others(context: Any) -> frozenset[int]:
     return frozenset(operator.as_pointer() for operator in every if operator.bl_idname not in own)
 
 
-def _go_on_later(token: int, window: Any) -> None:
+def _resume_later(token: int, window: Any) -> None:
     """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile.
 
     Until then the file has what is being recorded, in case Blender saves it.
     """
     loop.step_aside()
-    recovery.lend()
+    recovery.write_recovery()
     pointer = window.as_pointer()
 
     def go_on() -> None:
         if token != loop.token():
             return
-        recovery.take_back()
+        recovery.clear_recovery()
         windows = bpy.context.window_manager.windows
         found = next((one for one in windows if one.as_pointer() == pointer), None)
         if found is None:

@@ -8,12 +8,12 @@ from ..live import handlers, loop, tick
 from ..overlay import views
 from .action import Action
 from .poll_messages import baked, edited, linked, no_bed, session_runs
-from .session_loop import Looping
+from .session_loop import LoopMixin
 
 __all__ = ["Session"]
 
 
-class Session(Looping, Action, bpy.types.Operator):
+class Session(LoopMixin, Action, bpy.types.Operator):
     """Start sculpting: the pins follow the fingertip, which any tool can move. Esc stops"""
 
     bl_idname = "digiclay.session"
@@ -45,7 +45,7 @@ class Session(Looping, Action, bpy.types.Operator):
         views.follow()
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
-        if loop.runs():
+        if loop.is_running():
             return None
         loop.begin(context)
-        return self.begun(context)
+        return self.drive(context)

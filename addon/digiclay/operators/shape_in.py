@@ -10,7 +10,7 @@ from ..device.view import bed_of
 from ..exchange import shape_show
 from ..live import running
 from ..settings.declared import title
-from ..settings.shown_units import SHOWN, si
+from ..settings.shown_units import SHOWN, to_si
 from .action import Action, FileAction
 from .poll_messages import baked, edited, linked, no_bed, session_runs
 
@@ -82,7 +82,7 @@ class Shaped(Action):
         laid, off = self.displayed(context, bed)
         lost = laid.too_low + laid.too_high + laid.overhanging
         words = f"{laid.told()}; displayed to within {off * 1e6:.2g} µm"
-        running.say(words)
+        running.set_message(words)
         self.report({"WARNING" if lost else "INFO"}, words)
 
     def displayed(self, context: Any, bed: Any) -> Any:
@@ -91,10 +91,10 @@ class Shaped(Action):
 
     def shape(self, file: str, bed: Any, **known: Any) -> Shape:
         """Return how the shape is laid onto the bed."""
-        lengths = {name: si(getattr(self, name), SHOWN["m"][1]) for name in ("x", "y", "rise", "foot")}
+        known |= {name: to_si(getattr(self, name), SHOWN["m"][1]) for name in ("x", "y", "rise", "foot")}
         before = bed.digiclay.shape
         return Shape(
-            file=file, fit=self.fit, scale=float(f"{self.scale:.7g}"), relief=self.relief, **lengths, **known,
+            file=file, fit=self.fit, scale=float(f"{self.scale:.7g}"), relief=self.relief, **known,
             refresh=before.refresh, surfaces=before.surfaces,
         )  # fmt: skip
 
@@ -118,7 +118,7 @@ class ShapeFromObject(Shaped, bpy.types.Operator):
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the object."""
         (thing,) = others(context, bed)
-        relief = shape_show.relief_of(thing, bed, context.evaluated_depsgraph_get())
+        relief = shape_show.read_relief(thing, bed, context.evaluated_depsgraph_get())
         return shape_show.show_relief(bed, relief, self.shape(thing.name, bed))
 
 
@@ -162,4 +162,4 @@ class ShapeSample(Shaped, bpy.types.Operator):
 
 def others(context: Any, bed: Any) -> list[Any]:
     """Return the selected objects with a surface that are no part of a bed."""
-    return [thing for thing in context.selected_objects if thing != bed and shape_show.surfaced(thing)]
+    return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]

@@ -34,7 +34,7 @@ class KeepShape(Action, bpy.types.Operator):
         heights = bridge.read_cells(bed.data)["height"]
         before = scene.shape or Shape()
         shape = replace(before, file="Formed", fit="placed", heights=packed(heights))
-        properties.adopt(bed, replace(scene, shape=shape))
+        properties.write_scene(bed, replace(scene, shape=shape))
         self.report({"INFO"}, f"{bed.name} has a shape of {heights.size} heights: sessions begin with it")
 
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from ..compat import bpy
 
-__all__ = ["clear", "tell"]
+__all__ = ["clear", "show"]
 
 #: What was written, by the name of the workspace.
 _TOLD: dict[str, str] = {}
 
 
-def tell(context: Any, words: str) -> None:
+def show(context: Any, words: str) -> None:
     """Write words into the status bar, in place of those written before, in whichever workspace."""
     name = context.workspace.name
     if _TOLD.get(name) == words:

@@ -37,14 +37,16 @@ class RecordTake(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """A running session that does not record yet is needed."""
-        session = running.of(bed_of(context))
+        session = running.find(bed_of(context))
         if session is None:
             return "Start a session first"
         return "A take is being recorded already" if session.recording is not None else ""
 
     def perform(self, context: Any) -> None:
         """Begin to record."""
-        running.put(sculpting.recording(running.of(bed_of(context)), True))
+        session = running.find(bed_of(context))
+        assert session is not None  # so says the poll
+        running.put(sculpting.set_recording(session, True))
 
 
 class KeepTake(Action, bpy.types.Operator):
@@ -59,21 +61,21 @@ class KeepTake(Action, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """A session that records is needed."""
-        session = running.of(bed_of(context))
-        records = session is not None and session.recording is not None
-        return "" if records else "Record a take first"
+        session = running.find(bed_of(context))
+        return "" if session is not None and session.recording is not None else "Record a take first"
 
     def perform(self, context: Any) -> set[str] | None:
         """Keep it."""
-        recovery.take_back()
+        recovery.clear_recovery()
         bed = bed_of(context)
-        session = running.of(bed)
-        take = takes.recorded(session)
-        running.put(sculpting.recording(session, False))
+        session = running.find(bed)
+        assert session is not None  # so says the poll
+        take = takes.read_recording(session)
+        running.put(sculpting.set_recording(session, False))
         if take is None:
             self.report({"WARNING"}, "Nothing was recorded: the session was paused")
             return {"CANCELLED"}
-        entry = takes.keep(bed, take, self.name)
+        entry = takes.add(bed, take, self.name)
         self.report({"INFO"}, f"{entry.name}: {entry.seconds:.1f} s kept")
         return None
 

@@ -1,6 +1,7 @@
 """Replay of a take, with a comparison of its end state bit for bit."""
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from .. import bridge, preferences
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
+from ..core.engine.state import State
 from ..core.model.fingertip import LEVEL
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
@@ -30,6 +32,10 @@ __all__ = ["ReplayTake"]
 
 class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     """Replay a take at its recorded speed. Esc stops and restores the bed"""
+
+    _states: Iterator[State]
+    _clock: Clock
+    _at: int
 
     bl_idname = "digiclay.take_replay"
     bl_label = "Replay Take"
@@ -63,7 +69,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         except DigiclayError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        manager, rate = context.window_manager, preferences.of(context).redraw_rate
+        manager, rate = context.window_manager, preferences.get(context).redraw_rate
         self._timer = manager.event_timer_add(1.0 / rate, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -79,7 +85,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
             return self._left(context)
         period = self._system.period
         count, self._clock = periods_due(
-            self._clock, time.perf_counter(), period, preferences.of(context).most_periods
+            self._clock, time.perf_counter(), period, preferences.get(context).most_periods
         )
         try:
             for _ in range(min(count, self._took.periods - self._at)):
@@ -95,7 +101,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         view.show_state(bed, self._system, self._state)
         self._place(bed)
         seconds, whole = self._at * period, self._took.duration
-        status.tell(context, f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
+        status.show(context, f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
@@ -152,13 +158,13 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
 
     def _came_to(self, bed: Any, state: bytes) -> Running:
         """Return the session that would go on from here."""
-        session, _ = sculpting.begun(
+        session, _ = sculpting.begin_session(
             bed.session_uid,
             bed.name,
             self._took.scene,
             pick_pose(self._took.poses[-1]),
             state,
-            bed_state.moment(bed),
+            bed_state.read_tick(bed),
         )
         return session
 
@@ -169,11 +175,11 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         if bed is not None:
             try:
                 scene = properties.scene_of(bed)
-                before, _ = sculpting.begun(
-                    bed.session_uid, bed.name, scene, self._stood, bed_state.kept(bed)
+                before, _ = sculpting.begin_session(
+                    bed.session_uid, bed.name, scene, self._stood, bed_state.read_snapshot(bed)
                 )
                 view.show_state(bed, before.system, before.state)
-                tick.place(context, bed, before)
+                tick.place_finger(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
         self.report({"INFO"}, "Replay stopped: the bed is restored")
@@ -181,6 +187,6 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
 
     def _ended(self, context: Any) -> None:
         """Take back what the replay needs of Blender."""
-        self._states.close()
+        self._states = iter(())
         context.window_manager.event_timer_remove(self._timer)
         status.clear()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Colour", "Look", "contrast", "look"]
+__all__ = ["Colour", "Look", "choose_colours", "contrast"]
 
 #: sRGB.
 Colour = tuple[float, float, float]
@@ -41,7 +41,7 @@ class Look:
     pins: tuple[Colour, ...]
 
 
-def look(back: Colour, ink: Colour) -> Look:
+def choose_colours(back: Colour, ink: Colour) -> Look:
     """Choose all colours to go with those of the theme.
 
     Parameters
@@ -51,15 +51,15 @@ def look(back: Colour, ink: Colour) -> Look:
     ink : Colour
         The theme's letters; replaced by black or white where they could not be read.
     """
-    ink = legible(ink, back, INK)
+    ink = make_legible(ink, back, INK)
     return Look(
         back=back,
         ink=ink,
-        faint=legible(_mixed(ink, back, 0.35), back, LETTERS),
-        frame=_mixed(ink, back, 0.75),
+        faint=make_legible(_mix(ink, back, 0.35), back, LETTERS),
+        frame=_mix(ink, back, 0.75),
         force=ink,
-        set_point=legible(CURVES[4], back, LINES),
-        pins=tuple(legible(colour, back, LINES) for colour in CURVES),
+        set_point=make_legible(CURVES[4], back, LINES),
+        pins=tuple(make_legible(colour, back, LINES) for colour in CURVES),
     )
 
 
@@ -75,7 +75,7 @@ def contrast(one: Colour, other: Colour) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def legible(colour: Colour, back: Colour, least: float) -> Colour:
+def make_legible(colour: Colour, back: Colour, least: float) -> Colour:
     """Return a colour, mixed with as much black or white as it needs for a contrast to what is behind it.
 
     Parameters
@@ -87,13 +87,13 @@ def legible(colour: Colour, back: Colour, least: float) -> Colour:
     """
     end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
     for share in np.linspace(0.0, 1.0, 41):
-        mixed = _mixed(colour, end, float(share))
+        mixed = _mix(colour, end, float(share))
         if contrast(mixed, back) >= least:
             return mixed
     return end
 
 
-def _mixed(one: Colour, other: Colour, share: float) -> Colour:
+def _mix(one: Colour, other: Colour, share: float) -> Colour:
     """Return a colour with a share of another."""
     r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
     return r, g, b

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .look import Colour
 
-__all__ = ["Box", "Dot", "Line", "Picture", "Words", "axis", "scaled"]
+__all__ = ["Box", "Dot", "Line", "Picture", "Words", "round_axis", "scale_curve"]
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class Picture:
     words: list[Words] = field(default_factory=list)
 
 
-def axis(low: float, high: float) -> tuple[float, float]:
+def round_axis(low: float, high: float) -> tuple[float, float]:
     """Return round ends of an axis that holds two values, the first below the second.
 
     Steps are 1, 2 or 5 times a power of ten, and at most ten of them make the axis, so that
@@ -84,7 +84,7 @@ def axis(low: float, high: float) -> tuple[float, float]:
     return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
 
 
-def scaled(
+def scale_curve(
     time: Floats, value: Floats, window: tuple[float, float], ends: tuple[float, float], box: Box
 ) -> Floats:
     """Return the points (k, 2) of a curve inside a box, what lies outside the window left away.

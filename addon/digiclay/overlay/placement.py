@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from .look import Look
 from .picture import Box, Picture
-from .sections import SECTIONS, Pen, Told
+from .sections import SECTIONS, Pen, Readings
 
-__all__ = ["free", "laid_out"]
+__all__ = ["find_room", "lay_out"]
 
 #: Sizes at a UI scale of 1, pixels.
 WIDTH, MARGIN, PADDING = 290.0, 12.0, 10.0
@@ -19,7 +19,7 @@ SHARE = 0.75
 Room = tuple[float, float, float, float]
 
 
-def free(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
+def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
     """Return the part of a view that no panel covers.
 
     Parameters
@@ -35,7 +35,7 @@ def free(width: float, height: float, covered: list[tuple[str, float]]) -> Room:
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def laid_out(told: Told, look: Look, room: Room, scale: float) -> Picture:
+def lay_out(told: Readings, look: Look, room: Room, scale: float) -> Picture:
     """Lay the overlay out in the lower right corner of the room there is.
 
     Where the view is low, sections there is no room for are left away; where it is narrow, all.

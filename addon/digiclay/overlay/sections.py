@@ -15,9 +15,9 @@ from ..core.base.modes import Mode
 from ..core.model.finger_range import MOST_FORCE
 from ..device import heat
 from .look import Colour, Look
-from .picture import Box, Dot, Floats, Line, Picture, Words, axis, scaled
+from .picture import Box, Dot, Floats, Line, Picture, Words, round_axis, scale_curve
 
-__all__ = ["SECTIONS", "Pen", "Told", "error_words"]
+__all__ = ["SECTIONS", "Pen", "Readings", "error_message"]
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
@@ -30,7 +30,7 @@ LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Readings:
     """Session data in the overlay.
 
     Attributes
@@ -129,7 +129,9 @@ class Pen:
             self.picture.words.append(Words(box.x + step, y + lift, size, self.look.faint, label))
         return box
 
-    def curve(self, told: Told, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1) -> None:
+    def curve(
+        self, told: Readings, value: Floats, ends: tuple[float, float], box: Box, pin: int = -1
+    ) -> None:
         """Draw a curve into the frame of a plot: that of a pin, or the force.
 
         Parameters
@@ -144,46 +146,46 @@ class Pen:
             Which pin of the plot; below 0: the force.
         """
         colour = self.look.force if pin < 0 else self.look.pins[pin]
-        points = scaled(told.time, value, told.window, ends, box)
+        points = scale_curve(told.time, value, told.window, ends, box)
         if len(points) > 1:
             self.picture.lines.append(Line(points, colour, 1.5 * self.scale))
 
 
-def error_words(errors: tuple[float, float] | None) -> str:
+def error_message(errors: tuple[float, float] | None) -> str:
     """Return the text of the estimated errors of a height, m, and of a cell's force, N."""
     if errors is None:
         return "Solver error: not estimated yet"
     return f"Solver error: about {_size(errors[0] * 1e6, 'µm')}, {_size(errors[1] * 1e3, 'mN')}"
 
 
-def force_words(force: float) -> str:
+def force_message(force: float) -> str:
     """Return the text of the total force, N, and its excess over `core.model.finger_range`."""
     if force <= MOST_FORCE:
         return f"{force:.2f} N"
     return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
 
 
-def head_height(told: Told) -> float:
+def head_height(told: Readings) -> float:
     """Return the height of the head, pixels at a UI scale of 1."""
     return 3 * ROW + GAP
 
 
-def head(told: Told, pen: Pen, top: float) -> None:
+def head(told: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
     speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
     top = pen.row(top, told.name, "paused" if told.paused else speed)
     top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
-    pen.row(top, error_words(told.errors), small=True)
+    pen.row(top, error_message(told.errors), small=True)
 
 
-def force_height(told: Told) -> float:
+def force_height(told: Readings) -> float:
     """Return the height of the section of the force, pixels at a UI scale of 1."""
     return 2 * ROW + PLOT + GAP
 
 
-def force(told: Told, pen: Pen, top: float) -> None:
+def force(told: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
-    now = force_words(float(told.force[-1])) if told.force.size else ""
+    now = force_message(float(told.force[-1])) if told.force.size else ""
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
     top = pen.row(top, f"Total force  {now}", asked)
     recent = told.force[told.time >= told.window[0]]
@@ -192,7 +194,7 @@ def force(told: Told, pen: Pen, top: float) -> None:
     if asked_for:
         largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
     largest = max(largest, LEAST_FORCE)
-    ends = (0.0, axis(0.0, largest)[1])
+    ends = (0.0, round_axis(0.0, largest)[1])
     box = pen.frame(top, "0 N", f"{ends[1]:g} N")
     if told.set_point is not None:
         y = box.y + told.set_point / ends[1] * box.height
@@ -202,12 +204,12 @@ def force(told: Told, pen: Pen, top: float) -> None:
     pen.row(box.y, "", f"last {told.seconds:g} s", small=True)
 
 
-def heights_height(told: Told) -> float:
+def heights_height(told: Readings) -> float:
     """Return the height of the section of the heights, pixels at a UI scale of 1."""
     return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
 
 
-def heights(told: Told, pen: Pen, top: float) -> None:
+def heights(told: Readings, pen: Pen, top: float) -> None:
     """Draw the heights of the picked pins over the last seconds."""
     if not told.pins:
         pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
@@ -218,7 +220,7 @@ def heights(told: Told, pen: Pen, top: float) -> None:
     known = recent[np.isfinite(recent)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
-    ends = axis(low - spare, high + spare)
+    ends = round_axis(low - spare, high + spare)
     box = pen.frame(top, f"{ends[0]:g} mm", f"{ends[1]:g} mm")
     for place in range(len(told.pins)):
         pen.curve(told, values[:, place], ends, box, pin=place)
@@ -229,12 +231,12 @@ def heights(told: Told, pen: Pen, top: float) -> None:
         _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
 
 
-def scale_height(told: Told) -> float:
+def scale_height(told: Readings) -> float:
     """Return the height of the scale of colours, pixels at a UI scale of 1; 0 while none is needed."""
     return 0.0 if told.top is None else 2.6 * ROW
 
 
-def scale(told: Told, pen: Pen, top: float) -> None:
+def scale(told: Readings, pen: Pen, top: float) -> None:
     """Draw the colours of the force on a pin."""
     if told.top is None:
         return
@@ -245,12 +247,12 @@ def scale(told: Told, pen: Pen, top: float) -> None:
     pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
 
 
-def modes_height(told: Told) -> float:
+def modes_height(told: Readings) -> float:
     """Return the height of the section of the modes, pixels at a UI scale of 1."""
     return ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2))
 
 
-def modes(told: Told, pen: Pen, top: float) -> None:
+def modes(told: Readings, pen: Pen, top: float) -> None:
     """List how many pins are in each mode that occurs, with its colour."""
     top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):

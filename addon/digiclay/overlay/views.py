@@ -17,13 +17,13 @@ from ..core.base.modes import Mode
 from ..core.model.set_point import asked
 from ..device import palettes, view
 from ..live import running
-from ..press.aim import on_screen
-from .look import Look, look
+from ..press.aim import project
+from .look import Look, choose_colours
 from .picture import Dot, Picture
-from .placement import Room, free, laid_out
-from .sections import Told
+from .placement import Room, find_room, lay_out
+from .sections import Readings
 
-__all__ = ["follow", "redraw", "shown", "stop", "told"]
+__all__ = ["follow", "read_session", "redraw", "shown", "stop"]
 
 #: How often the views are drawn anew while nothing moves in them, s: the curves go on all the same.
 QUIET = 0.25
@@ -33,7 +33,7 @@ _HANDLES: list[Any] = []
 
 def follow() -> None:
     """Draw the overlay if a live session has it enabled, and remove it otherwise."""
-    if any(_wanted(bed) for bed in _beds()):
+    if any(_is_wanted(bed) for bed in _beds()):
         if not _HANDLES:
             _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
             bpy.app.timers.register(_again, first_interval=QUIET)
@@ -69,7 +69,9 @@ def _again() -> float:
     return QUIET
 
 
-def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]) -> Told:
+def read_session(
+    bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]
+) -> Readings:
     """Return the content of the overlay for a bed and its session.
 
     Parameters
@@ -81,7 +83,7 @@ def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, fl
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else asked(scene.set_point, 0))
     errors = session.errors
-    return Told(
+    return Readings(
         name=bed.name,
         method=scene.method if scene.control else "",
         paused=session.paused,
@@ -101,19 +103,19 @@ def told(bed: Any, session: running.Running, colours: dict[Mode, tuple[float, fl
 
 def _beds() -> list[Any]:
     """Return the beds with a running session; fetched anew each time, since undo invalidates them."""
-    uids = {session.uid for session in running.all()}
+    uids = {session.uid for session in running.list_sessions()}
     return [thing for thing in bpy.data.objects if thing.session_uid in uids] if uids else []
 
 
-def _wanted(bed: Any) -> bool:
+def _is_wanted(bed: Any) -> bool:
     """Return whether the overlay is enabled for a bed."""
     display = getattr(bed, "digiclay_display", None)
     return display is not None and bool(display.overlay)
 
 
-def _chosen(context: Any) -> Any | None:
+def _choose_bed(context: Any) -> Any | None:
     """Return the bed of a view's overlay: the active one, or the first one in the view's scene."""
-    beds = [bed for bed in _beds() if _wanted(bed) and bed.name in context.scene.objects]
+    beds = [bed for bed in _beds() if _is_wanted(bed) and bed.name in context.scene.objects]
     active = context.object
     while active is not None and active not in beds:
         active = active.parent
@@ -134,7 +136,7 @@ def _room(area: Any, region: Any) -> Room:
                 else sides[other.type]
             )
             covered.append((side, other.width if side in ("LEFT", "RIGHT") else other.height))
-    return free(region.width, region.height, covered)
+    return find_room(region.width, region.height, covered)
 
 
 def _draw() -> None:
@@ -145,18 +147,20 @@ def _draw() -> None:
     from .draw import draw
 
     context = bpy.context
-    bed = _chosen(context) if context.space_data.overlay.show_overlays else None
-    session = running.of(bed)
+    bed = _choose_bed(context) if context.space_data.overlay.show_overlays else None
+    session = running.find(bed)
     if session is None:
         return
     settings = context.preferences
     theme = settings.themes[0].user_interface.wcol_menu_back
-    colours = palettes.PALETTES[preferences.of(context).palette]
-    chosen = look(tuple(theme.inner[:3]), tuple(theme.text))
+    colours = palettes.PALETTES[preferences.get(context).palette]
+    chosen = choose_colours(tuple(theme.inner[:3]), tuple(theme.text))
     scale = settings.system.ui_scale
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
-        picture = laid_out(told(bed, session, colours), chosen, _room(context.area, context.region), scale)
+        picture = lay_out(
+            read_session(bed, session, colours), chosen, _room(context.area, context.region), scale
+        )
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 
@@ -167,7 +171,7 @@ def _marks(
     """Return a dot on every picked pin that the picture does not cover, in the colour of its curve."""
     pins = session.trace.pins
     cells = session.system.grid.positions[list(pins)]
-    places = on_screen(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
+    places = project(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
     marks = []
     for (x, y), colour in zip(places, colours.pins, strict=False):
         hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in picture.boxes)

@@ -40,7 +40,7 @@ class Display(Panel, bpy.types.Panel):
         column = layout.column()
         column.active = shown.overlay
         column.prop(shown, "seconds")
-        pins = ", ".join(str(pin) for pin in display.picked(bed))
+        pins = ", ".join(str(pin) for pin in display.picked_pins(bed))
         column.label(text=f"Picked pins: {pins or 'none'}")
         row = column.row(align=True)
         row.operator("digiclay.pick_pins")

@@ -7,7 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..live import bed_state, running
 from ..live.running import Running
-from ..overlay.sections import error_words
+from ..overlay.sections import error_message
 from ..recorded import bake, takes
 from .base import Panel, bed_of, draw_lines
 
@@ -24,9 +24,9 @@ class Session(Panel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         """Draw what can be done, and how it goes."""
         bed = bed_of(context)
-        session, column = running.of(bed), self.layout.column(align=True)
+        session, column = running.find(bed), self.layout.column(align=True)
         if session is None:
-            kept = bed_state.kept(bed) is not None
+            kept = bed_state.read_snapshot(bed) is not None
             words = "Go On Sculpting" if kept else "Start Sculpting"
             row = column.row(align=True)
             row.scale_y = 1.4
@@ -35,7 +35,11 @@ class Session(Panel, bpy.types.Panel):
         else:
             _buttons(column, session)
             _numbers(self.layout, session)
-        said = session.waits and f"Waits: {session.waits}" if session else running.said()
+        said = (
+            session.blocking_reason and f"Waits: {session.blocking_reason}"
+            if session
+            else running.last_message()
+        )
         if said:
             draw_lines(self.layout, said, "ERROR" if session else "INFO")
 
@@ -74,7 +78,7 @@ def _numbers(layout: Any, session: Running) -> None:
 def error_line(session: Running) -> str:
     """Return what is said of a session's error, here as in the overlay."""
     errors = session.errors
-    return error_words(errors and (errors.height, errors.force))
+    return error_message((errors.height, errors.force) if errors else None)
 
 
 class Takes(Panel, bpy.types.Panel):
@@ -88,13 +92,13 @@ class Takes(Panel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         """Draw the recording, the list of takes, and the bake."""
         layout, bed = self.layout, bed_of(context)
-        session = running.of(bed)
+        session = running.find(bed)
         if session is not None and session.recording is not None:
             seconds = (len(session.recording.path) - 1) * session.system.period
             layout.operator("digiclay.take_keep", text=f"Keep Take ({seconds:.1f} s)", icon="CHECKMARK")
         else:
             layout.operator("digiclay.take_record", icon="RECORD_ON")
-        for entry in takes.entries(bed):
+        for entry in takes.list_takes(bed):
             row = layout.row(align=True)
             row.label(text=f"{entry.name} ({entry.seconds:.1f} s)", icon="TRACKING")
             row.operator("digiclay.take_replay", text="", icon="PLAY").take = entry.number

@@ -39,7 +39,7 @@ class Start(Panel, bpy.types.Panel):
         column.label(text="Select a bed or its fingertip,")
         column.label(text="or add a new device:")
         column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
-        draw_lines(self.layout, running.said(), "INFO")
+        draw_lines(self.layout, running.last_message(), "INFO")
 
 
 class Presets(bpy.types.Menu):
@@ -75,7 +75,7 @@ class Device(Panel, bpy.types.Panel):
         row.menu(Presets.bl_idname, text=settings.own_preset or title(settings.preset))
         row.operator("digiclay.preset_save", text="", icon="ADD")
         row.operator("digiclay.preset_remove", text="", icon="REMOVE")
-        reason = properties.stale(bed)
+        reason = properties.rebuild_reason(bed)
         if reason:
             column = self.layout.column()
             column.alert = True

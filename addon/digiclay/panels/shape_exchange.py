@@ -75,7 +75,7 @@ class Export(Panel, bpy.types.Panel):
                 listed.label(text=line)
             if len(lines) > MOST:
                 listed.label(text="...")
-        kept = formed_bed.is_kept(bed)
+        kept = formed_bed.has_reference(bed)
         column = layout.column(align=True)
         column.label(text="Measured from the kept surface" if kept else "Measured from the bed at rest")
         row = column.row(align=True)

@@ -20,11 +20,11 @@ from ..core.session.render_settings import Film, Turntable
 from ..device import view
 from ..device.instant import Instant
 from . import stage
-from .film_file import encoded, frames_beside
-from .force_plot import SHARE, strip
-from .still import draw, dress, hasten, picture_scene
+from .film_file import encode_film, frame_folder
+from .force_plot import SHARE, draw_force_plot
+from .still import add_picture_scene, apply_style, render_picture, use_fast_settings
 
-__all__ = ["film", "turntable"]
+__all__ = ["render_film", "render_turntable"]
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -33,7 +33,7 @@ Progress = Callable[[int, int], None]
 LOOKS = 24
 
 
-def film(
+def render_film(
     history: Mapping[str, NDArray[Any]],
     out: Path,
     looks: Film,
@@ -76,21 +76,21 @@ def film(
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
-    with scratch(), frames_beside(out) as folder:
-        scene = picture_scene("Digital Clay Film", looks)
-        hasten(scene)
+    with scratch(), frame_folder(out) as folder:
+        scene = add_picture_scene("Digital Clay Film", looks)
+        use_fast_settings(scene)
         first = Instant.of(history, int(rows[0]), **sizes)
         bed = view.build(first, scene.collection, lowest=float(height.min()))
-        dress(bed, looks)
+        apply_style(bed, looks)
         left, right, below, above = stage.MARGINS
         front = stage.set_up(
             scene, bed, first,
-            points=_seen(bed, history, rows, sizes),
+            points=_visible_points(bed, history, rows, sizes),
             modes=[Mode(int(code)) for code in np.unique(history["mode"][used])],
             margins=(left, right, below + (SHARE if looks.strip else 0.0), above),
         )  # fmt: skip
         time, force = history["time"], history["total_force"]
-        chart = strip(front, time[used], force[used], set_point) if looks.strip else None
+        chart = draw_force_plot(front, time[used], force[used], set_point) if looks.strip else None
 
         def show(frame: int) -> None:
             row = int(rows[frame])
@@ -98,11 +98,11 @@ def film(
             if chart is not None:
                 chart.show(float(time[row]), float(force[row]))
 
-        drawn = _drawn(scene, folder, out, len(rows), show, progress, stopped)
-        return encoded(drawn, out, looks) if drawn else None
+        drawn = _render_frames(scene, folder, out, len(rows), show, progress, stopped)
+        return encode_film(drawn, out, looks) if drawn else None
 
 
-def turntable(
+def render_turntable(
     instant: Instant,
     out: Path,
     looks: Turntable,
@@ -117,35 +117,35 @@ def turntable(
     instant : Instant
         What the bed shows.
     out, looks, progress, stopped
-        As for `film`.
+        As for `render_film`.
 
     Returns
     -------
     Path or None
         `out`; None when it was stopped.
     """
-    with scratch(), frames_beside(out) as folder:
-        scene = picture_scene("Digital Clay Turntable", looks)
-        hasten(scene)
+    with scratch(), frame_folder(out) as folder:
+        scene = add_picture_scene("Digital Clay Turntable", looks)
+        use_fast_settings(scene)
         bed = view.build(instant, scene.collection)
-        dress(bed, looks)
+        apply_style(bed, looks)
         tip = view.fingertip_of(bed)
         if tip is not None and not looks.fingertip:
             for part in (*tip.children_recursive, tip):
                 bpy.data.objects.remove(part)
         points = stage.outline(bed)
-        turned = [_about_z(points, angle) for angle in np.arange(LOOKS) * (2.0 * np.pi / LOOKS)]
+        turned = [_turn(points, angle) for angle in np.arange(LOOKS) * (2.0 * np.pi / LOOKS)]
         stage.set_up(scene, bed, instant, points=np.concatenate(turned))
         angles = looks.angles()
 
         def show(frame: int) -> None:
             bed.rotation_euler = (0.0, 0.0, float(angles[frame]))
 
-        drawn = _drawn(scene, folder, out, looks.frames, show, progress, stopped)
-        return encoded(drawn, out, looks) if drawn else None
+        drawn = _render_frames(scene, folder, out, looks.frames, show, progress, stopped)
+        return encode_film(drawn, out, looks) if drawn else None
 
 
-def _seen(
+def _visible_points(
     bed: Any, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
 ) -> Floats:
     """Return what a film must have in its frame, (k, 3) in Blender units.
@@ -168,13 +168,13 @@ def _seen(
     return np.concatenate(clouds)
 
 
-def _about_z(points: Floats, angle: float) -> Floats:
+def _turn(points: Floats, angle: float) -> Floats:
     """Turn points about the vertical axis."""
     c, s = np.cos(angle), np.sin(angle)
-    return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def _drawn(
+def _render_frames(
     scene: Any,
     folder: Path,
     out: Path,
@@ -190,7 +190,7 @@ def _drawn(
             return []
         show(frame)
         files.append(folder / f"{frame:06d}.png")
-        draw(scene, files[-1], out)
+        render_picture(scene, files[-1], out)
         if progress:
             progress(frame + 1, count)
     return files

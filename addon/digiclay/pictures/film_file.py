@@ -13,13 +13,13 @@ from ..compat import bpy, quiet, strips, to_video
 from ..core.base.errors import OutputError
 from ..core.base.unfinished import name_unfinished
 from ..core.session.render_settings import Moving
-from .still import why_not
+from .still import failure_reason
 
-__all__ = ["encoded", "frames_beside", "whole_film"]
+__all__ = ["encode_film", "frame_folder", "is_whole_film"]
 
 
 @contextmanager
-def frames_beside(out: Path) -> Iterator[Path]:
+def frame_folder(out: Path) -> Iterator[Path]:
     """Give a folder for the frames beside the film, and take it away again."""
     folder = name_unfinished(out, "frames")
     try:
@@ -31,7 +31,7 @@ def frames_beside(out: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
+def encode_film(frames: list[Path], out: Path, looks: Moving) -> Path:
     """Make a film of pictures that lie in one folder.
 
     Parameters
@@ -56,15 +56,15 @@ def encoded(frames: list[Path], out: Path, looks: Moving) -> Path:
     try:
         with quiet():
             bpy.ops.render.render(animation=True, scene=scene.name)
-        if not partial.is_file() or not whole_film(partial.read_bytes()):
-            raise OutputError(f"{out} cannot be written: {why_not(partial)}.")
+        if not partial.is_file() or not is_whole_film(partial.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {failure_reason(partial)}.")
         os.replace(partial, out)
     except RuntimeError as error:
         raise OutputError(f"{out} cannot be written: {' '.join(str(error).split())}") from None
     return out
 
 
-def whole_film(data: bytes) -> bool:
+def is_whole_film(data: bytes) -> bool:
     """Return whether an MP4 file has all its parts, the last of which says where the frames are."""
     at, kinds = 0, []
     while at + 8 <= len(data):

@@ -12,7 +12,7 @@ from .. import bridge
 from ..compat import bpy
 from .legend import FADED, INK, LEFT, Front
 
-__all__ = ["SHARE", "Strip", "columns", "strip"]
+__all__ = ["SHARE", "ForcePlot", "draw_force_plot", "reduce_columns"]
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ LEAST = 0.05
 
 
 @dataclass(frozen=True)
-class Strip:
+class ForcePlot:
     """Force plot of one film.
 
     Attributes
@@ -73,7 +73,7 @@ class Strip:
         self.time.data.body = f"{time:.2f} s"
 
 
-def strip(front: Front, time: Floats, force: Floats, set_point: float | None) -> Strip:
+def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float | None) -> ForcePlot:
     """Draw the strip of a session.
 
     Parameters
@@ -89,13 +89,14 @@ def strip(front: Front, time: Floats, force: Floats, set_point: float | None) ->
     full = 2.0 * SHARE * front.height
     rise = (1.0 - LETTERS) * full
     top = max(LEAST, 1.1 * float(force.max()), 1.4 * (set_point or 0.0))
-    moments, highest = columns(time, force)
+    moments, highest = reduce_columns(time, force)
     lasts = max(float(time[-1] - time[0]), 1e-9)
     place, height = (moments - time[0]) * ((right - left) / lasts), highest * (rise / top)
     front.box("strip", (left, bottom), (right, bottom + rise), PAPER, 5)
     areas = []
+    corners = np.arange(len(place) - 1)[:, None] * 2 + [0, 2, 3, 1]
+    faces: list[tuple[int, ...]] = [tuple(face) for face in corners.tolist()]
     for name, colour, layer in (("to come", TO_COME, 4), ("been", BEEN, 3)):
-        faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(len(place) - 1)]
         area = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, height), faces)))
         areas.append(front.put(area, left, bottom, colour, layer))
     thick = max(0.010 * full, 0.5 * front.pixel)
@@ -108,10 +109,10 @@ def strip(front: Front, time: Floats, force: Floats, set_point: float | None) ->
     cursor = front.box("cursor", (left, bottom), (left + 1.5 * thick, bottom + rise), INK, 1)
     said = front.write("total force", size, left, above, INK)
     moment = front.write("time", size, right, above, FADED, "RIGHT")
-    return Strip(areas[1], cursor, said, moment, place, height, float(time[0]), (right - left) / lasts)
+    return ForcePlot(areas[1], cursor, said, moment, place, height, float(time[0]), (right - left) / lasts)
 
 
-def columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
+def reduce_columns(time: Floats, force: Floats, most: int = MOST) -> tuple[Floats, Floats]:
     """Return times and forces of at most so many columns: rows that share one give it their largest force.
 
     Parameters

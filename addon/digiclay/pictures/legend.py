@@ -16,7 +16,7 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
 
-__all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "of_forces", "of_modes"]
+__all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "write_force_legend", "write_mode_legend"]
 
 Colour = tuple[float, float, float]
 
@@ -71,7 +71,7 @@ class Front:
     @property
     def pixel(self) -> float:
         """Size of a pixel of the picture, Blender units."""
-        return 2.0 * self.width / self.scene.render.resolution_x
+        return 2.0 * self.width / float(self.scene.render.resolution_x)
 
     @property
     def letter(self) -> float:
@@ -151,7 +151,7 @@ class Front:
         return self.put(part, *low, colour, layer)
 
 
-def of_modes(front: Front, modes: Sequence[Mode]) -> None:
+def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
     """List modes down the picture's left side, each with a dot of its colour; small pictures explain none.
 
     Parameters
@@ -166,7 +166,7 @@ def of_modes(front: Front, modes: Sequence[Mode]) -> None:
     for mode in modes:
         name = mode.name.lower().replace("_", " ")
         lines = textwrap.wrap(MEANINGS[mode], 26) if front.explains else []
-        for radius, colour, layer in ((0.42, palettes.shown(mode), 0), (0.47, FADED, 1)):
+        for radius, colour, layer in ((0.42, palettes.colour_of(mode), 0), (0.47, FADED, 1)):
             dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
             dot.scale = (radius * size,) * 3
             front.put(dot, left, y + 0.33 * size, colour, layer)
@@ -178,7 +178,7 @@ def of_modes(front: Front, modes: Sequence[Mode]) -> None:
         y -= 1.25 * size
 
 
-def of_forces(front: Front) -> None:
+def write_force_legend(front: Front) -> None:
     """Draw the levels of force as a bar of colours down the picture's left side, their forces beside it."""
     size, count = front.letter, 1 + len(heat.COLOURS)
     left, top = LEFT * front.width, 0.78 * front.height

@@ -14,7 +14,7 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import Mode
 from ..device import view
 from ..device.instant import Instant
-from .legend import Front, of_forces, of_modes
+from .legend import Front, write_force_legend, write_mode_legend
 
 __all__ = ["MARGINS", "half_frame", "outline", "set_up"]
 
@@ -68,10 +68,10 @@ def set_up(
         _floor(scene, floor, 60.0 * span)
     _lights(scene)
     front = Front.before(scene, camera, half_frame(scene))
-    if view.coloured_by(bed) == "force":
-        of_forces(front)
+    if view.colour_source(bed) == "force":
+        write_force_legend(front)
     else:
-        of_modes(front, instant.modes if modes is None else modes)
+        write_mode_legend(front, instant.modes if modes is None else modes)
     return front
 
 

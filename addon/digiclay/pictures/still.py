@@ -14,7 +14,16 @@ from ..device import view
 from ..device.instant import Instant
 from . import stage
 
-__all__ = ["ENGINES", "draw", "dress", "hasten", "picture_scene", "render_still", "whole_picture", "why_not"]
+__all__ = [
+    "ENGINES",
+    "add_picture_scene",
+    "apply_style",
+    "failure_reason",
+    "is_whole_picture",
+    "render_picture",
+    "render_still",
+    "use_fast_settings",
+]
 
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
@@ -73,11 +82,11 @@ def render_still(
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with scratch():
-            scene = picture_scene("Digital Clay Still", looks, denoise=denoise)
+            scene = add_picture_scene("Digital Clay Still", looks, denoise=denoise)
             bed = view.build(instant, scene.collection)
-            dress(bed, looks)
+            apply_style(bed, looks)
             stage.set_up(scene, bed, instant)
-            draw(scene, partial, out)
+            render_picture(scene, partial, out)
         os.replace(partial, out)
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
@@ -86,7 +95,7 @@ def render_still(
     return out
 
 
-def dress(bed: Any, looks: Picture) -> None:
+def apply_style(bed: Any, looks: Picture) -> None:
     """Colour the pins as asked, and show arrows or not.
 
     Parameters
@@ -98,7 +107,7 @@ def dress(bed: Any, looks: Picture) -> None:
     view.show_arrows(bed, looks.arrows)
 
 
-def draw(scene: Any, path: Path, out: Path) -> None:
+def render_picture(scene: Any, path: Path, out: Path) -> None:
     """Draw a scene into a PNG file.
 
     Parameters
@@ -119,26 +128,26 @@ def draw(scene: Any, path: Path, out: Path) -> None:
         path.touch()
         with quiet():
             bpy.ops.render.render(write_still=True, scene=scene.name)
-        if not whole_picture(path.read_bytes()):
-            raise OutputError(f"{out} cannot be written: {why_not(path)}.")
+        if not is_whole_picture(path.read_bytes()):
+            raise OutputError(f"{out} cannot be written: {failure_reason(path)}.")
     except OSError as error:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
     except RuntimeError as error:
         raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
 
 
-def whole_picture(data: bytes) -> bool:
+def is_whole_picture(data: bytes) -> bool:
     """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
     return data[-8:-4] == b"IEND"
 
 
-def why_not(path: Path) -> str:
+def failure_reason(path: Path) -> str:
     """Return why Blender may not have written a file."""
     full = shutil.disk_usage(path.parent).free < SPACE
     return "no space is left on the disk" if full else "Blender wrote no whole file"
 
 
-def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
+def add_picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
     """Add a scene with all that decides a picture besides the scene's contents.
 
     Parameters
@@ -163,7 +172,7 @@ def picture_scene(name: str, looks: Picture, *, denoise: bool = True) -> Any:
     return scene
 
 
-def hasten(scene: Any) -> None:
+def use_fast_settings(scene: Any) -> None:
     """Leave out of a film's frames what costs Workbench most on a machine without a graphics card.
 
     Shadows are two thirds of a frame, and the second half of the samples can hardly be seen.

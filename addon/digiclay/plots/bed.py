@@ -116,7 +116,7 @@ def draw_relief(axes: Any, history: History) -> None:
         axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
 
 
-def _light(vertices: Floats, over: NDArray[np.int64]) -> Floats:
+def _light(vertices: Floats, over: NDArray[np.integer[Any]]) -> Floats:
     """Return how brightly each vertex of the skin is lit, in (0, 1], by normals averaged over its faces."""
     a, b, c = (vertices[over[:, corner]] for corner in range(3))
     normal = np.zeros_like(vertices)

@@ -54,7 +54,8 @@ def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **known
         from matplotlib.figure import Figure
     except ImportError:
         raise OutputError("Plots need matplotlib: run 'pip install digiclay[plots]'.") from None
-    with rc_context(dict(style)):
+    known_style: dict[Any, Any] = dict(style)
+    with rc_context(known_style):
         figure = Figure(figsize=(width, height), **known)
         FigureCanvasAgg(figure)
         yield figure

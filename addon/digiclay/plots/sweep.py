@@ -113,15 +113,14 @@ def _draw_line(axes: Axes, column: Column, values: Floats, label: str) -> None:
 
 def _draw_map(axes: Axes, scale: Axes, columns: Sequence[Column], values: Floats, label: str) -> None:
     """Draw a heat map: every point one cell of equal size, the first axis to the right."""
-    shown = np.ma.masked_invalid(values.T)
+    shown: Any = np.ma.masked_invalid(values.T)  # type: ignore[no-untyped-call]
+    names: tuple[Any, ...] = axes.set_xlabel, axes.set_ylabel
     axes.set_facecolor("#DDDDDD")
     field = axes.pcolormesh(shown, cmap="cividis", edgecolors="white", linewidth=0.6)
     axes.grid(False)
     for spine in axes.spines.values():
         spine.set_visible(False)
-    for column, ticks, name in zip(
-        columns, (axes.set_xticks, axes.set_yticks), (axes.set_xlabel, axes.set_ylabel), strict=True
-    ):
+    for column, ticks, name in zip(columns, (axes.set_xticks, axes.set_yticks), names, strict=True):
         read, along = _shown(column)
         words = [f"{value:.4g}" if column.numeric else str(value) for value in read]
         every = -(-len(words) // LABELS)

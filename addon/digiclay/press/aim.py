@@ -17,7 +17,7 @@ from ..device import view
 from ..live import running
 from ..settings import properties
 
-__all__ = ["Target", "meets", "on_screen", "surface", "target"]
+__all__ = ["Target", "find_target", "hit_point", "project", "read_surface"]
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Target:
         return int(self.grid.at(self.point[:1], self.point[1:2])[0])
 
 
-def target(context: Any, xy: tuple[float, float]) -> Target | None:
+def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
     """Return the nearest place on a visible bed under a pixel of the context's region.
 
     A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
@@ -65,8 +65,8 @@ def target(context: Any, xy: tuple[float, float]) -> Target | None:
         if not view.is_bed(bed):
             continue
         try:
-            cells, height = surface(bed)
-            point = meets(context, bed, cells, height, xy)
+            cells, height = read_surface(bed)
+            point = hit_point(context, bed, cells, height, xy)
         except DigiclayError:
             continue
         if point is None:
@@ -78,7 +78,7 @@ def target(context: Any, xy: tuple[float, float]) -> Target | None:
     return found
 
 
-def surface(bed: Any) -> tuple[Grid, Floats]:
+def read_surface(bed: Any) -> tuple[Grid, Floats]:
     """Return where a bed's pins stand and how high: from its session, or as they are drawn.
 
     Raises
@@ -86,13 +86,13 @@ def surface(bed: Any) -> tuple[Grid, Floats]:
     DigiclayError
         When the bed's settings do not describe it.
     """
-    session = running.of(bed)
+    session = running.find(bed)
     if session is not None:
         return session.system.grid, session.state.row(0)
     return grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
 
 
-def meets(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
+def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
     """Return where the ray through a pixel meets a bed's pins (3,), m; None when it passes by.
 
     Parameters
@@ -114,7 +114,7 @@ def meets(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, 
     return meeting(cells, height, origin, direction)
 
 
-def on_screen(context: Any, bed: Any, points: Floats) -> Floats:
+def project(context: Any, bed: Any, points: Floats) -> Floats:
     """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN.
 
     Parameters

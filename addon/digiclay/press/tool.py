@@ -16,7 +16,7 @@ from ..live import running
 from ..overlay.picture import Line
 from . import aim
 
-__all__ = ["PressTool", "outline", "register", "unregister"]
+__all__ = ["PressTool", "register", "touch_outline", "unregister"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -24,7 +24,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 
 
-def outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
+def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
     """Return the rim of what a bed's finger would touch at a place, lying on the pins, (k, 3), m.
 
     Parameters
@@ -51,14 +51,14 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     region = context.region
     if region is None or region.type != "WINDOW" or context.mode != "OBJECT":
         return
-    found = aim.target(context, (xy[0] - region.x, xy[1] - region.y))
+    found = aim.find_target(context, (xy[0] - region.x, xy[1] - region.y))
     if found is None or view.fingertip_of(found.bed) is None:
         return
     depth = 1e-3 * tool.operator_properties("digiclay.press").depth
-    rim = outline(found.bed, found.grid, found.height, found.point, depth)
+    rim = touch_outline(found.bed, found.grid, found.height, found.point, depth)
     drawn = [np.concatenate([rim, rim[:1]]), *_trail(found)]
     corner = np.array([region.x, region.y])
-    lines = [corner + aim.on_screen(context, found.bed, points) for points in drawn]
+    lines = [corner + aim.project(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     cursor([Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown])
@@ -66,7 +66,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
 
 def _trail(found: aim.Target) -> list[Floats]:
     """Return what the finger has still to go along, and its rim where it is now, on the pins; or nothing."""
-    session = running.of(found.bed)
+    session = running.find(found.bed)
     if session is None or not session.strokes:
         return []
     finger, pose = find_ellipsoid(session.scene), session.pose

@@ -21,9 +21,9 @@ from ..core.session.take import Take
 from ..device import view
 from ..device.instant import pick_pose
 from ..device.roles import BAKE
-from .bake_tree import MOMENT, pins_at_moment
+from .bake_tree import MOMENT, playback_nodes
 
-__all__ = ["Moments", "apply", "frames_in", "free", "is_baked", "moments_of", "sampled"]
+__all__ = ["BakedFrames", "apply", "frame_periods", "free", "is_baked", "sample_path", "simulate_frames"]
 
 Floats = NDArray[np.float64]
 #: Name of the modifier.
@@ -33,7 +33,7 @@ MOST_FRAMES = 216_000
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
+class BakedFrames:
     """Content of a bake, a row a frame.
 
     Attributes
@@ -56,7 +56,7 @@ class Moments:
     pose: Floats
 
 
-def frames_in(take: Take, rate: float) -> NDArray[np.intp]:
+def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
     """Return the control period, 0 to t, that each frame of a take shows: the nearest one.
 
     Parameters
@@ -67,10 +67,10 @@ def frames_in(take: Take, rate: float) -> NDArray[np.intp]:
     """
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
-    return np.minimum(np.rint(np.arange(count) / (rate * period)).astype(np.intp), take.periods)
+    return np.asarray(np.minimum(np.rint(np.arange(count) / (rate * period)), take.periods), np.intp)
 
 
-def moments_of(take: Take, rate: float) -> Iterator[float | Moments]:
+def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     """Simulate a take and keep what each frame shows.
 
     Parameters
@@ -82,9 +82,9 @@ def moments_of(take: Take, rate: float) -> Iterator[float | Moments]:
     Yields
     ------
     float
-        The share that is done, after each control period; last of all the `Moments`.
+        The share that is done, after each control period; last of all the `BakedFrames`.
     """
-    wanted = frames_in(take, rate)
+    wanted = frame_periods(take, rate)
     system = assemble(take.scene)
     count = system.grid.count
     height = np.empty((wanted.size, count), np.float32)
@@ -96,10 +96,10 @@ def moments_of(take: Take, rate: float) -> Iterator[float | Moments]:
             mode[frame] = state.mode()
             frame += 1
         yield period / take.periods
-    yield Moments(system.grid.positions, height, mode, force, take.poses[wanted])
+    yield BakedFrames(system.grid.positions, height, mode, force, take.poses[wanted])
 
 
-def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
+def apply(bed: Any, moments: BakedFrames, first: int, finger: Fingertip, *, keyframe_finger: bool) -> None:
     """Give a bed a bake, in place of an older one.
 
     Parameters
@@ -115,11 +115,13 @@ def apply(bed: Any, moments: Moments, first: int, finger: Fingertip, *, keyframe
     free(bed)
     count = len(moments.height)
     modifier = bed.modifiers.new(MODIFIER, "NODES")
-    held = _held(moments)
-    modifier.node_group = pins_at_moment(held, count)
+    held = _make_source(moments)
+    modifier.node_group = playback_nodes(held, count)
     sources = view.sources_of(bed)
     if sources is not None:
-        sources.objects.link(held)  # as `view.guard` has it: appended, the bed leaves it out of the scene
+        sources.objects.link(
+            held
+        )  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]
     own_curves(bed)
@@ -161,7 +163,7 @@ def free(bed: Any) -> bool:
     return True
 
 
-def sampled(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
+def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
     """Read the path of an animated fingertip, frame by frame and in between.
 
     Parameters
@@ -230,14 +232,14 @@ def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:
         yield from ((group, curve) for curve in group if start and curve.data_path.startswith(start))
 
 
-def _held(moments: Moments) -> Any:
+def _make_source(moments: BakedFrames) -> Any:
     """Make the object that holds the pins moment after moment; it stands in no scene."""
     count, pins = moments.height.shape
     mesh = bridge.points("Digital Clay Bake", count * pins)
     bridge.write_cells(
         mesh,
         np.tile(moments.position, (count, 1)),
-        moments.height.ravel(),
+        moments.height.ravel().astype(np.float64),
         mode=moments.mode.ravel(),
         force=moments.force.ravel(),
     )

@@ -12,13 +12,13 @@ from ..bridge import ATTRIBUTES
 from ..compat import bpy
 from ..device.nodes import attribute, node, number, socket
 
-__all__ = ["MOMENT", "pins_at_moment"]
+__all__ = ["MOMENT", "playback_nodes"]
 
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
 MOMENT = "Moment"
 
 
-def pins_at_moment(bake: Any, moments: int) -> Any:
+def playback_nodes(bake: Any, moments: int) -> Any:
     """Make the node group that moves the pins of a bed to where they were at a moment.
 
     Parameters
@@ -52,11 +52,11 @@ def pins_at_moment(bake: Any, moments: int) -> Any:
     blend.data_type = "VECTOR"
     tree.links.new(part, blend.inputs["Factor"])
     for end, index, row in (("A", first, 0), ("B", second, 1)):
-        sampled = _sampled(tree, table, place, "FLOAT_VECTOR", index, row)
-        tree.links.new(sampled, _usable(blend.inputs, end))
+        sampled = _sample(tree, table, place, "FLOAT_VECTOR", index, row)
+        tree.links.new(sampled, _enabled_socket(blend.inputs, end))
     moved = node(tree, "GeometryNodeSetPosition", 9, 0)
     tree.links.new(settings.outputs["Geometry"], moved.inputs["Geometry"])
-    tree.links.new(_usable(blend.outputs, "Result"), moved.inputs["Position"])
+    tree.links.new(_enabled_socket(blend.outputs, "Result"), moved.inputs["Position"])
 
     shown = moved.outputs["Geometry"]
     for row, (name, (kind, _, _)) in enumerate(ATTRIBUTES.items(), 3):
@@ -64,23 +64,23 @@ def pins_at_moment(bake: Any, moments: int) -> Any:
         stored.data_type, stored.domain = kind, "POINT"
         stored.inputs["Name"].default_value = name
         value = attribute(tree, name, kind, 6, row)
-        tree.links.new(_sampled(tree, table, value, kind, first, row), _usable(stored.inputs, "Value"))
+        tree.links.new(_sample(tree, table, value, kind, first, row), _enabled_socket(stored.inputs, "Value"))
         tree.links.new(shown, stored.inputs["Geometry"])
         shown = stored.outputs["Geometry"]
     tree.links.new(shown, result.inputs["Geometry"])
     return tree
 
 
-def _sampled(tree: Any, table: Any, value: Any, kind: str, index: Any, row: float) -> Any:
+def _sample(tree: Any, table: Any, value: Any, kind: str, index: Any, row: float) -> Any:
     """Add the node that reads a value of the bake's vertices at a place among them."""
     sample = node(tree, "GeometryNodeSampleIndex", 7, row)
     sample.data_type, sample.domain = kind, "POINT"
     tree.links.new(table, sample.inputs["Geometry"])
-    tree.links.new(value, _usable(sample.inputs, "Value"))
+    tree.links.new(value, _enabled_socket(sample.inputs, "Value"))
     tree.links.new(index, sample.inputs["Index"])
-    return _usable(sample.outputs, "Value")
+    return _enabled_socket(sample.outputs, "Value")
 
 
-def _usable(sockets: Any, name: str) -> Any:
+def _enabled_socket(sockets: Any, name: str) -> Any:
     """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
     return next(one for one in sockets if one.name == name and one.enabled)

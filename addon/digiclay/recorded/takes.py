@@ -18,7 +18,16 @@ from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
 __all__ = [
-    "START", "Entry", "entries", "find", "keep", "keep_recorded", "read", "recorded", "remove", "simulate",
+    "START",
+    "Entry",
+    "add",
+    "find",
+    "keep_recording",
+    "list_takes",
+    "read",
+    "read_recording",
+    "remove",
+    "simulate",
 ]  # fmt: skip
 
 #: The bed's property that holds them, by number.
@@ -46,7 +55,7 @@ class Entry(NamedTuple):
     seconds: float
 
 
-def entries(bed: Any) -> list[Entry]:
+def list_takes(bed: Any) -> list[Entry]:
     """Return the takes of a bed, oldest first."""
     held = bed.get(PROPERTY)
     numbers = sorted(held.keys(), key=int) if held else []
@@ -67,7 +76,7 @@ def find(bed: Any, number: str = "") -> Entry:
     DigiclayError
         When the bed has none, or none of that number.
     """
-    known = entries(bed)
+    known = list_takes(bed)
     if not known and not number:
         raise DigiclayError(f"{bed.name} has no take: record one in a session first.")
     found = [entry for entry in known if number in ("", entry.number)]
@@ -77,14 +86,14 @@ def find(bed: Any, number: str = "") -> Entry:
     return found[-1]
 
 
-def recorded(session: Running) -> Take | None:
+def read_recording(session: Running) -> Take | None:
     """Return what a session has recorded, or None when that is nothing yet."""
     if session.recording is None or len(session.recording.path) < 2:
         return None
-    return Take(session.scene, session.recording.start, session.recording.path.copy(), session.kept)
+    return Take(session.scene, session.recording.start, session.recording.path.copy(), session.snapshot)
 
 
-def keep(bed: Any, take: Take, name: str = "") -> Entry:
+def add(bed: Any, take: Take, name: str = "") -> Entry:
     """Add a take to a bed; without a name it gets its number.
 
     Parameters
@@ -101,7 +110,7 @@ def keep(bed: Any, take: Take, name: str = "") -> Entry:
     return Entry(number, held[number]["name"], take.duration)
 
 
-def keep_recorded(bed: Any, session: Running) -> str:
+def keep_recording(bed: Any, session: Running) -> str:
     """Keep what a session has recorded before its recording ends; return words about it, empty without.
 
     Parameters
@@ -109,10 +118,10 @@ def keep_recorded(bed: Any, session: Running) -> str:
     bed : bpy.types.Object
     session : Running
     """
-    take = recorded(session)
+    take = read_recording(session)
     if take is None:
         return ""
-    entry = keep(bed, take)
+    entry = add(bed, take)
     return f"The recording ended and was kept as {entry.name} ({entry.seconds:.1f} s)"
 
 

@@ -13,9 +13,9 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.named_shapes import SHAPES
-from .shown_units import shown, unit_of
+from .shown_units import to_shown, unit_of
 
-__all__ = ["INT_MAX", "Update", "group", "listed", "title"]
+__all__ = ["INT_MAX", "Update", "format_list", "group", "title"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
@@ -57,7 +57,7 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
     known: Quantity = field.metadata["quantity"]
     default = field.default
     unit, power = unit_of(known.unit, default)
-    said = {
+    said: dict[str, Any] = {
         "name": f"{title(field.name)} ({unit})" if unit else title(field.name),
         "description": _tooltip(known, default, unit, power),
         "update": update,
@@ -73,13 +73,13 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
     if isinstance(default, float):
         return bpy.props.FloatProperty(**_numbers(known, default, power), **said)
     if isinstance(default, tuple):
-        return bpy.props.StringProperty(default=listed(default, power), **said)
+        return bpy.props.StringProperty(default=format_list(default, power), **said)
     if field.name in SHAPED:
         said |= {"search": _shapes, "search_options": {"SUGGESTION"}}
     return bpy.props.StringProperty(default=default, **said)
 
 
-def listed(values: tuple[float, ...], power: int) -> str:
+def format_list(values: tuple[float, ...], power: int) -> str:
     """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``.
 
     Parameters
@@ -89,13 +89,13 @@ def listed(values: tuple[float, ...], power: int) -> str:
     power : int
         Of ten, shown units per SI unit.
     """
-    return ", ".join(repr(shown(value, power)).removesuffix(".0") for value in values)
+    return ", ".join(repr(to_shown(value, power)).removesuffix(".0") for value in values)
 
 
 def _numbers(known: Quantity, default: float, power: int) -> dict[str, Any]:
     """Return default, range, and how a number is shown and dragged."""
-    start = shown(default, power)
-    least = shown(EXTENTS[known.unit][0], power)
+    start = to_shown(default, power)
+    least = to_shown(EXTENTS[known.unit][0], power)
     inside = max(INSIDE * (abs(start) or 1.0), (1.0 + INSIDE) * least)
     reach = REACH * (abs(start) or 0.1)
     low, high = (
@@ -117,8 +117,8 @@ def _numbers(known: Quantity, default: float, power: int) -> dict[str, Any]:
 def _bound(closed: float | None, opened: float | None, power: int, inside: float) -> float | None:
     """Return an end of a range in the unit shown; an end that is not allowed itself is moved inside."""
     if closed is not None:
-        return shown(float(closed), power)
-    return None if opened is None else shown(float(opened), power) + inside
+        return to_shown(float(closed), power)
+    return None if opened is None else to_shown(float(opened), power) + inside
 
 
 def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
@@ -126,7 +126,7 @@ def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
 
     def value(number: float) -> str:
         plain = isinstance(default, int)
-        return f"{number if plain else shown(float(number), power):.6g} {unit}".rstrip()
+        return f"{number if plain else to_shown(float(number), power):.6g} {unit}".rstrip()
 
     bounds = (
         ("above", known.above),
@@ -138,7 +138,7 @@ def _tooltip(known: Quantity, default: object, unit: str, power: int) -> str:
     parts += [f"symbol {known.symbol}"] if known.symbol else []
     parts += [f"{word} {value(number)}" for word, number in bounds if number is not None]
     if isinstance(default, tuple):
-        parts.append(f"separated by commas, by default {listed(default, power)} {unit}".rstrip())
+        parts.append(f"separated by commas, by default {format_list(default, power)} {unit}".rstrip())
     elif isinstance(default, (int, float)):
         parts.append(f"by default {value(default)}")
     return "; ".join(parts)

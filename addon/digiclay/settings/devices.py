@@ -14,10 +14,10 @@ from .own_presets import path
 if TYPE_CHECKING:
     from ..core.control.blister import Blister
 
-__all__ = ["device", "laid_out"]
+__all__ = ["change_layout", "make_scene"]
 
 
-def device(preset: str, layout: Layout, method: str) -> Scene:
+def make_scene(preset: str, layout: Layout, method: str) -> Scene:
     """Return the scene of a preset, with another plan of the bed and another method.
 
     Parameters
@@ -35,15 +35,15 @@ def device(preset: str, layout: Layout, method: str) -> Scene:
     """
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
-        return laid_out(resolve({"preset": preset, **control}), layout)
+        return change_layout(resolve({"preset": preset, **control}), layout)
     scene = load(path(preset))
     if scene.method != method:
         plain = resolve(control)
         scene = replace(scene, method=method, control=plain.control, blister=plain.blister)
-    return laid_out(scene, layout)
+    return change_layout(scene, layout)
 
 
-def laid_out(scene: Scene, layout: Layout) -> Scene:
+def change_layout(scene: Scene, layout: Layout) -> Scene:
     """Return a scene with another plan of the bed; a blister wider than the bed is made to fit.
 
     Parameters
@@ -51,10 +51,10 @@ def laid_out(scene: Scene, layout: Layout) -> Scene:
     scene : Scene
     layout : Layout
     """
-    return replace(scene, layout=layout, blister=_fitted(scene.blister, layout))
+    return replace(scene, layout=layout, blister=_fit_blister(scene.blister, layout))
 
 
-def _fitted(blister: Blister | None, layout: Layout) -> Blister | None:
+def _fit_blister(blister: Blister | None, layout: Layout) -> Blister | None:
     """Return a blister that is at most as wide as the longer side of a bed, in the same proportions."""
     if blister is None:
         return None

@@ -9,6 +9,7 @@ from .. import bridge
 from ..compat import bpy
 from ..core.base.quantity import quantities
 from ..core.control.methods import METHODS
+from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
@@ -92,9 +93,8 @@ def take_size(fingertip: Any, context: Any) -> None:
     """
     bed = fingertip.id_data
     tip = view.fingertip_of(bed)
-    kind = import_parameters("fingertip", bed.digiclay.method)
     if tip is not None:
-        bridge.resize_fingertip(tip, kind(**read(fingertip, kind, {}, "fingertip")))
+        bridge.resize_fingertip(tip, Fingertip(**read(fingertip, Fingertip, {}, "fingertip")))
 
 
 #: What happens after a change, by section and field.
@@ -127,7 +127,7 @@ def use_properties() -> dict[str, Any]:
     return switches
 
 
-def made(name: str, words: str, properties: dict[str, Any]) -> type:
+def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
     """Make a property group of properties.
 
     Parameters
@@ -147,12 +147,12 @@ def pointers(groups: dict[str, type]) -> dict[str, Any]:
 
 
 METHOD_GROUPS = {name: group(name, import_parameters("control", name), {}) for name in METHODS}
-CONTROL = made("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
+CONTROL = make_group("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
 GROUPS = {
     section: group(section, import_parameters(section, "virtual_master"), UPDATES.get(section, {}))
     for section in PLAIN
 }
-SETTINGS = made(
+SETTINGS = make_group(
     "settings",
     "Every parameter of a bed's scene.",
     {

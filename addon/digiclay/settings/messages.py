@@ -9,14 +9,14 @@ from ..core.base.quantity import quantities
 from ..core.control.methods import METHODS
 from ..core.scene.schema import SECTIONS, import_parameters
 from .declared import title
-from .shown_units import in_words
+from .shown_units import convert_units
 
-__all__ = ["named"]
+__all__ = ["relabel"]
 
 _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 
 
-def named(error: ParameterError) -> ParameterError:
+def relabel(error: ParameterError) -> ParameterError:
     """Return an error of the core with its owner, field, rule and value as the panels show them.
 
     ``layout.pitch must be at least actuator.bore, 0.002 m (got 0.001 m)`` becomes
@@ -30,8 +30,8 @@ def named(error: ParameterError) -> ParameterError:
     if owner in SECTIONS:
         owner = f"{title(owner)}: {field}" if field else title(owner)
         field = ""
-    rule = in_words(_NAME.sub(labelled, error.rule))
-    return ParameterError(owner, field, rule, in_words(error.value), error.hint)
+    rule = convert_units(_NAME.sub(labelled, error.rule))
+    return ParameterError(owner, field, rule, convert_units(error.value), error.hint)
 
 
 def _known(section: str) -> set[str]:

@@ -6,20 +6,38 @@ A scene is made of them and of nothing else, so what the panels show is what is 
 from __future__ import annotations
 
 import json
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import bridge
 from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters
 from ..core.control.methods import METHODS
+from ..core.model.layout import Layout, grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
-from ..device.pins_drawn import differs
 from .groups import CLASSES, SETTINGS
-from .messages import named
+from .messages import relabel
 from .table import Notes, read, write
 
-__all__ = ["adopt", "described", "part_group", "register", "scene_of", "stale", "table_of", "unregister"]
+__all__ = [
+    "part_group",
+    "read_scene",
+    "rebuild_reason",
+    "register",
+    "scene_of",
+    "table_of",
+    "unregister",
+    "write_scene",
+]
+
+#: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
+#: a bed of metres, less than any change of pitch worth making.
+AWAY = 1e-6
 
 
 def scene_of(bed: Any) -> Scene:
@@ -34,8 +52,8 @@ def scene_of(bed: Any) -> Scene:
     ParameterError
         Its owner and field are those of the panels.
     """
-    scene = described(bed)
-    reason = differs(bed, scene.layout)
+    scene = read_scene(bed)
+    reason = _layout_mismatch(bed, scene.layout)
     if reason:
         plan = scene.layout
         rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in the Device panel."
@@ -43,12 +61,12 @@ def scene_of(bed: Any) -> Scene:
     return scene
 
 
-def described(bed: Any) -> Scene:
+def read_scene(bed: Any) -> Scene:
     """Return the scene a bed's settings describe, whatever the bed looks like by now; as `scene_of`."""
     try:
         return resolve(table_of(bed))
     except ParameterError as error:
-        raise named(error) from None
+        raise relabel(error) from None
 
 
 def table_of(bed: Any) -> dict[str, Any]:
@@ -77,7 +95,7 @@ def table_of(bed: Any) -> dict[str, Any]:
     return table
 
 
-def adopt(bed: Any, scene: Scene) -> None:
+def write_scene(bed: Any, scene: Scene) -> None:
     """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused.
 
     Parameters
@@ -100,12 +118,11 @@ def adopt(bed: Any, scene: Scene) -> None:
     settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
 
 
-def stale(bed: Any) -> str:
+def rebuild_reason(bed: Any) -> str:
     """Return why a bed no longer shows the pins its settings describe, or an empty text."""
     settings = bed.digiclay
     notes = _notes(settings).get("layout", {})
-    kind = import_parameters("layout", settings.method)
-    return differs(bed, kind(**read(settings.layout, kind, notes, "layout")))
+    return _layout_mismatch(bed, Layout(**read(settings.layout, Layout, notes, "layout")))
 
 
 def part_group(settings: Any, section: str) -> Any:
@@ -155,3 +172,28 @@ def _path(value: Any) -> Any:
 def _printable(name: str) -> str:
     """Return an object's name as a scene may have it."""
     return "".join(letter if letter.isprintable() else " " for letter in name)
+
+
+def _layout_mismatch(bed: Any, layout: Layout) -> str:
+    """Return why a bed is not the one a layout describes, or an empty text.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    layout : Layout
+    """
+    pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
+    if pins != wanted:
+        return f"The bed has {pins} pins, not {wanted}"
+    for index, place in _told_apart(layout):
+        if np.abs(np.array(bed.data.vertices[index].co[:2]) / bridge.SCALE - place).max() > AWAY:
+            return "The pins stand elsewhere than Layout says"
+    return ""
+
+
+@lru_cache(maxsize=32)
+def _told_apart(layout: Layout) -> tuple[tuple[int, NDArray[np.float64]], ...]:
+    """Return index and place of the pins that tell layouts of as many pins apart, m."""
+    places = grid(layout).positions
+    last = layout.rows * layout.columns - 1
+    return tuple((index, places[index]) for index in sorted({0, min(layout.columns, last), last}))

@@ -6,7 +6,7 @@ import math
 import re
 from decimal import Decimal
 
-__all__ = ["SHOWN", "in_words", "shown", "si", "unit_of"]
+__all__ = ["SHOWN", "convert_units", "to_shown", "to_si", "unit_of"]
 
 #: The unit shown for an SI unit, and the power of ten between them: 1 m is 10³ mm.
 SHOWN: dict[str, tuple[str, int]] = {
@@ -42,7 +42,7 @@ def unit_of(unit: str, default: object) -> tuple[str, int]:
     return SHOWN.get(unit, (unit, 0))
 
 
-def shown(value: float, power: int) -> float:
+def to_shown(value: float, power: int) -> float:
     """Return an SI value in the unit it is shown in, free of the noise of a product: 0.003 m is 3 mm.
 
     Parameters
@@ -55,7 +55,7 @@ def shown(value: float, power: int) -> float:
     return float(Decimal(repr(value)).scaleb(power))
 
 
-def si(value: float, power: int) -> float:
+def to_si(value: float, power: int) -> float:
     """Return the SI value of a number kept by Blender in 32 bits.
 
     The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
@@ -73,11 +73,11 @@ def si(value: float, power: int) -> float:
     return float(Decimal(f"{value:.{DIGITS}g}").scaleb(-power))
 
 
-def in_words(text: str) -> str:
+def convert_units(text: str) -> str:
     """Return a message with its lengths, speeds and pressures in the units a person reads."""
 
     def converted(found: re.Match[str]) -> str:
         name, power = SHOWN[found[2]]
-        return f"{shown(float(found[1]), power):g} {name}"
+        return f"{to_shown(float(found[1]), power):g} {name}"
 
     return _MEASURED.sub(converted, text)

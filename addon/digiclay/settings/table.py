@@ -12,8 +12,8 @@ from typing import Any
 
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters
-from .declared import INT_MAX, listed
-from .shown_units import shown, si, unit_of
+from .declared import INT_MAX, format_list
+from .shown_units import to_shown, to_si, unit_of
 
 __all__ = ["Notes", "assign", "read", "reset", "write"]
 
@@ -54,9 +54,9 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
     """
     power = _power(_fields(kind)[name])
     if isinstance(value, tuple):
-        value = listed(value, power)
+        value = format_list(value, power)
     elif isinstance(value, float):
-        value = shown(value, power)
+        value = to_shown(value, power)
     elif isinstance(value, int) and not isinstance(value, bool):
         value = min(value, INT_MAX)
     setattr(group, name, value)
@@ -119,4 +119,4 @@ def _meant(kept: Any, field: dataclasses.Field[Any]) -> Any:
     """Return the value a property stands for."""
     if isinstance(field.default, tuple):
         return tuple(float(Decimal(word.strip()).scaleb(-_power(field))) for word in kept.split(","))
-    return si(kept, _power(field)) if isinstance(kept, float) else kept
+    return to_si(kept, _power(field)) if isinstance(kept, float) else kept

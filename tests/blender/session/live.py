@@ -59,7 +59,7 @@ def press(bed: Any, clock: Clock, x: float = 0.0) -> None:
 def exact(bed: Any) -> np.ndarray:
     """Return the pin tops the bed keeps, exactly, m."""
     system = assemble(properties.scene_of(bed))
-    kept = bed_state.kept(bed)
+    kept = bed_state.read_snapshot(bed)
     return (begin(system) if kept is None else snapshot.load(system, kept)).row(0)
 
 
@@ -85,17 +85,17 @@ def waits(bed: Any, clock: Clock, *, words: str) -> None:
     """Check that the session waits, says why once, and stands still."""
     notes = clock.tick(3)
     assert [note.level for note in notes] == ["WARNING"]
-    assert words in notes[0].words
-    session = running.all()[0]
-    assert words in session.waits
+    assert words in notes[0].message
+    session = running.list_sessions()[0]
+    assert words in session.blocking_reason
     period = session.state.period
     assert clock.tick(3) == []
-    assert running.all()[0].state.period == period
+    assert running.list_sessions()[0].state.period == period
 
 
 def goes_on(clock: Clock) -> None:
     """Check that the session says that it goes on, and does."""
-    period = running.all()[0].state.period
+    period = running.list_sessions()[0].state.period
     notes = clock.tick(handlers.STALE + 3)
-    assert ["goes on" in note.words for note in notes] == [True]
-    assert running.all()[0].state.period > period
+    assert ["goes on" in note.message for note in notes] == [True]
+    assert running.list_sessions()[0].state.period > period

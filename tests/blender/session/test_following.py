@@ -37,10 +37,10 @@ def test_the_bed_forms_while_the_fingertip_moves(bed: Any, clock: Clock) -> None
 def test_the_bed_keeps_and_shows_what_the_session_is(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock)
-    session = running.of(bed)
+    session = running.find(bed)
     assert session is not None
-    assert bed_state.kept(bed) == snapshot.dump(session.system, session.state)
-    assert np.array_equal(bed_state.pose(bed), session.pose)
+    assert bed_state.read_snapshot(bed) == snapshot.dump(session.system, session.state)
+    assert np.array_equal(bed_state.read_pose(bed), session.pose)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3
 
@@ -101,7 +101,7 @@ def test_several_beds_go_on_at_once_each_with_its_own_fingertip(bed: Any, clock:
     press(other, clock)
     assert (exact(bed) == 40e-3).all()
     assert exact(other).min() < 39e-3
-    assert len(running.all()) == 2
+    assert len(running.list_sessions()) == 2
 
 
 def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed: Any, clock: Clock) -> None:
@@ -110,16 +110,16 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     before = exact(bed)
     bed.digiclay.method = "plastic"
     notes = clock.tick(tick.LOOK)
-    assert ["heights were taken up" in note.words for note in notes] == [True]
+    assert ["heights were taken up" in note.message for note in notes] == [True]
     np.testing.assert_allclose(exact(bed), before, rtol=0, atol=1e-5)  # pins were still coming to rest
-    assert running.of(bed).scene.method == "plastic"
+    assert running.find(bed).scene.method == "plastic"
 
 
 def test_a_parameter_that_is_changed_in_mid_session_takes_effect(bed: Any, clock: Clock) -> None:
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
     assert clock.tick(tick.LOOK) == []
-    assert running.of(bed).scene.set_point == SetPoint(0.8)
+    assert running.find(bed).scene.set_point == SetPoint(0.8)
 
 
 def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> None:
@@ -135,8 +135,8 @@ def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> Non
 def test_recorded_poses_are_those_of_the_fingertip(bed: Any, clock: Clock) -> None:
     started(bed)
     clock.tick(2)
-    running.put(sculpting.recording(running.of(bed), True))
+    running.put(sculpting.set_recording(running.find(bed), True))
     move(bed, clock, [(0.0, 46.0), (3.0, 45.0), (6.0, 40.0)])
-    path = running.of(bed).path
-    np.testing.assert_allclose(path[-1, 0], [6e-3, 0, 40e-3, 1, 0, 0, 0], rtol=0, atol=FLOAT32)
+    path = running.find(bed).path
+    np.testing.assert_allclose(path[-1], [6e-3, 0, 40e-3, 1, 0, 0, 0], rtol=0, atol=FLOAT32)
     assert len(path) == pytest.approx(1 + 3 * TICK / 5e-3, abs=1)

@@ -29,12 +29,12 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     bpy.ops.ed.undo_push(message="Start")
     press(bed, clock, -6.0)
     bpy.ops.ed.undo_push(message="First")
-    first = bed_state.kept(bed)
+    first = bed_state.read_snapshot(bed)
     press(bed, clock, 6.0)
     bpy.ops.ed.undo_push(message="Second")
-    second = bed_state.kept(bed)
+    second = bed_state.read_snapshot(bed)
     undone(clock)
-    session = running.of(only_bed())
+    session = running.find(only_bed())
     assert session is not None
     assert snapshot.dump(session.system, session.state) == first
     assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
@@ -44,7 +44,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     bpy.ops.ed.redo()
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
-    assert bed_state.kept(only_bed()) == second
+    assert bed_state.read_snapshot(only_bed()) == second
     press(only_bed(), clock)
     assert exact(only_bed())[6 * 13 + 6] < 39e-3
 
@@ -74,8 +74,8 @@ def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock:
     bpy.ops.ed.undo()
     notes = clock.tick()
     assert [note.level for note in notes] == ["WARNING"]
-    assert "was deleted" in notes[0].words
-    assert running.all() == ()
+    assert "was deleted" in notes[0].message
+    assert running.list_sessions() == ()
 
 
 def reloaded(tmp_path: Path) -> Any:
@@ -89,12 +89,12 @@ def reloaded(tmp_path: Path) -> Any:
 def test_a_file_saved_in_mid_session_goes_on_bit_for_bit(bed: Any, clock: Clock, tmp_path: Path) -> None:
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)
-    kept, periods = bed_state.kept(bed), running.of(bed).state.period
+    kept, periods = bed_state.read_snapshot(bed), running.find(bed).state.period
     bed = reloaded(tmp_path)
-    assert running.all() == ()
-    assert "another file was loaded" in running.said()
+    assert running.list_sessions() == ()
+    assert "another file was loaded" in running.last_message()
     started(bed)
-    session = running.of(bed)
+    session = running.find(bed)
     assert snapshot.dump(session.system, session.state) == kept
     assert session.state.period == periods
 
@@ -105,25 +105,25 @@ def test_a_crash_recovered_file_has_the_state_of_the_last_tick(
     # What Blender saves by itself is the open file as it stands, without asking anybody.
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)
-    kept = bed_state.kept(bed)
+    kept = bed_state.read_snapshot(bed)
     path = str(tmp_path / "recovery.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     move(bed, clock, [(0.0, 46.0)] * 10)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert bed_state.kept(only_bed()) == kept
+    assert bed_state.read_snapshot(only_bed()) == kept
 
 
 def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock)
-    kept = bed_state.kept(bed)
+    kept = bed_state.read_snapshot(bed)
     bpy.ops.object.duplicate()
     copy = bpy.context.object
     assert copy != bed
-    assert running.of(copy) is None
+    assert running.find(copy) is None
     notes = tick.start(bpy.context, copy)
-    assert ["new fingertip" in note.words for note in notes] == [True]
-    assert bed_state.kept(copy) == kept
+    assert ["new fingertip" in note.message for note in notes] == [True]
+    assert bed_state.read_snapshot(copy) == kept
     press(copy, clock, 6.0)
     assert np.abs(exact(copy) - exact(bed)).max() > 1e-3
 
@@ -133,7 +133,7 @@ def test_a_linked_duplicate_gets_pins_of_its_own(bed: Any, clock: Clock) -> None
     copy = bpy.context.object
     assert copy.data == bed.data
     notes = tick.start(bpy.context, copy)
-    assert any("pins of its own" in note.words for note in notes)
+    assert any("pins of its own" in note.message for note in notes)
     press(copy, clock)
     np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
 
@@ -141,7 +141,7 @@ def test_a_linked_duplicate_gets_pins_of_its_own(bed: Any, clock: Clock) -> None
 def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
     started(bed)
     press(bed, clock)
-    kept, name = bed_state.kept(bed), bed.name
+    kept, name = bed_state.read_snapshot(bed), bed.name
     path = str(tmp_path / "library.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -150,7 +150,7 @@ def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Pat
     bpy.context.collection.objects.link(wanted.objects[0])
     appended = only_bed()
     notes = tick.start(bpy.context, appended)
-    session = running.of(appended)
+    session = running.find(appended)
     assert snapshot.dump(session.system, session.state) == kept
     assert all(note.level == "INFO" for note in notes)
 
@@ -159,7 +159,7 @@ def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Pat
 def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed: Any, junk: Any) -> None:
     bed[bed_state.STATE] = junk
     bed[bed_state.POSE] = junk
-    bed[bed_state.MOMENT] = "x"
+    bed[bed_state.TICK] = "x"
     notes = tick.start(bpy.context, bed)
     assert [note.level for note in notes] == ["WARNING"]
     assert (exact(bed) == 40e-3).all()
@@ -170,8 +170,8 @@ def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clo
     bpy.ops.ed.undo_push(message="Start")
     press(bed, clock)
     bpy.ops.ed.undo_push(message="Press")
-    running.put(sculpting.recording(running.of(bed), True))
+    running.put(sculpting.set_recording(running.find(bed), True))
     clock.tick(3)
     bpy.ops.ed.undo()
-    assert ["recording ended" in note.words for note in clock.tick(handlers.STALE)] == [True]
-    assert running.of(only_bed()).path is None
+    assert ["recording ended" in note.message for note in clock.tick(handlers.STALE)] == [True]
+    assert running.find(only_bed()).path is None

@@ -55,7 +55,7 @@ def test_within_one_press_backspace_goes_back_gesture_by_gesture(bed: Any, clock
     for left in (1, 0):
         assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
         clock.tick(3)
-        assert len(running.of(bed).gestures) == left
+        assert len(running.find(bed).gestures) == left
     assert (exact(bed) == 40e-3).all()
 
 
@@ -76,17 +76,17 @@ def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock:
 def test_a_single_step_pauses_and_is_one_control_period(bed: Any, clock: Clock) -> None:
     started(bed)
     clock.tick(5)
-    before = running.of(bed).state.period
+    before = running.find(bed).state.period
     bpy.ops.digiclay.session_step()
     clock.tick(5)
-    assert (running.of(bed).state.period, running.of(bed).paused) == (before + 1, True)
+    assert (running.find(bed).state.period, running.find(bed).paused) == (before + 1, True)
 
 
 def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_one(bed: Any) -> None:
     started(bed)
     bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
     assert bpy.ops.digiclay.session_pause() == {"FINISHED"}
-    assert running.of(bed).paused
+    assert running.find(bed).paused
 
 
 @pytest.mark.parametrize("name", ["session_pause", "session_step", "session_rewind", "session_stop"])
@@ -104,4 +104,4 @@ def test_a_session_does_not_start_on_settings_that_do_not_fit(bed: Any) -> None:
     bed.digiclay.layout.columns = 14
     with pytest.raises(DigiclayError, match="169 pins"):
         tick.start(bpy.context, bed)
-    assert running.all() == ()
+    assert running.list_sessions() == ()

@@ -45,7 +45,7 @@ def recorded_on(bed: Any, clock: Clock) -> None:
 
 def seconds(bed: Any) -> list[float]:
     """Return how long the takes of a bed are, s."""
-    return [round(entry.seconds, 1) for entry in takes.entries(bed)]
+    return [round(entry.seconds, 1) for entry in takes.list_takes(bed)]
 
 
 def save(path: Path, **how: Any) -> None:
@@ -62,7 +62,7 @@ def load(path: Path) -> Any:
 def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recording: Any) -> None:
     digiclay.unregister()
     try:
-        assert "kept as Take 1" in running.said()
+        assert "kept as Take 1" in running.last_message()
         assert seconds(recording) == [SECONDS]
         bpy.ops.ed.undo_push(message="Later")
         bpy.ops.ed.undo()
@@ -81,8 +81,8 @@ def test_stopping_one_of_two_sessions_keeps_its_recording_and_leaves_the_other(
     bpy.context.view_layer.objects.active = bpy.data.objects[name]
     assert bpy.ops.digiclay.session_stop() == {"FINISHED"}
     assert seconds(bpy.data.objects[name]) == [SECONDS]
-    assert [session.uid for session in running.all()] == [other.session_uid]
-    assert handlers.take_up in bpy.app.handlers.undo_post
+    assert [session.uid for session in running.list_sessions()] == [other.session_uid]
+    assert handlers.reload_states in bpy.app.handlers.undo_post
 
 
 def test_a_file_that_is_saved_has_the_take_so_far_and_the_recording_goes_on(
@@ -102,38 +102,38 @@ def test_a_file_that_cannot_be_saved_leaves_the_recording_as_it_was(recording: A
     with pytest.raises(RuntimeError):
         save(tmp_path / "nowhere" / "saved.blend")
     assert seconds(recording) == []
-    assert recovery.unsaved()
+    assert recovery.has_unsaved()
 
 
 def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
     recording: Any, clock: Clock
 ) -> None:
     for _ in range(2):
-        recovery.lend()
+        recovery.write_recovery()
         assert seconds(recording) == [SECONDS]
-    recovery.take_back()
+    recovery.clear_recovery()
     assert seconds(recording) == []
 
 
 def test_a_session_that_ends_while_blender_may_save_by_itself_keeps_one_take(recording: Any) -> None:
-    recovery.lend()
+    recovery.write_recovery()
     bpy.ops.digiclay.session_stop()
     assert seconds(recording) == [SECONDS]
 
 
 def test_a_take_kept_while_blender_may_save_by_itself_is_the_only_one_and_the_first(recording: Any) -> None:
-    recovery.lend()
+    recovery.write_recovery()
     bpy.ops.digiclay.take_keep()
-    recovery.take_back()
-    assert [entry.name for entry in takes.entries(recording)] == ["Take 1"]
+    recovery.clear_recovery()
+    assert [entry.name for entry in takes.list_takes(recording)] == ["Take 1"]
 
 
 def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock: Clock) -> None:
     bpy.ops.ed.undo_push(message="Before")
-    recovery.lend()
+    recovery.write_recovery()
     bpy.ops.ed.undo_push(message="After")
     bpy.ops.ed.undo()
-    recovery.take_back()
+    recovery.clear_recovery()
     assert seconds(only_bed()) == []
 
 
@@ -143,48 +143,48 @@ def test_another_file_leaves_the_former_one_with_its_take_to_be_recovered(
     save(tmp_path / "saved.blend")
     recorded_on(recording, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert running.said().endswith("Take 1 (1.0 s). It can be had back with File > Recover > Auto Save: "
-                                   "digiclay_recording.blend")  # fmt: skip
-    assert recovery.file().parent == tmp_path / "temporary"
-    bpy.ops.wm.recover_auto_save(filepath=str(recovery.file()))
+    told = "Take 1 (1.0 s). It can be had back with File > Recover > Auto Save: digiclay_recording.blend"
+    assert running.last_message().endswith(told)
+    assert recovery.file_path().parent == tmp_path / "temporary"
+    bpy.ops.wm.recover_auto_save(filepath=str(recovery.file_path()))
     assert seconds(only_bed()) == [2 * SECONDS]
 
 
 def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
     save(tmp_path / "saved.blend")
     assert seconds(load(tmp_path / "saved.blend")) == [SECONDS]
-    assert not recovery.file().exists()
+    assert not recovery.file_path().exists()
 
 
 def test_a_copy_that_was_saved_does_not_count_as_the_file(
     recording: Any, clock: Clock, tmp_path: Path
 ) -> None:
     save(tmp_path / "saved.blend")
-    assert not recovery.unsaved()
+    assert not recovery.has_unsaved()
     recorded_on(recording, clock)
     save(tmp_path / "copy.blend", copy=True)
-    assert recovery.unsaved()
+    assert recovery.has_unsaved()
 
 
 def test_what_is_recorded_anew_after_undo_is_not_what_was_saved() -> None:
-    recorded = Recording.begun(b"", 0, np.zeros(7), 0).extended(np.zeros((9, 7)), 1)
-    back = replace(recorded, saved=recorded.count).until(5)
+    recorded = Recording.begin(b"", 0, np.zeros(7), 0).extend(np.zeros((9, 7)), 1)
+    back = replace(recorded, saved=recorded.count).cut_at_period(5)
     assert back is not None
     assert not back.unsaved
-    assert back.extended(np.zeros((4, 7)), 2).unsaved
+    assert back.extend(np.zeros((4, 7)), 2).unsaved
 
 
 def test_nothing_is_left_where_nothing_is_recorded(bed: Any, clock: Clock) -> None:
     started(bed)
     recorded_on(bed, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not recovery.file().exists()
+    assert not recovery.file_path().exists()
 
 
 def test_what_cannot_be_left_is_told(recording: Any, tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "temporary")
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert "It could not be left for recovery: " in running.said()
+    assert "It could not be left for recovery: " in running.last_message()
 
 
 def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed: Any, clock: Clock) -> None:
@@ -195,4 +195,4 @@ def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed: Any, 
     recorded_on(bed, clock)
     bpy.ops.ed.undo_push(message="Gesture")
     undone(clock)
-    assert running.of(only_bed()).recording is not None
+    assert running.find(only_bed()).recording is not None

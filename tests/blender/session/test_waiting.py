@@ -81,7 +81,7 @@ def test_a_session_waits_while_the_pins_are_not_those_of_the_layout(bed: Any, cl
     started(bed)
     bed.digiclay.layout.rows = 14
     clock.tick(tick.LOOK)
-    assert "169 pins" in running.of(bed).waits
+    assert "169 pins" in running.find(bed).blocking_reason
     bed.digiclay.layout.rows = 13
     goes_on(clock)
 
@@ -97,7 +97,7 @@ def test_a_deleted_bed_ends_its_session_with_a_message(bed: Any, clock: Clock) -
     bpy.ops.object.delete()
     notes = clock.tick()
     assert [note.level for note in notes] == ["WARNING"]
-    assert running.all() == ()
+    assert running.list_sessions() == ()
 
 
 def test_a_deleted_scene_ends_the_session_with_a_message(bed: Any, clock: Clock) -> None:
@@ -105,18 +105,18 @@ def test_a_deleted_scene_ends_the_session_with_a_message(bed: Any, clock: Clock)
     gone, other = bpy.context.window.scene, bpy.data.scenes.new("Other")
     bpy.context.window.scene = other
     bpy.data.scenes.remove(gone)
-    assert ["was deleted" in note.words for note in clock.tick()] == [True]
-    assert running.all() == ()
+    assert ["was deleted" in note.message for note in clock.tick()] == [True]
+    assert running.list_sessions() == ()
 
 
 def test_disabling_the_extension_ends_the_session_and_leaves_the_state(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock)
-    kept = bed_state.kept(bed)
+    kept = bed_state.read_snapshot(bed)
     digiclay.unregister()
     try:
-        assert running.all() == ()
-        assert bed_state.kept(bed) == kept
-        assert handlers.take_up not in bpy.app.handlers.undo_post
+        assert running.list_sessions() == ()
+        assert bed_state.read_snapshot(bed) == kept
+        assert handlers.reload_states not in bpy.app.handlers.undo_post
     finally:
         digiclay.register()
