@@ -8,7 +8,7 @@ from .claims_following import largest_speed, tracking
 from .claims_force import deviations, onset, reference_force, trade
 from .claims_relief import relief
 from .claims_variants import ahead, escape, gaussian, radius, rise, staggered
-from .relief import LIMITS, blister_section
+from .relief_sections import LIMITS, blister_section
 from .results import PAPER_SPEED, Results
 from .scenes import METHODS
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .claim import MM, SHORT, TWO, Claim, times, verdict
-from .relief import LIMITS, Section, sections
+from .relief_sections import LIMITS, Section, sections
 from .results import Results
 from .scenes import METHODS
 

@@ -11,7 +11,7 @@ from digiclay.plots.bed import draw_map, draw_path, draw_relief
 from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
 from digiclay.plots.run import LETTERS, session_cells
 
-from .relief import sections
+from .relief_sections import sections
 from .results import Results, Session
 from .scenes import METHODS, NAMES
 

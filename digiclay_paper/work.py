@@ -17,10 +17,10 @@ from . import figures_blister, figures_limits, figures_session, figures_variants
 from .claims import claims
 from .page import page
 from .panel import curves, letter, table
-from .relief import LIMITS, sections
+from .relief_sections import LIMITS, sections
 from .results import Extent, Results
 from .scenes import METHODS
-from .trials import Told, simulate
+from .simulations import Told, simulate
 
 __all__ = ["produce"]
 

@@ -21,7 +21,7 @@ from digiclay_paper.claims_force import onset, trade
 from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page
 from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
-from digiclay_paper.trials import sessions
+from digiclay_paper.simulations import sessions
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 

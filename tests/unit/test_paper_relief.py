@@ -12,7 +12,7 @@ from digiclay.core.session.run_scene import Result
 from numpy.typing import NDArray
 
 from digiclay_paper.claims_relief import relief
-from digiclay_paper.relief import LIMITS, asked_for, blister_section, sections
+from digiclay_paper.relief_sections import LIMITS, asked_for, blister_section, sections
 from digiclay_paper.results import SESSION, Results, Session
 from digiclay_paper.scenes import METHODS
 
