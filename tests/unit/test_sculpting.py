@@ -134,7 +134,7 @@ def test_reset_brings_the_bed_to_rest_and_can_be_rewound() -> None:
 def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     hand = Hand()
     session = hand.press(started())
-    kept = session.kept
+    kept = session.snapshot
     back = sculpting.restore(hand.press(session, 6.0), kept, pose())
     assert snapshot.dump(back.system, back.state) == kept
     assert len(back.gestures) == 1
@@ -149,7 +149,7 @@ def test_a_bed_goes_on_from_what_was_kept() -> None:
     session = Hand().press(started())
     other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), session.snapshot)
     assert said == ""
-    assert snapshot.dump(other.system, other.state) == session.kept
+    assert snapshot.dump(other.system, other.state) == session.snapshot
 
 
 def test_a_bed_whose_parts_have_changed_goes_on_with_its_heights_and_says_so() -> None:

@@ -24,7 +24,7 @@ def test_the_path_of_a_recording_gives_the_session_again_bit_for_bit() -> None:
     keep = session.recording
     assert keep is not None
     *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.kept
+    assert snapshot.dump(session.system, again) == session.snapshot
 
 
 def test_undo_shortens_a_recording_to_what_led_there() -> None:
@@ -37,7 +37,7 @@ def test_undo_shortens_a_recording_to_what_led_there() -> None:
     keep = session.recording
     assert keep is not None
     *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.kept
+    assert snapshot.dump(session.system, again) == session.snapshot
 
 
 def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
@@ -69,7 +69,7 @@ def test_a_gesture_taken_back_is_gone_from_a_recording_too() -> None:
     keep = session.recording
     assert keep is not None
     *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
-    assert snapshot.dump(session.system, again) == session.kept
+    assert snapshot.dump(session.system, again) == session.snapshot
 
 
 def test_a_recording_ends_with_a_gesture_that_began_before_it() -> None:
