@@ -15,15 +15,9 @@ from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 
 __all__ = [
-    "Sources",
-    "ellipsoid",
-    "finger_material",
-    "is_linked",
-    "make_fingertip",
-    "make_sources",
-    "marked",
+    "Sources", "ellipsoid", "finger_material", "is_linked", "make_fingertip", "make_sources", "marked",
     "material",
-]
+]  # fmt: skip
 
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)

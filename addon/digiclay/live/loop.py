@@ -10,16 +10,9 @@ from ..compat import bpy
 from . import running
 
 __all__ = [
-    "begin",
-    "end",
-    "is_aside",
-    "is_due",
-    "is_running",
-    "redraw_numbers",
-    "step_aside",
-    "take_over",
+    "begin", "end", "is_aside", "is_due", "is_running", "redraw_numbers", "step_aside", "take_over",
     "token",
-]
+]  # fmt: skip
 
 #: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
 GONE = 5.0

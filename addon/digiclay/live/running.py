@@ -17,16 +17,9 @@ from ..core.session.recent_trace import Trace
 from .stroke import Stroke
 
 __all__ = [
-    "Gesture",
-    "Recording",
-    "Running",
-    "drop",
-    "find",
-    "last_message",
-    "list_sessions",
-    "put",
+    "Gesture", "Recording", "Running", "drop", "find", "last_message", "list_sessions", "put",
     "set_message",
-]
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 

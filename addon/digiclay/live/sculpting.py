@@ -32,16 +32,8 @@ from .running import Gesture, Recording, Running
 from .stroke_queue import drop_strokes, take_path
 
 __all__ = [
-    "advance",
-    "begin_session",
-    "change_scene",
-    "request_step",
-    "reset",
-    "restore",
-    "restore_gesture",
-    "rewind",
-    "set_recording",
-    "withdraw_stroke",
+    "advance", "begin_session", "change_scene", "request_step", "reset", "restore", "restore_gesture",
+    "rewind", "set_recording", "withdraw_stroke",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]

@@ -15,15 +15,9 @@ from ..device.instant import Instant
 from . import stage
 
 __all__ = [
-    "ENGINES",
-    "add_picture_scene",
-    "apply_style",
-    "failure_reason",
-    "is_whole_picture",
-    "render_picture",
-    "render_still",
-    "use_fast_settings",
-]
+    "ENGINES", "add_picture_scene", "apply_style", "failure_reason", "is_whole_picture", "render_picture",
+    "render_still", "use_fast_settings",
+]  # fmt: skip
 
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}

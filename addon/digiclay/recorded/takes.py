@@ -18,15 +18,7 @@ from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 
 __all__ = [
-    "START",
-    "Entry",
-    "add",
-    "find",
-    "keep_recording",
-    "list_takes",
-    "read",
-    "read_recording",
-    "remove",
+    "START", "Entry", "add", "find", "keep_recording", "list_takes", "read", "read_recording", "remove",
     "simulate",
 ]  # fmt: skip
 

@@ -25,15 +25,9 @@ from .messages import relabel
 from .table import Notes, read, write
 
 __all__ = [
-    "part_group",
-    "read_scene",
-    "rebuild_reason",
-    "register",
-    "scene_of",
-    "table_of",
-    "unregister",
+    "part_group", "read_scene", "rebuild_reason", "register", "scene_of", "table_of", "unregister",
     "write_scene",
-]
+]  # fmt: skip
 
 #: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
 #: a bed of metres, less than any change of pitch worth making.
