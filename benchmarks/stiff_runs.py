@@ -131,7 +131,7 @@ def _played(system: System, trajectories: Sequence[Trajectory], count: int) -> t
 def _within_reach(
     system: System, trajectories: Sequence[Trajectory], period: int, before: Floats, after: Floats
 ) -> bool:
-    """Tell whether heights, (n,), are within `Speeds.reach` of those a control period before."""
+    """Return whether heights, (n,), are within `Speeds.reach` of those a control period before."""
     assert system.cell.touch is not None
     poses = require_one(trajectories).poses(period * system.period + system.instants)
     places = system.grid.place(np.arange(system.grid.count))

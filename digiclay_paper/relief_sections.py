@@ -114,7 +114,7 @@ class Section(NamedTuple):
         return float(np.abs(self.found - self.asked).max())
 
     def meets(self, limits: Limits) -> bool:
-        """Tell whether the section has the shape asked for."""
+        """Return whether the section has the shape asked for."""
         allowed = limits.rms, limits.largest, limits.rim
         shape = np.array([self.rms, self.largest, self.rim]) <= np.array(allowed) * self.relief + TINY
         return bool(np.all(shape)) and abs(self.level) <= limits.level * self.middle

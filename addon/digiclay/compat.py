@@ -36,7 +36,7 @@ KINDS = (
 
 
 def shader_nodes(owner: Any) -> Any:
-    """Return the node tree of a material or world; up to 4.5 it must be asked for, from 5.0 it is there."""
+    """Return the node tree of a material or world; up to 4.5 it must be enabled, from 5.0 it exists."""
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree

@@ -58,7 +58,7 @@ class Folder:
         return resolve_inside(self.path, RUNS, job.name)
 
     def log(self, job: Job) -> Path:
-        """Return the file of what a job's process said."""
+        """Return the log file of a job's process."""
         return resolve_inside(self.path, LOGS, f"{job.name}.log")
 
     def is_done(self, job: Job) -> bool:

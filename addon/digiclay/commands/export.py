@@ -87,7 +87,7 @@ def exported(
     folder: Path,
     model: Model | None = None,
 ) -> list[Path]:
-    """Write one row of a history in several formats, as the solid unless told otherwise; return the files.
+    """Write one row of a history in several formats, by default as the solid; return the files.
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _laid(scene: Scene) -> tuple[Scene, Fitted]:
-    """Return the scene with the shape's heights in it, and what is to be said of them."""
+    """Return the scene with the shape's heights in it, and the messages on them."""
     refuse_what_has_no_surface(scene, "form")
     if scene.recorder is None:
         raise OutputError("form needs a recorder, and the scene has recorder = 'absent'.")
@@ -129,7 +129,7 @@ def before_the_finger(result: Result) -> int:
 
 
 def _judged(result: Result, laid: Fitted) -> tuple[Result, list[str]]:
-    """Return the result with what is known of its shape, and lines that say so."""
+    """Return the result with the data of its shape, and their lines of text."""
     history, layout = result.history, result.scene.layout
     assert history is not None
     row = max(before_the_finger(result), 0)

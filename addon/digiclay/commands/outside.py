@@ -22,7 +22,7 @@ NO_BENCHMARK = "The benchmarks are run from a checkout: 'python -m benchmarks --
 
 
 def add(commands: Any) -> None:
-    """Add ``paper``, or what to install for it, and ``benchmark``, which says where the benchmarks are."""
+    """Add ``paper``, or its install message, and ``benchmark``, which names the place of the benchmarks."""
     if find_spec(PAPER):
         import_module(f"{PAPER}.reproduce").add(commands)
     else:

@@ -52,7 +52,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(WRONG, f"{told}.{self._hint or self._misspelt()} See '{self.prog} --help'.\n")
 
     def _misspelt(self) -> str:
-        """Ask for the option that was probably meant by one that there is not."""
+        """Return a suggestion for an unknown option."""
         words = list(self._given)
         for word in words[: words.index("--")] if "--" in words else words:
             name = word.partition("=")[0]

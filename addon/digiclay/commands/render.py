@@ -133,7 +133,7 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
 
 
 def sizes(scene: Scene) -> dict[str, Any]:
-    """Return what drawing needs to know of the device."""
+    """Return the sizes of the device for drawing."""
     from ..device.instant import find_ellipsoid
 
     return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoid(scene)}

@@ -149,7 +149,7 @@ def _judged(result: Result, stop: Stop, *, quiet: bool) -> tuple[Result, bool]:
 
 
 def _extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
-    """Return what the options ask for besides the session."""
+    """Return the outputs of the options beside the session."""
     scene, history = result.scene, result.history
     if not history:
         return []

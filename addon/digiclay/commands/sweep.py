@@ -180,7 +180,7 @@ def _draw_pictures(
     records: dict[int, Record],
     names: Sequence[str],
 ) -> list[str]:
-    """Draw the figures over one or two axes; return what there is to be said of it."""
+    """Draw the figures over one or two axes; return the messages."""
     if len(axes) > 2:
         return [f"{len(axes)} axes: a table only, no pictures"]
     from ..plots.sweep import picture

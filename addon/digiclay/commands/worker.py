@@ -91,7 +91,7 @@ class Process:
         self.input = self.process.stdin
 
     def stop(self) -> None:
-        """Ask the process to stop."""
+        """Request the process to stop."""
         with suppress(OSError):  # it may have ended, and what was meant for it be left over
             self.input.close()
 
@@ -130,18 +130,18 @@ class Processes:
         return self
 
     def stopping(self) -> bool:
-        """Tell whether they have been asked to stop."""
+        """Return whether they have been asked to stop."""
         return self._deadline < math.inf
 
     def stopped(self) -> bool:
-        """Draw, and ask all to stop when somebody asks to; kill those that have not after some time."""
+        """Draw, and stop all on request; kill the remaining ones after some time."""
         self._draw()
         if self._stop():
             self._stop_all()
         return self._stop()
 
     def _stop_all(self) -> None:
-        """Ask all to stop, or kill them."""
+        """Request all to stop, or kill them."""
         with self._lock:
             self._deadline = min(self._deadline, time.monotonic() + GRACE)
             for process in self._alive:
@@ -157,7 +157,7 @@ class Processes:
             return process
 
     def wait(self, process: Process) -> str:
-        """Wait for a process to end, forget it, and say how it did."""
+        """Wait for a process to end, remove it, and return its outcome."""
         how = process.wait()
         with self._lock:
             self._alive.remove(process)

@@ -62,7 +62,7 @@ def _brightness(image: Any, path: Path) -> NDArray[np.float64]:
 
 
 def _unreadable(path: Path) -> ParameterError:
-    """Return what is said of a file Blender cannot read."""
+    """Return the error of a file that Blender cannot read."""
     return ParameterError("shape", "file", "must be a picture Blender can read", str(path))
 
 

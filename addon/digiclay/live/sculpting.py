@@ -124,7 +124,7 @@ def advance(
 
 
 def request_step(running: Running) -> Running:
-    """Ask a paused session for one more control period; pause one that is not."""
+    """Request one more control period of a paused session; pause one that is not."""
     return replace(running, paused=True, steps=running.steps + 1)
 
 

@@ -54,7 +54,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for the file, named after the bed."""
+        """Open the file browser, with the name of the bed."""
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         name = bpy.path.clean_name(bed_of(context).name)
         self.filepath = str(folder / f"{name}{suffix(self.file_format)}")
@@ -63,7 +63,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def check(self, context: Any) -> bool:
-        """Keep name and format the same: the one that was changed last tells the other."""
+        """Keep name and format equal: the last change sets the other."""
         if self.file_format == self.shown:
             self.file_format = _told_by(self.filepath) or self.file_format
         self.shown = self.file_format
@@ -87,7 +87,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         row.prop(self, "separate")
 
     def perform(self, context: Any) -> None:
-        """Write the file, or the files; a format nobody has asked for is told by the ending of the name."""
+        """Write the file, or the files; without a format, the extension of the name determines it."""
         if not self.properties.is_property_set("file_format"):
             self.file_format = _told_by(self.filepath) or self.file_format
         target = self._file()
@@ -115,7 +115,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
 
 
 def _told_by(name: str) -> str:
-    """Return the format that the ending of a name tells; empty where it tells none."""
+    """Return the format of a name's extension; empty without one."""
     by_length = sorted(FORMATS, key=lambda one: len(suffix(one)), reverse=True)
     return next((one for one in by_length if name.lower().endswith(suffix(one))), "")
 

@@ -69,7 +69,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for the file, unless one was dropped."""
+        """Open the file browser, unless a file was dropped."""
         if self.filepath:
             return self.execute(context)
         return super().invoke(context, event)

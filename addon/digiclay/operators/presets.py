@@ -65,7 +65,7 @@ class SavePreset(Action, bpy.types.Operator):
         return no_bed(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for the name."""
+        """Open the dialog for the name."""
         self.name = bed_of(context).digiclay.own_preset
         result: set[str] = context.window_manager.invoke_props_dialog(self)
         return result

@@ -60,7 +60,7 @@ class StepSession(OfSession, bpy.types.Operator):
     bl_label = "Single Step"
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Ask for one more; the next tick does it."""
+        """Request one more; the next tick simulates it."""
         running.put(sculpting.request_step(session))
         loop.redraw_status()
 

@@ -96,7 +96,7 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
         return no_bed(context) or no_take(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Ask for the file, named after the take."""
+        """Open the file browser, with the name of the take."""
         try:
             name = self.chosen_take(context).name
         except DigiclayError:

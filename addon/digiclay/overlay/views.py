@@ -56,7 +56,7 @@ def shown() -> bool:
 
 
 def redraw() -> None:
-    """Ask every 3D view to draw itself again."""
+    """Request a redraw of every 3D view."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

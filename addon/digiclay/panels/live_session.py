@@ -76,7 +76,7 @@ def _numbers(layout: Any, session: Running) -> None:
 
 
 def error_line(session: Running) -> str:
-    """Return what is said of a session's error, here as in the overlay."""
+    """Return the text of a session's error, as in the overlay."""
     errors = session.errors
     return error_message((errors.height, errors.force) if errors else None)
 

@@ -34,7 +34,7 @@ class Start(Panel, bpy.types.Panel):
         return bed_of(context) is None
 
     def draw(self, context: Any) -> None:
-        """Draw the hint, and what was told last: a session may have ended with the file it was of."""
+        """Draw the hint, and the last message: a session may have ended with its file."""
         column = self.layout.column()
         column.label(text="Select a bed or its fingertip,")
         column.label(text="or add a new device:")
@@ -68,7 +68,7 @@ class Device(Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the presets, and what a bed needs that no longer is as its settings say."""
+        """Draw the presets, and the remedy for a bed that differs from its settings."""
         bed = bed_of(context)
         settings = bed.digiclay
         row = self.layout.row(align=True)
@@ -92,7 +92,7 @@ class Finger(Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Say when there is none."""
+        """Draw a hint if there is none."""
         if not bed_of(context).digiclay.use_fingertip:
             self.layout.label(text="Omitted: nothing touches the bed", icon="INFO")
 

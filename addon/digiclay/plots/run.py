@@ -125,7 +125,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
 
 
 def _draw_set_point(axes: Axes, history: History, set_point: SetPoint | None) -> None:
-    """Draw the total force asked for over time, dashed; one per cell is none while no cell follows."""
+    """Draw the set point over time, dashed; one per cell is absent without a following cell."""
     if set_point is None:
         return
     wanted = set_point.total(sum_cells(history).following)

@@ -45,7 +45,7 @@ def _full(numbers: tuple[float, ...], count: int, kind: type) -> tuple[NDArray[A
 
 
 def any_true(test: NDArray[np.bool_]) -> bool:
-    """Tell whether a test holds anywhere; numpy's own `any` takes twice as long."""
+    """Return whether a test holds anywhere; numpy's own `any` takes twice as long."""
     return 1 in test.tobytes()
 
 

@@ -15,7 +15,7 @@ FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def told_size(path: Path) -> tuple[int, int] | None:
-    """Return width and height of a picture in pixels, None where its head does not tell.
+    """Return width and height of a picture in pixels, None if they are not in its header.
 
     PNG, JPEG, BMP, TIFF, EXR and HDR are known, by what they begin with.
 

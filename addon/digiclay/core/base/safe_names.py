@@ -34,7 +34,7 @@ def make_safe_name(text: str) -> str:
 
 
 def find_name(path: Path, general: str = "scene.toml") -> str:
-    """Return what a file describes by name: the file's stem, or its folder's name where that says nothing.
+    """Return the name of a file's content: its stem, or its folder's name for a generic stem.
 
     Parameters
     ----------

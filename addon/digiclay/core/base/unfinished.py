@@ -29,7 +29,7 @@ def name_unfinished(target: Path, kind: str = "part") -> Path:
 
 
 def is_unfinished(path: Path) -> bool:
-    """Tell by its name whether something was still being prepared."""
+    """Return whether a name is that of an unfinished file or folder."""
     return UNFINISHED.fullmatch(path.name) is not None
 
 

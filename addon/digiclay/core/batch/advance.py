@@ -154,7 +154,7 @@ def _queue(commands: Floats, newest: Floats) -> None:
 
 
 def broken(state: Beds) -> NDArray[np.bool_]:
-    """Tell which runs, (b,), hold numbers that are not finite."""
+    """Return the runs, (b,), with numbers that are not finite."""
     block = state.gathered.block
     # One sum tells that all is well, as it nearly always is.
     if math.isfinite(np.add.reduce(block, axis=None)):

@@ -138,7 +138,7 @@ def _put_back(known: Gathering, beds: Beds) -> Flags:
 
 
 def _ordered(touched: Flags, wanted: Flags) -> tuple[Cells, int]:
-    """Return the cells that take part (w, b), the touched ones first, and how many count as touched."""
+    """Return the active cells (w, b), the touched ones first, and the number of touched ones."""
     rank = 2 - touched.astype(np.int8)
     rank -= touched | wanted
     order = np.argsort(rank.T, axis=1, kind="stable").T

@@ -59,7 +59,7 @@ class Histories:
         self._recording.observe(now.play.state)
 
     def finish(self, now: Instant, place: int) -> Result:
-        """Return the result of a run; its history is valid until another run's is asked for.
+        """Return the result of a run; its history is valid until that of another run is requested.
 
         New memory for every run would take longer than all that is written into it.
 

@@ -255,7 +255,7 @@ class CellStatesControl:
 
 
 def _under_finger(mode: Modes) -> NDArray[np.bool_]:
-    """Tell which cells follow the force, or did until just now."""
+    """Return the cells that follow the force, or did in the last period."""
     following: NDArray[np.bool_] = (mode == Mode.FORCE_FOLLOW) | (mode == Mode.CRITICAL)
     return following
 

@@ -73,7 +73,7 @@ def suppress_noise(force: Floats, floor: Any) -> Floats:
 
 
 def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
-    """Refuse noise that hides what is asked for: the finger would never be felt where it should be held.
+    """Refuse noise above the set point, since contact would not be detected.
 
     Parameters
     ----------

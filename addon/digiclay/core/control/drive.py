@@ -145,7 +145,7 @@ class CellwiseControl(BatchControl):
         """Nothing to remember but the cells' own rows."""
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
-        """Ask for no more than the cells near the finger and those that move; see `interfaces.Controller`."""
+        """Request the cells near the fingertip and those in motion only; see `interfaces.Controller`."""
         return memory, None
 
 

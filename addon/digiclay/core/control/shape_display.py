@@ -115,7 +115,7 @@ class ShapeDisplayControl:
     def locate(
         self, memory: Progress, touched: Measurement
     ) -> tuple[Progress, tuple[float, float, float] | None]:
-        """Ask for all cells while there is a move to make; see `interfaces.Controller`."""
+        """Request all cells during the moves; see `interfaces.Controller`."""
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Orders]:

@@ -180,7 +180,7 @@ class ViscousControl:
         return Spot()
 
     def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
-        """Ask for all displaced cells and a margin around them; see `interfaces.Controller`."""
+        """Request all displaced cells and a margin around them; see `interfaces.Controller`."""
         spot = memory.around(touched.place[:, touched.force >= self.parameters.felt_force])
         return spot, spot.disc(self.margin)
 

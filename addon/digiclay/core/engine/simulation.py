@@ -171,7 +171,7 @@ def _moved(ready: _Ready, under: Floats) -> Floats:
 
 
 def _check_finite(system: System, state: State) -> None:
-    """Refuse to go on with numbers that are not finite, and say which."""
+    """Refuse numbers that are not finite, with their position."""
     rows, held = system.rows, state.gathered
     # One product tells: what is not finite makes no finite square.
     if math.isfinite(held.flat.dot(held.flat)):

@@ -56,7 +56,7 @@ class Model(Parameters):
 
 
 def sheet(formed: Formed, model: Model) -> Sheet:
-    """Return the skin a model asks for.
+    """Return the skin of a model.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def sheet(formed: Formed, model: Model) -> Sheet:
 
 
 def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
-    """Return the features of the skin a model asks for.
+    """Return the features of the skin of a model.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
 
 
 def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
-    """Return what a model asks for as bodies, in m.
+    """Return the bodies of a model, in m.
 
     Parameters
     ----------

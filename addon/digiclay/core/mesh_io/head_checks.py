@@ -19,7 +19,7 @@ LONGEST_HEAD = 1 << 16
 
 
 def stl_is_text(data: bytes) -> bool:
-    """Tell an STL as text from a binary one, whose head may begin with the same word."""
+    """Return whether an STL is text; the header of a binary one may begin with the same word."""
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
         return False
     head = data[:LONGEST_HEAD].lstrip().lower()
@@ -27,7 +27,7 @@ def stl_is_text(data: bytes) -> bool:
 
 
 def check_stl(data: bytes, name: str) -> None:
-    """Refuse an STL that holds fewer triangles than its head says, or ends inside of one.
+    """Refuse an STL with fewer triangles than its header states, or with an incomplete one.
 
     Parameters
     ----------

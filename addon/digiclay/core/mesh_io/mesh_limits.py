@@ -14,7 +14,7 @@ SMALLER = "Make the mesh coarser first."
 
 
 def refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterError:
-    """Return what is said of a mesh that cannot be used: the rule, the file, and what it has.
+    """Return the error of an unusable mesh: the rule, the file, and its content.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def refuse_many_triangles(name: str, count: int) -> None:
 
 
 def refuse_size(name: str, size: int, what: str = "") -> None:
-    """Refuse a file of more bytes than can be read; `what` says of which part they are.
+    """Refuse a file of more bytes than can be read; `what` names the part.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def reader(kind: str) -> str:
 
 
 def read(path: Path) -> Read:
-    """Read a mesh; its extension, one of `MESHES`, tells the format.
+    """Read a mesh; its extension, one of `MESHES`, determines the format.
 
     Raises
     ------

@@ -99,7 +99,7 @@ def _taken_at_once(lines: list[bytes], vertices: array[float], corners: array[in
 
 
 def _taken(lines: list[bytes], first: int, name: str, vertices: array[float], corners: array[int]) -> None:
-    """Take in lines one by one, and say of which one cannot be."""
+    """Read lines one by one, with an error that names the line."""
     for number, line in enumerate(lines, first):
         words = line.partition(b"#")[0].split()
         try:

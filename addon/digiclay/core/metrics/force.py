@@ -82,7 +82,7 @@ def first_touch(total_force: ArrayLike) -> slice:
 
 
 def touchdown(time: Floats, total_force: Floats, set_point: Floats) -> tuple[float | None, float | None]:
-    """Return overshoot and settling time of the force at first touch; None where no force is asked for.
+    """Return overshoot and settling time of the force at first touch; None without a set point.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ ROWS = 64
 
 
 def find_largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> float:
-    """Return how deep the deepest pin that is felt stands in the finger, over all rows, m.
+    """Return the largest indentation of a pin in contact, over all rows, m.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ def _mixed(words: Words) -> Words:
 
 
 def _uniform(counter: Words) -> Floats:
-    """Return numbers spread evenly in (0, 1), both ends left out."""
+    """Return numbers spread evenly in (0, 1), without both ends."""
     uniform: Floats = ((_mixed(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
     return uniform
 

@@ -58,7 +58,7 @@ class Setting(NamedTuple):
 
 
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
-    """Read a scene file, and let settings override what it says.
+    """Read a scene file, and override it by settings.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
 
 
 def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = ()) -> Scene:
-    """Make a scene of what its file says, and let settings override it.
+    """Make a scene of its file's content, overridden by settings.
 
     Parameters
     ----------

@@ -237,7 +237,7 @@ class Scene:
         return tuple(finger.trajectory.trajectory() for finger in self.fingers)
 
     def section(self, name: str) -> Any:
-        """Return what a section of a scene file of one finger holds; None for a part that is left out."""
+        """Return the content of a section in the scene file of one finger; None for an omitted part."""
         return getattr(require_one(self.fingers) if name in FINGER_SECTIONS else self, name, None)
 
     def with_sections(self, **parts: Any) -> Scene:

@@ -145,7 +145,7 @@ def _text(key: str, value: Any) -> str:
 
 
 def _section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None:
-    """Return the table of a section, or None for a part that is left out."""
+    """Return the table of a section, or None for an omitted part."""
     if value == ABSENT and section in OPTIONAL:
         return None
     if isinstance(value, dict):
@@ -207,7 +207,7 @@ def format_scene(scene: Scene) -> str:
 
 
 def _lines(scene: Scene) -> Iterator[str]:
-    """Give the lines of a scene file; one finger is written as versions that know no more of them read it."""
+    """Return the lines of a scene file; one finger is written in the form of versions without more."""
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
     yield "# Every parameter of the scene, in SI units."
@@ -233,7 +233,7 @@ def _lines(scene: Scene) -> Iterator[str]:
 
 
 def _part_lines(section: str, part: Parameters | None, method: str = "") -> Iterator[str]:
-    """Give the lines of a section; none for a part that is left out."""
+    """Return the lines of a section; none for an omitted part."""
     if part is None:
         return
     yield f"\n[{section}]"

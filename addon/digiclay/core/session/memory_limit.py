@@ -27,12 +27,12 @@ ASSUMED_MEMORY = 8 * 2**30
 
 
 def count_busy_cells(scene: Scene) -> int:
-    """Return how many cells may take part at once: all, where a shape is displayed; else few."""
+    """Return the largest number of active cells: all during the display of a shape; else few."""
     return scene.cells if scene.shape is not None else 0
 
 
 def check_memory(scene: Scene, rows: Rows) -> None:
-    """Refuse a session that cannot fit in memory, before it starts; ParameterError says what to change.
+    """Refuse a session beyond the memory, before it starts; ParameterError names the remedy.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ class Ended(NamedTuple):
 
 
 def count_losses(memory: object) -> int | None:
-    """Return how often a controller has lost the finger, by its memory; None if it does not count."""
+    """Return the number of losses in a controller's memory; None if it does not count."""
     losses: int | None = getattr(memory, "losses", None)
     return losses
 

@@ -67,7 +67,7 @@ def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
 
 
 def _like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return `kept` in the types of the template; any error says that it does not have its structure."""
+    """Return `kept` in the types of the template; any error means another structure."""
     kind = type(template)
     if isinstance(template, np.ndarray):
         array = arrays[kept["array"]]

@@ -174,7 +174,7 @@ def _rests(system: System, start: bytes) -> bool:
 
 
 def _turning_points(poses: Floats) -> NDArray[np.bool_]:
-    """Tell which poses are needed to draw the path with straight lines, evenly spaced in time."""
+    """Return the poses that are needed to draw the path with straight lines, evenly spaced in time."""
     needed = np.ones(len(poses), bool)
     bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
     needed[1:-1] = bend > STRAIGHT

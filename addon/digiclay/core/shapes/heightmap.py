@@ -132,7 +132,7 @@ def averaged(values: NDArray[np.generic], block: int) -> Floats:
 
 
 def _within(places: Floats, pixels: int) -> NDArray[np.bool_]:
-    """Tell which places lie on the pixels, those on the edge included."""
+    """Return the positions that lie on the pixels, those on the edge included."""
     slack = ON_THE_SIDE * pixels
     inside: NDArray[np.bool_] = (places >= -slack) & (places <= pixels + slack)
     return inside

@@ -75,7 +75,7 @@ def pixels(path: Path) -> Pixels:
 
 
 def _refuse_by_head(path: Path) -> None:
-    """Refuse a picture whose head says that it is too large, whoever reads it."""
+    """Refuse a picture whose header states too large a size, for all readers."""
     try:
         size = told_size(path)
     except OSError:
@@ -98,7 +98,7 @@ def refuse_too_many(path: Path, width: int, height: int) -> None:
 
 
 def too_large(path: Path, size: str) -> ParameterError:
-    """Return what is said of a picture too large to be read.
+    """Return the error of a picture too large to be read.
 
     Parameters
     ----------

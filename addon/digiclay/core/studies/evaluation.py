@@ -58,7 +58,7 @@ ALONE = "alone"
 
 
 def find_figure(word: str) -> str:
-    """Return the name of a figure asked for, such as ``lag``.
+    """Return the full name of a metric, such as ``lag``.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _limit_runs(scene: Scene | None) -> int:
 
 
 def _count(count: int, what: str) -> str:
-    """Say how many."""
+    """Return a count with its noun."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
@@ -195,7 +195,7 @@ def evaluate(
 
 
 def _make_record(result: Result, *, errors: bool) -> Record:
-    """Return what is kept of a session that came to its end; `ERRORS` only where they were asked for."""
+    """Return the record of a finished session; `ERRORS` only if they were requested."""
     names = [name for name in FIGURES if errors or name not in ERRORS]
     return {"figures": {name: result.metrics.get(name) for name in names}}
 

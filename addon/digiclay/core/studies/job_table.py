@@ -109,7 +109,7 @@ def find_jobs_file(said: str) -> Path:
 
 
 def read_outputs(path: Path) -> Outputs:
-    """Read a ``job.toml``; SceneError says in one line what is wrong with it."""
+    """Read a ``job.toml``; SceneError states its error in one line."""
     try:
         return make_outputs(read_table(path))
     except ParameterError as error:

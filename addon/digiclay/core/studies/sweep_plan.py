@@ -107,7 +107,7 @@ def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], versio
 
 
 def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
-    """Tell whether the first point that is kept comes to the same figures once more.
+    """Return whether the first point that is kept comes to the same figures once more.
 
     Older descriptions identify scenes by a number that depends on the wording of their comments.
     """
@@ -121,7 +121,7 @@ def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
 
 
 def _is_close(one: float | None, other: float | None) -> bool:
-    """Tell whether a figure is the same but for rounding."""
+    """Return whether a figure is the same but for rounding."""
     if one is None or other is None:
         return one is other
     return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-12)
@@ -147,7 +147,7 @@ def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) ->
 
 
 def format_table(columns: Sequence[Column], records: Mapping[int, Record], names: Sequence[str]) -> str:
-    """Return the sweep as CSV: the axes, the figures asked for, and the error; SI units, in the header.
+    """Return the sweep as CSV: the axes, the metrics, and the error; SI units, in the header.
 
     Parameters
     ----------

@@ -248,7 +248,7 @@ def _first_bad(values: Floats) -> str:
 
 
 def _cut_along_ac(place: Floats, top: Floats, *corners: Indices) -> NDArray[np.bool_]:
-    """Tell which cells of the skin are cut from a to c, and not from b to d (rules above)."""
+    """Return the cells of the skin that are cut from a to c, and not from b to d (rules above)."""
     a, b, c, d = corners
     ac, bd = (np.sum((place[i] - place[j]) ** 2, axis=1) for i, j in ((a, c), (b, d)))
     steep_ac, steep_bd = np.abs(top[a] - top[c]), np.abs(top[b] - top[d])
