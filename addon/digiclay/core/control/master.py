@@ -282,5 +282,5 @@ class MasterControl(BatchControl):
         return min(max(height, 0.0), self.actuator.stroke)
 
     def get_heights(self, master: Master) -> tuple[float, float, int]:
-        """Return the heights of the surface around a master and of itself, m, and the mode of touched cells."""
+        """Return the heights of the surface around a master and of itself, m, and the modes."""
         return master.edge, master.height, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING
