@@ -87,13 +87,8 @@ def tree_of(instant: Instant, lowest: float | None = None) -> Any:
     return bed_nodes(drawn, deck * SCALE, length * SCALE, SCALE * 1e-3)
 
 
-<<<<<<< HEAD
 def add_modifier(bed: Any, instant: Instant) -> None:
     """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
-=======
-def dress(bed: Any, instant: Instant) -> None:
-    """Draw a bed by new geometry nodes, with its housing and its display properties."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
     _modifier(bed).node_group = tree_of(instant, 0.0)
 
 

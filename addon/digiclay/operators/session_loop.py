@@ -129,13 +129,8 @@ def _is_undo_key(context: Any, event: Any) -> bool:
     return any(item.idname == "ed.undo" and item.active and _matches_key(item, event) for item in items)
 
 
-<<<<<<< HEAD
 def _matches_key(item: Any, event: Any) -> bool:
     """Return whether an event is the key of a keymap's item, with the keys held that it wants."""
-=======
-def _struck(item: Any, event: Any) -> bool:
-    """Return whether an event is the key of a keymap's item, with its modifiers."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
     return item.type == event.type and all(
         bool(getattr(item, held)) == getattr(event, held) for held in ("ctrl", "shift", "alt", "oskey")
     )

@@ -64,13 +64,8 @@ def encode_film(frames: list[Path], out: Path, looks: Moving) -> Path:
     return out
 
 
-<<<<<<< HEAD
 def is_whole_film(data: bytes) -> bool:
     """Return whether an MP4 file has all its parts, the last of which says where the frames are."""
-=======
-def whole_film(data: bytes) -> bool:
-    """Return whether an MP4 file has all its parts; the last one locates the frames."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
     at, kinds = 0, []
     while at + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, at)

@@ -130,13 +130,8 @@ def render_picture(scene: Any, path: Path, out: Path) -> None:
         raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
 
 
-<<<<<<< HEAD
 def is_whole_picture(data: bytes) -> bool:
     """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
-=======
-def whole_picture(data: bytes) -> bool:
-    """Return whether a PNG file has its end; Blender does not always report a full disk."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
     return data[-8:-4] == b"IEND"
 
 

@@ -72,7 +72,6 @@ class Master(NamedTuple):
     # What changes every period is written out: `_replace` takes nearly twice as long.
 
     def move_to(self, x: float, y: float, heading: Heading) -> Master:
-<<<<<<< HEAD
         """Return the master where it has felt the finger.
 
         Parameters
@@ -81,9 +80,6 @@ class Master(NamedTuple):
             m.
         heading : Heading
         """
-=======
-        """Return the master at the contact."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
         kept = self.height, self.opening, self.reference, self.edge
         return Master(self.phase, x, y, *kept, heading, self.felt, 0, self.losses)
 
@@ -218,7 +214,7 @@ class MasterControl(BatchControl):
         return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
 
     def is_given_up(self, master: Master) -> bool:
-        """Return whether the finger has been away for longer than the loss time."""
+        """Tell whether the finger has been away for longer than the loss time."""
         return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
 
     def lead(self, master: Master, force: float) -> Master:
@@ -250,7 +246,7 @@ class MasterControl(BatchControl):
         return None if master.phase is Phase.IDLE else (master.x, master.y, self.blister.edge_radius)
 
     def is_active(self, master: Master) -> bool:
-        """Return whether a master follows a finger."""
+        """Tell whether a master follows a finger."""
         return master.phase is not Phase.IDLE
 
     def get_place(self, master: Master) -> tuple[float, float]:
@@ -282,5 +278,5 @@ class MasterControl(BatchControl):
         return min(max(height, 0.0), self.actuator.stroke)
 
     def get_heights(self, master: Master) -> tuple[float, float, int]:
-        """Return the heights of the surface around a master and of itself, m, and the modes."""
+        """Return the heights of the surface around a master and of itself, m, and the mode of felt cells."""
         return master.edge, master.height, FORCE_FOLLOW if master.phase is Phase.SHAPING else SPRING

@@ -45,7 +45,6 @@ class BatchControl:
         return rule(self, memory, *columns)
 
     def any_run(self, rule: Callable[..., bool], memory: Any) -> bool:
-<<<<<<< HEAD
         """Tell whether a rule holds for the run, or for any of a stack; see `decide`.
 
         Parameters
@@ -54,9 +53,6 @@ class BatchControl:
             As `decide` takes it.
         memory : object
         """
-=======
-        """Return whether a rule holds for the run, or for any of a stack; see `decide`."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
         return any(self.decide(rule, memory)) if self.runs else rule(self, memory)
 
     def gather(self, rule: Callable[..., tuple[Any, ...]], memory: Any) -> tuple[Any, ...]:

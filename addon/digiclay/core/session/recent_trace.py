@@ -78,7 +78,6 @@ def begun(period: float, pins: Sequence[int] = ()) -> Trace:
 
 
 def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
-<<<<<<< HEAD
     """Return a trace that follows other pins; those a bed of `count` cells does not have are left out.
 
     Parameters
@@ -87,9 +86,6 @@ def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
     pins : sequence of int
     count : int
     """
-=======
-    """Return a trace of other pins, without those beyond a bed of `count` cells."""
->>>>>>> 4ce1df1 (docstrings: functions return, request and report)
     kept = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
     if kept == trace.pins:
         return trace
