@@ -103,7 +103,13 @@ def redraw_status() -> None:
 
 
 def draw(header: Any, context: Any) -> None:
-    """Draw the keys of a running session in the status bar."""
+    """Draw the keys of a running session in the status bar.
+
+    Parameters
+    ----------
+    header : bpy.types.Header
+    context : bpy.types.Context
+    """
     sessions = running.list_sessions()
     row = header.layout.row()
     paused = all(session.paused for session in sessions)

@@ -123,7 +123,14 @@ class Stroke:
 
 
 def start(number: int, x: float, y: float, depth: float) -> Stroke:
-    """Return the stroke of a mouse that goes down at a place, m."""
+    """Return the stroke of a mouse that goes down at a place, m.
+
+    Parameters
+    ----------
+    number : int
+    x, y, depth : float
+        m.
+    """
     return Stroke(number, (Sample(0.0, x, y, _limit_depth(depth)),))
 
 
@@ -153,7 +160,16 @@ def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Strok
 
 
 def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
-    """Return the stroke pressed deeper where it is, m, within what can be pressed."""
+    """Return the stroke pressed deeper where it is, m, within what can be pressed.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    time : float
+        s.
+    by : float
+        m.
+    """
     last = stroke.samples[-1]
     return draw(stroke, time, last.x, last.y, last.depth + by)
 

@@ -18,18 +18,40 @@ Floats = NDArray[np.float64]
 
 
 def queue_stroke(running: Running, x: float, y: float, depth: float) -> tuple[Running, int]:
-    """Queue the stroke of a mouse that goes down at a place, m; return its number as well."""
+    """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
+
+    Parameters
+    ----------
+    running : Running
+    x, y, depth : float
+        m.
+    """
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
     return replace(running, strokes=(*running.strokes, start(number, x, y, depth))), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
-    """Return the stroke of a number, or None when it is finished or was taken back."""
+    """Return the stroke of a number, or None when it is finished or was taken back.
+
+    Parameters
+    ----------
+    running : Running
+    number : int
+    """
     return next((stroke for stroke in running.strokes if stroke.number == number), None)
 
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
-    """Return the session with one of its strokes changed, if it still has it."""
+    """Return the session with one of its strokes changed, if it still has it.
+
+    Parameters
+    ----------
+    running : Running
+    number : int
+        Of the stroke.
+    change : callable
+        Returns a stroke in place of another.
+    """
     strokes = tuple(change(one) if one.number == number else one for one in running.strokes)
     return replace(running, strokes=strokes)
 

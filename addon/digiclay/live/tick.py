@@ -38,6 +38,11 @@ class Note(NamedTuple):
 def start(context: Any, bed: Any) -> list[Note]:
     """Begin a session of a bed, from what the bed keeps; what was missing for it is made.
 
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+
     Raises
     ------
     DigiclayError
@@ -72,7 +77,13 @@ def stop(uid: int) -> str:
 
 
 def show(bed: Any, session: Running) -> None:
-    """Make a value the present one of a session, kept and shown by its bed."""
+    """Make a value the present one of a session, kept and shown by its bed.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    session : Running
+    """
     running.put(session)
     bed_state.write(bed, session)
     view.show_state(bed, session.system, session.state)
@@ -87,7 +98,14 @@ def place_finger(context: Any, bed: Any, session: Running) -> None:
 
 
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
-    """Take back the last unfinished stroke of one session, or of each; return whether there was one."""
+    """Take back the last unfinished stroke of one session, or of each; return whether there was one.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    uid : int, optional
+        Of one session's bed; by default all.
+    """
     busy = [session for session in running.list_sessions() if session.strokes and uid in (None, session.uid)]
     for session in busy:
         bed = find_bed(session.uid, session.name)
@@ -99,7 +117,14 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
 
 
 def tick(context: Any, now: float) -> list[Note]:
-    """Advance every session to the current time of a monotonic clock, s; return the messages."""
+    """Advance every session to the current time of a monotonic clock, s; return the messages.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    now : float
+        s.
+    """
     notes: list[Note] = []
     most = preferences.get(context).most_periods
     for session in running.list_sessions():

@@ -30,7 +30,13 @@ OFFERED: list[tuple[str, str, str]] = []
 
 
 def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
-    """Return the core's presets and the user's own."""
+    """Return the core's presets and the user's own.
+
+    Parameters
+    ----------
+    operator : bpy.types.Operator
+    context : bpy.types.Context
+    """
     OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
     OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
     return OFFERED
@@ -130,13 +136,26 @@ class Rebuild(Action, bpy.types.Operator):
 
 
 def add(context: Any, scene: Scene) -> Any:
-    """Add the device of a scene, at rest, in the context's collection; return its bed."""
+    """Add the device of a scene, at rest, in the context's collection; return its bed.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    scene : Scene
+    """
     finger = find_ellipsoid(scene)
     return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
 
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
-    """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
+    """Add the device of a scene as it is at an instant, in the context's collection; return its bed.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    scene : Scene
+    instant : Instant
+    """
     coloured = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
     if not coloured:
@@ -146,14 +165,26 @@ def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
 
 
 def place_at_cursor(context: Any, bed: Any) -> None:
-    """Put the housing's underside on the 3D cursor, and leave the bed selected and active."""
+    """Put the housing's underside on the 3D cursor, and leave the bed selected and active.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
     bed.location = context.scene.cursor.location
     bed.location.z -= view.underside(bed) * bed.scale.z
     select_only(context, bed)
 
 
 def select_only(context: Any, bed: Any) -> None:
-    """Leave a new object selected and active, as Blender's own Add operators do."""
+    """Leave a new object selected and active, as Blender's own Add operators do.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
     for other in context.selected_objects:
         other.select_set(False)
     bed.select_set(True)
@@ -161,5 +192,11 @@ def select_only(context: Any, bed: Any) -> None:
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in Add > Mesh."""
+    """Draw the entry in Add > Mesh.
+
+    Parameters
+    ----------
+    menu : bpy.types.Menu
+    context : bpy.types.Context
+    """
     menu.layout.operator(AddBed.bl_idname, icon="MESH_GRID")

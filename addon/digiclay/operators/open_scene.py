@@ -41,7 +41,13 @@ class AddSceneAction(Action):
         return edited(context, "Leave Edit Mode first: the device is an object of its own")
 
     def add_scene(self, context: Any, scene: Scene) -> None:
-        """Add the bed of a scene, its finger where its path begins."""
+        """Add the bed of a scene, its finger where its path begins.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        scene : Scene
+        """
         scene = shape_show.embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
@@ -170,12 +176,24 @@ class SceneFiles(bpy.types.FileHandler):
 
 
 def added(menu: Any, context: Any) -> None:
-    """Draw the submenu in Add > Mesh."""
+    """Draw the submenu in Add > Mesh.
+
+    Parameters
+    ----------
+    menu : bpy.types.Menu
+    context : bpy.types.Context
+    """
     menu.layout.menu(Samples.bl_idname, icon="MESH_GRID")
 
 
 def imported(menu: Any, context: Any) -> None:
-    """Draw the entry in File > Import."""
+    """Draw the entry in File > Import.
+
+    Parameters
+    ----------
+    menu : bpy.types.Menu
+    context : bpy.types.Context
+    """
     menu.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")
 
 

@@ -27,7 +27,14 @@ class ApplyPreset(Action, bpy.types.Operator):
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:
-        """Return the description of the preset."""
+        """Return the description of the preset.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        chosen : bpy.types.OperatorProperties
+            The operator's settings.
+        """
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 
     @classmethod

@@ -37,7 +37,14 @@ class OfSession(Action):
         return None
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
-        """Change a session."""
+        """Change a session.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        bed : bpy.types.Object
+        session : Running
+        """
         raise NotImplementedError
 
 

@@ -32,7 +32,16 @@ RELIEFS = (
 
 
 def millimetres(name: str, default: float, words: str) -> Any:
-    """Make a property of a length."""
+    """Make a property of a length.
+
+    Parameters
+    ----------
+    name : str
+    default : float
+        m.
+    words : str
+        Its description.
+    """
     return bpy.props.FloatProperty(
         name=f"{name} (mm)", description=words, default=default * 1e3, soft_min=-100.0, soft_max=100.0,
         min=-1e5, max=1e5, precision=2, step=20,
@@ -72,7 +81,13 @@ class Shaped(Action):
 
     @classmethod
     def missing(cls, context: Any, bed: Any) -> str:
-        """Return what else is needed, or an empty text."""
+        """Return what else is needed, or an empty text.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        bed : bpy.types.Object
+        """
         return ""
 
     def perform(self, context: Any) -> None:
@@ -86,11 +101,26 @@ class Shaped(Action):
         self.report({"WARNING" if lost else "INFO"}, words)
 
     def displayed(self, context: Any, bed: Any) -> Any:
-        """Display the shape; return what `shape_show` does."""
+        """Display the shape; return what `shape_show` does.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        bed : bpy.types.Object
+        """
         raise NotImplementedError
 
     def shape(self, file: str, bed: Any, **known: Any) -> Shape:
-        """Return how the shape is laid onto the bed."""
+        """Return how the shape is laid onto the bed.
+
+        Parameters
+        ----------
+        file : str
+            Empty where the shape is none of a file.
+        bed : bpy.types.Object
+        **known
+            More fields of `Shape`.
+        """
         known |= {name: to_si(getattr(self, name), SHOWN["m"][1]) for name in ("x", "y", "rise", "foot")}
         before = bed.digiclay.shape
         return Shape(
@@ -161,5 +191,11 @@ class ShapeSample(Shaped, bpy.types.Operator):
 
 
 def others(context: Any, bed: Any) -> list[Any]:
-    """Return the selected objects with a surface that are no part of a bed."""
+    """Return the selected objects with a surface that are no part of a bed.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
     return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]

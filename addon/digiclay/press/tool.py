@@ -100,7 +100,14 @@ class PressTool(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context: Any, layout: Any, tool: Any) -> None:
-        """Draw the tool's settings into the header."""
+        """Draw the tool's settings into the header.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        layout : bpy.types.UILayout
+        tool : bpy.types.WorkSpaceTool
+        """
         settings = tool.operator_properties("digiclay.press")
         layout.prop(settings, "depth")
         layout.prop(settings, "use_pressure")

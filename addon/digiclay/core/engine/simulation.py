@@ -84,7 +84,7 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
         return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
     ready = _ready(system, held)
     memory = _command(system, state, ready, memory)
-    held.touched.force[:] = _moved(ready, _underside(system, finger, held))
+    held.touched.force[:] = ready.movement(_underside(system, finger, held))
     if system.sensors:
         system.sensors.update(held.all.sensed, _truth(held.all, state.period + 1))
     _check_finite(system, state)
@@ -163,11 +163,6 @@ def _command(system: System, state: State, ready: _Ready, memory: Any) -> Any:
         older[:] = newer
     queue[-1][:] = orders.command
     return memory
-
-
-def _moved(ready: _Ready, under: Floats) -> Floats:
-    """Let the stepper move the gathered cells on; return the forces on the near ones, N."""
-    return ready.movement(under)
 
 
 def _check_finite(system: System, state: State) -> None:

@@ -29,7 +29,14 @@ class InstantValve:
         return own
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the map that picks the command seen at each time, shape (t, queue.length)."""
+        """Return the map that picks the command seen at each time, shape (t, queue.length).
+
+        Parameters
+        ----------
+        queue : Queue
+        times : sequence of float
+            Times into the period, s.
+        """
         response = np.zeros((len(times), queue.length))
         response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
         return response
@@ -48,7 +55,14 @@ class Unrelaxed:
         return 0.0
 
     def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return no rows."""
+        """Return no rows.
+
+        Parameters
+        ----------
+        own : ndarray (0, n)
+        tension : ndarray (n,)
+            N.
+        """
         return own
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
@@ -60,7 +74,14 @@ class Unrelaxed:
         return np.empty((0, 3))
 
     def age(self, own: Floats, time: Floats) -> None:
-        """Nothing to age."""
+        """Nothing to age.
+
+        Parameters
+        ----------
+        own : ndarray (0, n)
+        time : ndarray (n,)
+            s.
+        """
 
 
 class PerfectSensors:
