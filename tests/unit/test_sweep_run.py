@@ -9,7 +9,9 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +94,12 @@ def test_any_executor_will_do() -> None:
     at_once = finished(AtOnce(), evaluate_bundle, some(), stopped=never)
     with ThreadPoolExecutor(2) as threads:
         in_threads = finished(threads, evaluate_bundle, some(), stopped=never)
-    assert [at_once[i]["figures"]["rfd"] for i in range(3)] == [
-        in_threads[i]["figures"]["rfd"] for i in range(3)
-    ]
+    # Processes that are started afresh get and give values: nothing of this one is theirs.
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes:
+        in_processes = finished(processes, partial(evaluate_bundle, errors=True), some(), stopped=never)
+    figures = [[done[i]["figures"]["rfd"] for i in range(3)] for done in (at_once, in_threads, in_processes)]
+    assert figures[0] == figures[1] == figures[2]
+    assert "height_error" in in_processes[2]["figures"]
 
 
 def test_a_fault_in_one_point_is_recorded_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:

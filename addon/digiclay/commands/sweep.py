@@ -35,7 +35,7 @@ from .worker import Processes, count_cores, in_blender
 
 __all__ = ["add", "read_count"]
 
-#: The most processes of a command: Windows can wait for no more.
+#: The most processes of a command.
 MOST = 61
 
 EXAMPLES = """\
