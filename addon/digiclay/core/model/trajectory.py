@@ -118,7 +118,7 @@ class Trajectory:
             first, last = slopes[piece] * span[:, None], slopes[piece + 1] * span[:, None]
             bend = part * (1.0 - part)
             poses[:, :3] += bend * ((1.0 - part) * (first - end + start) - part * (last - end + start))
-        poses[:, 3:] = _turned(self.orientations[piece], self.orientations[piece + 1], part)
+        poses[:, 3:] = _interpolate_turns(self.orientations[piece], self.orientations[piece + 1], part)
         return poses
 
 
@@ -189,11 +189,11 @@ def interpolate_poses(path: Floats, parts: Floats) -> Floats:
     part = np.tile(np.repeat(parts, fingers), count)[:, None]
     poses = np.empty((len(start), 7))
     poses[:, :3] = start[:, :3] + (end[:, :3] - start[:, :3]) * part
-    poses[:, 3:] = _turned(start[:, 3:], end[:, 3:], part)
+    poses[:, 3:] = _interpolate_turns(start[:, 3:], end[:, 3:], part)
     return poses.reshape(count, parts.size, fingers, 7)
 
 
-def _turned(start: Floats, end: Floats, part: Floats) -> Floats:
+def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
     """Turn unit quaternions (k, 4) along the shortest arc, by the share `part` (k, 1) of the way."""
     cosine = np.einsum("ij,ij->i", start, end)[:, None]
     end = np.where(cosine < 0.0, -end, end)

@@ -25,15 +25,15 @@ __all__ = ["assemble"]
 
 def assemble(scene: Scene) -> System:
     """Build the system of a scene."""
-    stepper = _stepper(scene)
+    stepper = _make_stepper(scene)
     period = scene.simulation.control_period
-    cell = Cell(scene.actuator, _flow(scene), scene.supply, _lag(scene), _touch(scene))
+    cell = Cell(scene.actuator, _make_flow(scene), scene.supply, _make_lag(scene), _make_touch(scene))
     line = queue(scene.delay, period) if scene.delay else Queue()
     # An opening that lags has a kink where the next command comes through; one that does not, a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
     steps, instants = segments(stepper, cut, period, scene.simulation.steps)
     bed = grid(scene.layout)
-    controller, sensors = _controller(scene, bed, cell), _sensors(scene, cell, line)
+    controller, sensors = _make_controller(scene, bed, cell), _make_sensors(scene, cell, line)
     return System(
         grid=bed,
         cell=cell,
@@ -50,14 +50,14 @@ def assemble(scene: Scene) -> System:
     )
 
 
-def _stepper(scene: Scene) -> Stepper:
+def _make_stepper(scene: Scene) -> Stepper:
     """Return how a period is integrated."""
     kind = import_part(*STEPPERS[scene.simulation.stepper])
     stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
     return stepper
 
 
-def _flow(scene: Scene) -> Flow:
+def _make_flow(scene: Scene) -> Flow:
     """Return the valve, behind it the conduit if there is one."""
     valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
     if scene.conduit is None:
@@ -67,7 +67,7 @@ def _flow(scene: Scene) -> Flow:
     return in_series(valve, scene.conduit, scene.fluid)
 
 
-def _lag(scene: Scene) -> Lag:
+def _make_lag(scene: Scene) -> Lag:
     """Return how the valve follows its command."""
     if scene.valve_lag:
         return scene.valve_lag
@@ -76,15 +76,15 @@ def _lag(scene: Scene) -> Lag:
     return InstantValve()
 
 
-def _touch(scene: Scene) -> Touch | None:
+def _make_touch(scene: Scene) -> Touch | None:
     """Return the finger, or None."""
     finger = require_one(scene.fingers)
     if finger.fingertip is None or finger.contact is None:
         return None
-    return Touch(finger.fingertip, select_law("contact", finger.contact), _pulp(finger))
+    return Touch(finger.fingertip, select_law("contact", finger.contact), _make_pulp(finger))
 
 
-def _pulp(finger: Finger) -> Pulp:
+def _make_pulp(finger: Finger) -> Pulp:
     """Return how the finger's pulp relaxes."""
     if finger.relaxation:
         return finger.relaxation
@@ -93,7 +93,7 @@ def _pulp(finger: Finger) -> Pulp:
     return Unrelaxed()
 
 
-def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
+def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     """Return the sensor chain of a scene."""
     known = scene.sensors
     if known is None:
@@ -116,7 +116,7 @@ def _sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     return sensors
 
 
-def _controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
+def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
     """Return the control method, before it the display of a shape; or None: every valve stays shut."""
     if scene.control is None and scene.shape is None:
         return None

@@ -53,18 +53,18 @@ def resolve(table: Table, name: str = "") -> Scene:
     """
     refuse_unknown("", table, TOP_LEVEL)
     texts: dict[str, Any] = {
-        key: _text(key, table.get(key, default))
+        key: _check_text(key, table.get(key, default))
         for key, default in zip(TEXTS, (name, "", "paper"), strict=True)
     }
     if texts["preset"] not in PRESETS:
         raise ParameterError("preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"]))
-    tables = _finger_tables(table)
+    tables = _split_fingers(table)
     shared = {
-        section: _section(section, table.get(section, ABSENT if section in UNASKED else {}))
+        section: _read_section(section, table.get(section, ABSENT if section in UNASKED else {}))
         for section in SECTIONS
         if section not in FINGER_PARTS
     }
-    method = _method(shared["control"])
+    method = _take_method(shared["control"])
     defaults = {section: dict(values) for section, values in PRESETS[texts["preset"]].items()}
     parts: dict[str, Any] = {}
     for section, own in shared.items():
@@ -72,7 +72,7 @@ def resolve(table: Table, name: str = "") -> Scene:
         if (
             own is None
             or (needed and shared[needed] is None)
-            or (section == "blister" and not _forms_one(method, own))
+            or (section == "blister" and not _forms_blister(method, own))
         ):
             parts[section] = None
             continue
@@ -83,11 +83,11 @@ def resolve(table: Table, name: str = "") -> Scene:
     if parts["layout"].arrangement == "hexagonal":
         defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
     rest_height = parts["actuator"].rest_height
-    fingers = tuple(_finger(owner, own, defaults, rest_height) for owner, own in tables)
+    fingers = tuple(_read_finger(owner, own, defaults, rest_height) for owner, own in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
 
 
-def _finger_tables(table: Table) -> list[tuple[str, Table]]:
+def _split_fingers(table: Table) -> list[tuple[str, Table]]:
     """Return what messages put before the sections of each finger, and the sections.
 
     The sections of one finger stand beside the others; those of several in a list of tables.
@@ -121,21 +121,23 @@ def merge_one_finger(table: Table) -> dict[str, Any]:
     return {**{key: value for key, value in table.items() if key != FINGERS}, **given[0]}
 
 
-def _finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float) -> Finger:
+def _read_finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float) -> Finger:
     """Make a finger of its sections; `owner` stands before their names in messages."""
     parts: dict[str, Any] = {}
     for section in FINGER_PARTS:
-        own, needed = _section(section, table.get(section, {}), owner), NEEDS.get(section)
+        own, needed = _read_section(section, table.get(section, {}), owner), NEEDS.get(section)
         if own is None or (needed and parts[needed] is None):
             parts[section] = None
             continue
         parts[section] = read_part(
             owner + section, import_parameters(section, ""), defaults.get(section, {}), own
         )
-    return Finger(**parts, trajectory=_path(owner + "trajectory", table.get("trajectory", {}), rest_height))
+    return Finger(
+        **parts, trajectory=_read_path(owner + "trajectory", table.get("trajectory", {}), rest_height)
+    )
 
 
-def _text(key: str, value: Any) -> str:
+def _check_text(key: str, value: Any) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
         raise ParameterError(key, "", "must be a text", show_value(value))
@@ -144,7 +146,7 @@ def _text(key: str, value: Any) -> str:
     return value
 
 
-def _section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None:
+def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None:
     """Return the table of a section, or None for an omitted part."""
     if value == ABSENT and section in OPTIONAL:
         return None
@@ -154,7 +156,7 @@ def _section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None
     raise ParameterError(owner + section, "", rule, show_value(value))
 
 
-def _method(control: dict[str, Any] | None) -> str:
+def _take_method(control: dict[str, Any] | None) -> str:
     """Take the method out of the control's section."""
     method = (control or {}).pop("method", "virtual_master")
     if not isinstance(method, str) or method not in METHODS:
@@ -162,7 +164,7 @@ def _method(control: dict[str, Any] | None) -> str:
     return method
 
 
-def _forms_one(method: str, own: dict[str, Any]) -> bool:
+def _forms_blister(method: str, own: dict[str, Any]) -> bool:
     """Return whether a method forms a blister; refuse a section [blister] where it does not."""
     if METHODS[method].blister is None and own:
         raise ParameterError(
@@ -171,7 +173,7 @@ def _forms_one(method: str, own: dict[str, Any]) -> bool:
     return METHODS[method].blister is not None
 
 
-def _path(owner: str, table: Any, rest_height: float) -> Path:
+def _read_path(owner: str, table: Any, rest_height: float) -> Path:
     """Read the section of the finger's path."""
     if not isinstance(table, dict):
         raise ParameterError(owner, "", "must be a section, [trajectory]", show_value(table))
@@ -184,7 +186,9 @@ def _path(owner: str, table: Any, rest_height: float) -> Path:
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             rule = "must be a list of tables such as {time = 0, position = [0, 0, 0.046]}"
             raise ParameterError(owner, "waypoints", rule, show_value(rows))
-        path = Path(kind, tuple(_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1)))
+        path = Path(
+            kind, tuple(_read_waypoint(f"{owner}.waypoints #{i}", row) for i, row in enumerate(rows, 1))
+        )
     try:
         path.trajectory()
     except ParameterError as error:
@@ -192,7 +196,7 @@ def _path(owner: str, table: Any, rest_height: float) -> Path:
     return path
 
 
-def _waypoint(owner: str, row: Table) -> Waypoint:
+def _read_waypoint(owner: str, row: Table) -> Waypoint:
     """Read one waypoint; where it is and when has no sensible default."""
     refuse_unknown(owner, row, tuple(quantities(Waypoint)))
     for key in ("time", "position"):
@@ -203,10 +207,10 @@ def _waypoint(owner: str, row: Table) -> Waypoint:
 
 def format_scene(scene: Scene) -> str:
     """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units."""
-    return "\n".join(_lines(scene)) + "\n"
+    return "\n".join(_write_lines(scene)) + "\n"
 
 
-def _lines(scene: Scene) -> Iterator[str]:
+def _write_lines(scene: Scene) -> Iterator[str]:
     """Return the lines of a scene file; one finger is written in the form of versions without more."""
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
@@ -219,20 +223,20 @@ def _lines(scene: Scene) -> Iterator[str]:
         yield f"{FINGERS} = []"
     for name in sections:
         method = scene.method if name == "control" else ""
-        yield from _part_lines(name, scene.section(name), method)
+        yield from _write_part(name, scene.section(name), method)
     for finger in scene.fingers:
         if alone:
-            yield from _path_lines("trajectory", finger.trajectory)
+            yield from _write_path("trajectory", finger.trajectory)
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
         yield from (f'{name} = "{ABSENT}"' for name in parts if name in OPTIONAL and parts[name] is None)
         for name, part in parts.items():
-            yield from _part_lines(f"{FINGERS}.{name}", part)
-        yield from _path_lines(f"{FINGERS}.trajectory", finger.trajectory)
+            yield from _write_part(f"{FINGERS}.{name}", part)
+        yield from _write_path(f"{FINGERS}.trajectory", finger.trajectory)
 
 
-def _part_lines(section: str, part: Parameters | None, method: str = "") -> Iterator[str]:
+def _write_part(section: str, part: Parameters | None, method: str = "") -> Iterator[str]:
     """Return the lines of a section; none for an omitted part."""
     if part is None:
         return
@@ -244,7 +248,7 @@ def _part_lines(section: str, part: Parameters | None, method: str = "") -> Iter
         yield f"{key} = {format_value(getattr(part, key))}  # {note}"
 
 
-def _path_lines(section: str, path: Path) -> Iterator[str]:
+def _write_path(section: str, path: Path) -> Iterator[str]:
     """Give the lines of a finger's path."""
     yield f"\n[{section}]"
     yield f"interpolation = {format_value(path.interpolation)}"

@@ -85,7 +85,7 @@ def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int
         return 0, replace(clock, seen=now)
     gone = max(0.0, now - clock.seen)
     whole = math.floor((clock.left + gone) / period + SLACK)
-    count = max(0, min(whole, most, _affordable(clock, gone)))
+    count = max(0, min(whole, most, _count_affordable(clock, gone)))
     left = max(0.0, clock.left + gone - whole * period)
     ticks = (*clock.ticks, (gone, count * period))
     while len(ticks) > 1 and sum(time for time, _ in ticks[1:]) >= WINDOW:
@@ -93,7 +93,7 @@ def periods_due(clock: Clock, now: float, period: float, most: int) -> tuple[int
     return count, replace(clock, seen=now, left=left, ticks=ticks)
 
 
-def _affordable(clock: Clock, gone: float) -> int:
+def _count_affordable(clock: Clock, gone: float) -> int:
     """Return how many periods this machine can do in the time between two ticks, at least 1."""
     if clock.cost <= 0.0:
         return 2**31

@@ -113,11 +113,11 @@ def load(system: System, data: bytes) -> State:
     kept = _read(data)
     header, rows = kept.header, system.rows
     here = [rows.physics, rows.queue, rows.control, rows.sensors]
-    _fits("number of cells", header["cells"], system.grid.count)
-    _fits("rows of a cell", header["rows"], here)
-    _fits("control period", header["control_period"], system.period)
-    _fits("number of fingers", len(header["gathered"]["fingers"]), 1)
-    _within_the_device(system, kept)
+    _check_same("number of cells", header["cells"], system.grid.count)
+    _check_same("rows of a cell", header["rows"], here)
+    _check_same("control period", header["control_period"], system.period)
+    _check_same("number of fingers", len(header["gathered"]["fingers"]), 1)
+    _check_limits(system, kept)
     template = system.controller.begin() if system.controller else None
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
@@ -128,8 +128,8 @@ def load(system: System, data: bytes) -> State:
         kept.arrays["block"],
         kept.arrays["mode"],
         system.grid.place(cells),
-        _disc(require_one(gathered["fingers"])["reach"]),
-        _disc(gathered["control"]),
+        _read_disc(require_one(gathered["fingers"])["reach"]),
+        _read_disc(gathered["control"]),
         gathered["peak"],
         gathered["until"],
     )
@@ -164,7 +164,7 @@ def transfer_heights(system: System, data: bytes) -> State:
         When the bytes are no state, are damaged, or are a state of another number of cells.
     """
     kept = _read(data)
-    _fits("number of cells", kept.header["cells"], system.grid.count)
+    _check_same("number of cells", kept.header["cells"], system.grid.count)
     height = kept.arrays["rows"][0].copy()
     height[kept.arrays["cells"]] = kept.arrays["block"][0]
     actuator, state = system.cell.actuator, begin(system)
@@ -175,7 +175,7 @@ def transfer_heights(system: System, data: bytes) -> State:
     return State(0, state.rows, state.modes, state.aged, peak, state.gathered, state.memory)
 
 
-def _within_the_device(system: System, kept: Kept) -> None:
+def _check_limits(system: System, kept: Kept) -> None:
     """Refuse pins beyond their end stops, and valves opened wider than all the way."""
     rows, top = system.rows, system.cell.actuator.stroke + SLACK
     for name in ("rows", "block"):
@@ -183,45 +183,45 @@ def _within_the_device(system: System, kept: Kept) -> None:
         height, valves = values[0], (values[system.cell.lag_rows], values[rows.commands])
         wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
         if wide or ((height < -SLACK) | (height > top)).any():
-            raise _unusable("holds numbers that no state has")
+            raise _make_error("holds numbers that no state has")
 
 
 def _read(data: bytes) -> Kept:
     """Read bytes without regard to any system; their arrays are new ones."""
     if not isinstance(data, bytes) or not data.startswith((START, FIRST)):
-        raise _unusable("does not begin as one")
+        raise _make_error("does not begin as one")
     try:
         first = len(START) + 4
         length = int.from_bytes(data[len(START) : first], "little")
         header = json.loads(data[first : first + length])
-        cells, held = _whole(header["cells"]), header["gathered"]
+        cells, held = _read_count(header["cells"]), header["gathered"]
         if data.startswith(FIRST):
             held["fingers"] = [{"reach": held.pop("reach")}]
-        count, taken = Rows(*map(_whole, header["rows"])).count, _whole(held["cells"])
+        count, taken = Rows(*map(_read_count, header["rows"])).count, _read_count(held["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),
             ("<i8", (taken,)), ("<f8", (count, taken)), ("i1", (taken,)),
         ]  # fmt: skip
-        shapes += [(str(kind), tuple(map(_whole, shape))) for kind, shape in header["arrays"]]
-        arrays, end = _arrays(data, first + length, shapes)
+        shapes += [(str(kind), tuple(map(_read_count, shape))) for kind, shape in header["arrays"]]
+        arrays, end = _read_arrays(data, first + length, shapes)
         if end != len(data):
-            raise _unusable(f"must have {end} bytes and has {len(data)}")
+            raise _make_error(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], held["peak"], header["control_period"]]
-        numbers += [_whole(value) for value in (header["period"], held["until"], held["near"])]
+        numbers += [_read_count(value) for value in (header["period"], held["until"], held["near"])]
         discs = [held["control"], *(finger["reach"] for finger in held["fingers"])]
-        numbers += [number for disc in discs for number in _disc(disc) or ()]
+        numbers += [number for disc in discs for number in _read_disc(disc) or ()]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
         kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
-        raise _unusable(f"is damaged: {type(error).__name__}") from None
-    if not sound or not _sound(kept, cells):
-        raise _unusable("holds numbers that no state has")
+        raise _make_error(f"is damaged: {type(error).__name__}") from None
+    if not sound or not _is_sound(kept, cells):
+        raise _make_error("holds numbers that no state has")
     return kept
 
 
-def _arrays(
+def _read_arrays(
     data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
 ) -> tuple[list[NDArray[Any]], int]:
     """Return copies of the arrays that stand in `data` from a place on, and where they end."""
@@ -235,7 +235,7 @@ def _arrays(
     return found, at
 
 
-def _sound(kept: Kept, count: int) -> bool:
+def _is_sound(kept: Kept, count: int) -> bool:
     """Return whether the arrays hold what those of a state can hold."""
     arrays = kept.arrays
     cells = arrays["cells"]
@@ -247,14 +247,14 @@ def _sound(kept: Kept, count: int) -> bool:
     )
 
 
-def _whole(value: Any) -> int:
+def _read_count(value: Any) -> int:
     """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
         raise ValueError(f"no count: {value!r}")
     return value
 
 
-def _disc(values: Any) -> Disc | None:
+def _read_disc(values: Any) -> Disc | None:
     """Return a part of the bed."""
     if values is None:
         return None
@@ -264,13 +264,13 @@ def _disc(values: Any) -> Disc | None:
     return x, y, radius
 
 
-def _fits(what: str, kept: Any, here: Any) -> None:
+def _check_same(what: str, kept: Any, here: Any) -> None:
     """Refuse a state of another system."""
     if kept != here:
         rule = f"must have the same {what} as the bed now, {here} (got {kept})"
         raise StateError(f"The kept state {rule}. {REMEDY}")
 
 
-def _unusable(reason: str) -> StateError:
+def _make_error(reason: str) -> StateError:
     """Return the error of bytes that are no state."""
     return StateError(f"The kept state {reason}, and cannot be taken up. {REMEDY}")

@@ -58,7 +58,7 @@ def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
         When the memory is that of another controller, or damaged.
     """
     try:
-        return _like(template, kept, arrays)
+        return _rebuild_like(template, kept, arrays)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError):
         raise StateError(
             f"The kept state's memory of the controller must be a {type(template).__name__} "
@@ -66,7 +66,7 @@ def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
         ) from None
 
 
-def _like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
+def _rebuild_like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return `kept` in the types of the template; any error means another structure."""
     kind = type(template)
     if isinstance(template, np.ndarray):
@@ -78,7 +78,7 @@ def _like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
         name, *items = kept
         if name != kind.__name__:
             raise ValueError("another named tuple")
-        like = [_like(part, item, arrays) for part, item in zip(template, items, strict=True)]
+        like = [_rebuild_like(part, item, arrays) for part, item in zip(template, items, strict=True)]
         return kind(*like) if hasattr(kind, "_fields") else kind(like)
     if template is None:
         if kept is not None:

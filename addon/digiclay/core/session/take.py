@@ -140,7 +140,7 @@ def to_scene(take: Take, name: str) -> Scene:
         When the take does not begin at rest: a scene file has no other beginning.
     """
     system = assemble(take.scene)
-    if not _rests(system, take.start):
+    if not _is_at_rest(system, take.start):
         raise OutputError(
             f"The take {name!r} begins on a bed that is formed already, and a scene file begins at rest: "
             "reset the session before recording a take for export."
@@ -148,22 +148,22 @@ def to_scene(take: Take, name: str) -> Scene:
     times = np.arange(len(take.poses)) * take.scene.simulation.control_period
     lasting = replace(take.scene.simulation, duration=float(times[-1]))
     fingers = tuple(
-        replace(finger, trajectory=_path(times, take.poses[:, number]))
+        replace(finger, trajectory=_make_path(times, take.poses[:, number]))
         for number, finger in enumerate(take.scene.fingers)
     )
     return replace(take.scene, name=name, simulation=lasting, fingers=fingers)
 
 
-def _path(times: Floats, poses: Floats) -> Path:
+def _make_path(times: Floats, poses: Floats) -> Path:
     """Return a finger's poses (t, 7) at times (t,), s, as the path of a scene."""
     waypoints = (
         Waypoint(float(times[row]), tuple(poses[row, :3].tolist()), tuple(poses[row, 3:].tolist()))
-        for row in np.flatnonzero(_turning_points(poses))
+        for row in np.flatnonzero(_find_turns(poses))
     )
     return Path("linear", tuple(waypoints))
 
 
-def _rests(system: System, start: bytes) -> bool:
+def _is_at_rest(system: System, start: bytes) -> bool:
     """Return whether a state is that of a bed nothing has happened to, however long it has waited."""
     state, rest = snapshot.load(system, start), begin(system)
     return (
@@ -173,7 +173,7 @@ def _rests(system: System, start: bytes) -> bool:
     )
 
 
-def _turning_points(poses: Floats) -> NDArray[np.bool_]:
+def _find_turns(poses: Floats) -> NDArray[np.bool_]:
     """Return the poses that are needed to draw the path with straight lines, evenly spaced in time."""
     needed = np.ones(len(poses), bool)
     bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
