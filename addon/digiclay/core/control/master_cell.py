@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.actuator import Actuator
 from ..model.delay import Queue
 from ..model.interfaces import Flow
 from ..model.physics import GAUSS, Cell
-from ..model.supply import Supply
 
 __all__ = ["MasterCell", "make_master_cell"]
 
@@ -28,8 +26,12 @@ class MasterCell:
         The law of valve and conduit.
     laminar : bool
         No unloaded valve is turbulent.
-    supply : Supply
-    actuator : Actuator
+    up, down : float
+        Pressures of the reservoirs over the area of a pin, Pa/m².
+    area : float
+        Of a pin, m².
+    stroke : float
+        Upper end stop, m.
     period : float
         Control period, s.
     """
@@ -37,8 +39,10 @@ class MasterCell:
     openings: tuple[tuple[float, float], ...]
     flow: Flow
     laminar: bool
-    supply: Supply
-    actuator: Actuator
+    up: float
+    down: float
+    area: float
+    stroke: float
     period: float
 
     def advance(self, height: float, opening: float, command: float) -> tuple[float, float]:
@@ -52,16 +56,15 @@ class MasterCell:
         """
         (a, b), (c, d), (e, f) = self.openings
         speed = 0.5 * (self.speed(a * opening + b * command) + self.speed(c * opening + d * command))
-        stroke = self.actuator.stroke
-        return min(max(height + self.period * speed, 0.0), stroke), e * opening + f * command
+        return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
 
     def speed(self, opening: float) -> float:
         """Return the speed of the unloaded pin, m/s."""
-        pressure = self.supply.high if opening > 0.0 else self.supply.low
+        drive = self.up if opening > 0.0 else self.down
         if self.laminar:
-            speed: float = self.flow.laminar_conductance(opening) * pressure / self.actuator.area
+            speed: float = self.flow.laminar_conductance(opening) * drive
             return speed
-        return float(self.flow.flow(np.array(opening), np.array(pressure))) / self.actuator.area
+        return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
 
 
 def make_master_cell(cell: Cell, period: float) -> MasterCell:
@@ -77,4 +80,6 @@ def make_master_cell(cell: Cell, period: float) -> MasterCell:
     # Without a lag there is no column for the opening at the start.
     openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
     laminar = cell.flow.knee > cell.supply.largest
-    return MasterCell(openings, cell.flow, laminar, cell.supply, cell.actuator, period)
+    area, stroke = cell.actuator.area, cell.actuator.stroke
+    up, down = cell.supply.high / area, cell.supply.low / area
+    return MasterCell(openings, cell.flow, laminar, up, down, area, stroke, period)

@@ -72,9 +72,8 @@ def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:
     limit : float or ndarray (b,)
         Force the high reservoir can lift, ``P_high A_a``, N.
     """
-    limit, shut = constants((limit, 0.0), force.shape)
     overload = force >= limit
     if any_true(overload):
-        overload &= command > shut
-        np.putmask(command, overload, shut)
+        overload &= command > 0.0
+        np.putmask(command, overload, 0.0)
     return command

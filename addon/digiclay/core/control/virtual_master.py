@@ -10,6 +10,7 @@ master is decided in plain numbers, run by run.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -103,26 +104,23 @@ class VirtualMasterControl(MasterControl):
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
         """Create the blister, freeze what is left behind, command every cell; see `interfaces.Controller`."""
-        target, mode = seen.target, self._find_formed(seen.target)
+        target = seen.target
+        *limits, rest, band = constants(self._limits, target.shape)
+        off = target - rest
+        np.abs(off, off)
+        # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
+        mode: NDArray[np.int8] = (off > band).view(np.int8)
         if self.any_run(MasterControl.is_active, memory):
-            memory, target = self._create_blister(memory, seen, mode)
+            memory, target = self._create_blister(memory, seen, mode, limits)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Orders(target, mode, command)
 
-    def _find_formed(self, target: Floats) -> NDArray[np.int8]:
-        """Return the modes of cells outside the blister: formed ones hold, the others rest."""
-        rest, band = constants(self._limits, target.shape)[-2:]
-        off = target - rest
-        np.abs(off, off)
-        # False and True are the codes of these two modes.
-        mode: NDArray[np.int8] = (off > band).view(np.int8)
-        return mode
-
-    def _create_blister(self, memory: Any, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Any, Floats]:
+    def _create_blister(
+        self, memory: Any, seen: Measurement, mode: NDArray[np.int8], limits: Sequence[Any]
+    ) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        shape = seen.target.shape
-        edge_mode, formed, froze = constants(CODES, shape, np.int8)
-        abeam, radius, edge_radius, flat_radius, behind, release, noise, *_ = constants(self._limits, shape)
+        abeam, radius, edge_radius, flat_radius, behind, release, noise = limits
+        edge_mode, formed, froze = constants(CODES, mode.shape, np.int8)
         x, y, toward_x, toward_y = self.gather(MasterControl.get_pose, memory)
         distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.place)
         inside = distance <= radius
