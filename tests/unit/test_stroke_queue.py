@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from digiclay.core.session import live_periods
-from digiclay.live import sculpting
+from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import draw
 from digiclay.live.stroke_queue import change_stroke, find_stroke, queue_stroke
@@ -86,21 +86,21 @@ def test_at_most_one_stroke_ends_in_a_tick_so_that_each_gets_an_undo_step() -> N
 
 def test_a_stroke_taken_back_in_its_middle_leaves_the_bed_as_before_and_lets_the_earlier_ones_be() -> None:
     once = finish(tap(started(), -15.0, 0.0))
-    before, gestures = heights(once).copy(), len(once.gestures)
+    before, touched = heights(once).copy(), len(once.gestures)
     (session, _), now = queue_stroke(once, 15e-3, 0.0, DEPTH), once.clock.seen or 0.0
     for _ in range(30):
         now += TICK
         session = sculpting.advance(session, session.pose, now, 100)
     assert np.abs(heights(session) - before).max() > 1e-4
-    back = sculpting.withdraw_stroke(session)
+    back = gestures.withdraw_stroke(session)
     np.testing.assert_array_equal(heights(back), before)
-    assert (back.strokes, len(back.gestures)) == ((), gestures)
+    assert (back.strokes, len(back.gestures)) == ((), touched)
 
 
 def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
     session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
     number = session.strokes[-1].number
-    back = sculpting.rewind(session)
+    back = gestures.rewind(session)
     assert find_stroke(back, number) is None
     done = finish(back)
     assert depth_at(done, -15.0, 0.0) > FORMED
@@ -108,4 +108,4 @@ def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
 
 
 def test_a_reset_forgets_what_the_finger_has_not_finished() -> None:
-    assert sculpting.reset(tap(started(), 0.0, 0.0)).strokes == ()
+    assert gestures.reset(tap(started(), 0.0, 0.0)).strokes == ()

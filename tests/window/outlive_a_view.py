@@ -71,7 +71,7 @@ def escape(blender: Any) -> Iterator[float | None]:
         area = next(one for one in blender.window().screen.areas if one.type == name)
         at = area.x + area.width // 2, area.y + area.height // 2
         blender.event("MOUSEMOVE", "NOTHING", at)
-        yield from blender.until(loop.aside)
+        yield from blender.until(loop.is_aside)
         before = modal(), len(blender.part("live.running").list_sessions())
         blender.key("ESC", at)
         yield 0.5
@@ -100,7 +100,7 @@ def looked(blender: Any, name: str) -> Iterator[float | None]:
     """Wait until Blender has done what was asked for and it was looked at; count."""
     watch, tick = blender.part("device.unit_watch"), blender.part("live.running").list_sessions
     yield 1.0
-    yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._look))
+    yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if tick():
         yield from blender.until(lambda: not all(one.stale for one in tick()))
     yield 0.5

@@ -166,8 +166,8 @@ class Events:
 def check(blender: Any) -> None:
     """Check that every session is a state that can be kept, and every bed shows finite pins."""
     running, snapshot = blender.part("live.running"), blender.part("core.session.snapshot")
-    for session in running.all():
-        state = snapshot.load(session.system, session.kept)
+    for session in running.list_sessions():
+        state = snapshot.load(session.system, session.snapshot)
         height = state.row(0)
         assert np.isfinite(height).all()
         assert height.min() >= 0.0

@@ -31,7 +31,7 @@ __all__ = [
     "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
     "bed_of", "build", "colour_by", "colour_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
     "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state",
-    "shows_arrows", "shows_force", "sources_of", "top_colour", "tree_of", "underside", "wants_force",
+    "shows_arrows", "shows_force", "sources_of", "top_colour", "underside", "wants_force",
 ]  # fmt: skip
 
 #: What the colour of a pin can tell.
@@ -60,7 +60,7 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     """
     cells = bridge.points("Digital Clay", len(instant.height))
     bed = parts.marked(cells, cells.name, BED, collection)
-    bed.modifiers.new(MODIFIER, "NODES").node_group = tree_of(instant, lowest)
+    bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
     parts.make_fingertip(collection, bed)
     hold_parts(bed)
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
@@ -68,15 +68,8 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     return bed
 
 
-def tree_of(instant: Instant, lowest: float | None = None) -> Any:
-    """Make the geometry nodes that draw pins and housing of a bed; see `build`.
-
-    Parameters
-    ----------
-    instant : Instant
-    lowest : float, optional
-        Lowest pin top the housing must have room for, m; by default the instant's own.
-    """
+def _make_tree(instant: Instant, lowest: float | None = None) -> Any:
+    """Make the geometry nodes that draw pins and housing of a bed; see `build`."""
     lowest = float(instant.height.min()) if lowest is None else lowest
     # The rim stays below most tops, so that the surface and little of the rods is seen over it.
     rim = float(np.median(instant.height)) - 1.2 * instant.pitch
@@ -88,8 +81,15 @@ def tree_of(instant: Instant, lowest: float | None = None) -> Any:
 
 
 def add_modifier(bed: Any, instant: Instant) -> None:
-    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
-    _modifier(bed).node_group = tree_of(instant, 0.0)
+    """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    instant : Instant
+        For the sizes of the housing and the pins.
+    """
+    _modifier(bed).node_group = _make_tree(instant, 0.0)
 
 
 def hold_parts(bed: Any) -> None:
@@ -104,7 +104,13 @@ def hold_parts(bed: Any) -> None:
 
 
 def show(bed: Any, instant: Instant) -> None:
-    """Show another instant of the same bed, its fingertip's pose included."""
+    """Show another instant of the same bed, its fingertip's pose included.
+
+    Parameters
+    ----------
+    bed : bpy.types.Object
+    instant : Instant
+    """
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     _place_fingertip(bed, instant)
 

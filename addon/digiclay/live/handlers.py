@@ -49,7 +49,15 @@ def write_recordings(*_: Any) -> None:
 
 @bpy.app.handlers.persistent
 def finish_saving(path: str, *_: Any) -> None:
-    """Go on recording after the file was saved."""
+    """Go on recording after the file was saved.
+
+    Parameters
+    ----------
+    path : str
+        Of the file.
+    *_
+        What else Blender hands over.
+    """
     recovery.clear_recovery(path)
 
 

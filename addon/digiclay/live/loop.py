@@ -75,7 +75,14 @@ def end() -> None:
 
 
 def is_due(context: Any, now: float) -> bool:
-    """Return whether to tick now: no more often than preferred, though other timers may run as well."""
+    """Return whether to tick now: no more often than preferred, though other timers may run as well.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    now : float
+        Monotonic time, s.
+    """
     wanted = (1.0 - EARLY) / preferences.get(context).redraw_rate
     if now - float(_LOOP["ticked"]) < wanted:
         return False
@@ -84,7 +91,14 @@ def is_due(context: Any, now: float) -> bool:
 
 
 def redraw_numbers(context: Any, now: float) -> None:
-    """Have the sidebars drawn anew, now and then: numbers that change too quickly cannot be read."""
+    """Have the sidebars drawn anew, now and then: numbers that change too quickly cannot be read.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    now : float
+        Monotonic time, s.
+    """
     if now - float(_LOOP["numbers"]) < NUMBERS:
         return
     _LOOP["numbers"] = now

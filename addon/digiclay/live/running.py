@@ -59,7 +59,18 @@ class Recording:
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int) -> Recording:
-        """Return a recording that has nothing but its start."""
+        """Return a recording that has nothing but its start.
+
+        Parameters
+        ----------
+        snapshot : bytes
+            The state at the start.
+        period : int
+            Its period.
+        pose : ndarray (f, 7)
+            Of the fingertips then.
+        tick : int
+        """
         rows = np.empty((256, pose.size + 1))
         rows[0] = *pose.ravel(), tick
         return cls(snapshot, period, rows, 1)
@@ -75,7 +86,14 @@ class Recording:
         return self.count > max(self.saved, 1)
 
     def extend(self, path: Floats, tick: int) -> Recording:
-        """Return the recording with the poses of some more periods, shape (k, f, 7)."""
+        """Return the recording with the poses of some more periods, shape (k, f, 7).
+
+        Parameters
+        ----------
+        path : ndarray (k, f, 7)
+            Poses at the ends of the periods.
+        tick : int
+        """
         end = self.count + len(path)
         rows = self.rows
         if end > len(rows):
@@ -86,7 +104,14 @@ class Recording:
         return replace(self, rows=rows, count=end)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
-        """Return the recording as it was at a moment undo came back to; None when it did not lead there."""
+        """Return the recording as it was at a moment undo came back to; None when it did not lead there.
+
+        Parameters
+        ----------
+        tick : int
+        period : int
+            Of the state at that tick.
+        """
         count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 

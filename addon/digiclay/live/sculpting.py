@@ -1,4 +1,4 @@
-"""Start, advance and rewind of a live session; no Blender."""
+"""Start and advance of a live session; no Blender."""
 
 from __future__ import annotations
 
@@ -27,13 +27,11 @@ from ..core.session.live_periods import (
 )
 from ..core.session.recent_trace import begun as trace_begun
 from ..core.session.recent_trace import extended, felt, picked, row
-from ..device.instant import CLEARANCE
 from .running import Gesture, Recording, Running
-from .stroke_queue import drop_strokes, take_path
+from .stroke_queue import take_path
 
 __all__ = [
-    "advance", "begin_session", "change_scene", "request_step", "reset", "restore", "restore_gesture",
-    "rewind", "set_recording", "withdraw_stroke",
+    "advance", "begin_session", "change_scene", "request_step", "restore", "set_recording",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -53,6 +51,20 @@ def begin_session(
     uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0
 ) -> tuple[Running, str]:
     """Begin a session, from a kept state if there is one.
+
+    Parameters
+    ----------
+    uid : int
+        `session_uid` of the bed.
+    name : str
+        Of the bed, for messages.
+    scene : Scene
+    pose : ndarray (7,)
+        Of the fingertip: lowest point, m, and quaternion.
+    kept : bytes, optional
+        A snapshot of `core.session.snapshot`; at rest when left out.
+    tick : int, optional
+        Of that snapshot.
 
     Returns
     -------
@@ -129,7 +141,16 @@ def request_step(running: Running) -> Running:
 
 
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
-    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advance`."""
+    """Simulate control periods while the finger goes along its strokes, or else to a pose; see `advance`.
+
+    Parameters
+    ----------
+    running : Running
+    pose : ndarray (7,)
+        Where the finger is.
+    count : int
+        Most control periods.
+    """
     system, state, monitor = running.system, running.state, running.monitor
     if running.strokes:
         running, path = take_path(running, count)
@@ -205,52 +226,14 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
     )  # fmt: skip
 
 
-def rewind(running: Running) -> Running:
-    """Take back the last gesture: state and finger are where it began; nothing changes if there is none."""
-    if running.strokes:
-        return withdraw_stroke(running)
-    if not running.gestures:
-        return running
-    *earlier, last = running.gestures
-    return restore_gesture(replace(running, gestures=tuple(earlier)), last)
-
-
-def withdraw_stroke(running: Running) -> Running:
-    """Take back the last stroke: state and finger are where it began, or it never begins."""
-    *earlier, last = running.strokes
-    if last.height is None:
-        return replace(running, strokes=tuple(earlier))
-    assert running.stroke_start is not None
-    return drop_strokes(restore_gesture(running, running.stroke_start))
-
-
-def restore_gesture(running: Running, gesture: Gesture) -> Running:
-    """Bring state and finger back to where a gesture began; a recording that began before goes back too.
-
-    A finger that touched there already has to move on before it makes another gesture: else it counted at
-    once, and could be taken back for ever without a way to those before it.
-    """
-    back = restore(replace(running, recording=None), gesture.snapshot, gesture.pose)
-    keep = running.recording
-    # The gesture a reset leaves behind has periods of another count.
-    if keep is not None:
-        keep = keep.cut_at_period(gesture.period) if gesture.period == back.state.period else None
-    next_gesture = gesture if back.next_gesture is not None else None
-    return replace(back, next_gesture=next_gesture, rest_time=REST, recording=keep)
-
-
-def reset(running: Running) -> Running:
-    """Bring the bed back to rest and lift the finger off it; this can be rewound like a gesture."""
-    # Before period 0, at which the first gesture after the reset may begin.
-    before = Gesture(-1, running.snapshot, running.pose)
-    pose = running.pose.copy()
-    pose[2] = max(pose[2], running.system.cell.actuator.rest_height + CLEARANCE)
-    back = restore(replace(drop_strokes(running), gestures=()), None, pose, tick=-1)
-    return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
-
-
 def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
-    """Let the session go on with other parameters; see `begin_session` for what is returned and raised."""
+    """Let the session go on with other parameters; see `begin_session` for what is returned and raised.
+
+    Parameters
+    ----------
+    running : Running
+    scene : Scene
+    """
     if scene == running.scene:
         return running, ""
     other, said = begin_session(
@@ -272,7 +255,13 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
 
 
 def set_recording(running: Running, on: bool) -> Running:
-    """Begin to record the finger's path, or stop recording it."""
+    """Begin to record the finger's path, or stop recording it.
+
+    Parameters
+    ----------
+    running : Running
+    on : bool
+    """
     if not on:
         return replace(running, recording=None)
     begin_at = Recording.begin(running.snapshot, running.state.period, running.pose, running.tick)

@@ -17,7 +17,7 @@ from ..device.instant import find_ellipsoid
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..settings import properties
-from . import bed_state, running, sculpting
+from . import bed_state, gestures, running, sculpting
 from .running import Floats, Running
 from .stroke_queue import drop_strokes
 from .waiting import blocking_reason, find_bed
@@ -90,7 +90,14 @@ def show(bed: Any, session: Running) -> None:
 
 
 def place_finger(context: Any, bed: Any, session: Running) -> None:
-    """Put the fingertip where a session has it; one that is animated or constrained goes its own way."""
+    """Put the fingertip where a session has it; one that is animated or constrained goes its own way.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    session : Running
+    """
     tip = view.fingertip_of(bed)
     if tip is not None:
         bridge.place_fingertip(tip, session.pose, find_ellipsoid(session.scene))
@@ -110,7 +117,7 @@ def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
     for session in busy:
         bed = find_bed(session.uid, session.name)
         if bed is not None:
-            back = sculpting.withdraw_stroke(session)
+            back = gestures.withdraw_stroke(session)
             show(bed, back)
             place_finger(context, bed, back)
     return bool(busy)

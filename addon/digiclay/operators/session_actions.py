@@ -10,7 +10,7 @@ from ..core.scene.assembly import assemble
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..device.view import bed_of
-from ..live import bed_state, handlers, loop, running, sculpting, tick
+from ..live import bed_state, gestures, handlers, loop, running, sculpting, tick
 from ..live.running import Running
 from ..live.waiting import active_session
 from ..recorded import takes
@@ -98,7 +98,7 @@ class RewindSession(OfSession, bpy.types.Operator):
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Go back, the fingertip along with the bed."""
-        back = sculpting.rewind(session)
+        back = gestures.rewind(session)
         if session.recording is not None and back.recording is None:
             kept = takes.keep_recording(bed, session)
             self.report({"INFO"}, kept or "The recording ended: the gesture began before it")
@@ -139,7 +139,7 @@ class ResetSession(OfSession, bpy.types.Operator):
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Begin anew, the recording kept as a take."""
         kept = takes.keep_recording(bed, session)
-        back = sculpting.reset(session)
+        back = gestures.reset(session)
         tick.show(bed, back)
         tick.place_finger(context, bed, back)
         if kept:

@@ -16,7 +16,13 @@ _TOLD: dict[str, str] = {}
 
 
 def show(context: Any, words: str) -> None:
-    """Write words into the status bar, in place of those written before, in whichever workspace."""
+    """Write words into the status bar, in place of those written before, in whichever workspace.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    words : str
+    """
     name = context.workspace.name
     if _TOLD.get(name) == words:
         return

@@ -165,12 +165,12 @@ def force_message(force: float) -> str:
     return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
 
 
-def head_height(told: Readings) -> float:
+def _head_height(told: Readings) -> float:
     """Return the height of the head, pixels at a UI scale of 1."""
     return 3 * ROW + GAP
 
 
-def head(told: Readings, pen: Pen, top: float) -> None:
+def _draw_head(told: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
     speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
     top = pen.row(top, told.name, "paused" if told.paused else speed)
@@ -178,12 +178,12 @@ def head(told: Readings, pen: Pen, top: float) -> None:
     pen.row(top, error_message(told.errors), small=True)
 
 
-def force_height(told: Readings) -> float:
+def _force_height(told: Readings) -> float:
     """Return the height of the section of the force, pixels at a UI scale of 1."""
     return 2 * ROW + PLOT + GAP
 
 
-def force(told: Readings, pen: Pen, top: float) -> None:
+def _draw_force(told: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
     now = force_message(float(told.force[-1])) if told.force.size else ""
     asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
@@ -204,12 +204,12 @@ def force(told: Readings, pen: Pen, top: float) -> None:
     pen.row(box.y, "", f"last {told.seconds:g} s", small=True)
 
 
-def heights_height(told: Readings) -> float:
+def _heights_height(told: Readings) -> float:
     """Return the height of the section of the heights, pixels at a UI scale of 1."""
     return ROW * (2 + math.ceil(len(told.pins) / 3)) + PLOT + GAP if told.pins else ROW + GAP
 
 
-def heights(told: Readings, pen: Pen, top: float) -> None:
+def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
     """Draw the heights of the picked pins over the last seconds."""
     if not told.pins:
         pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
@@ -231,12 +231,12 @@ def heights(told: Readings, pen: Pen, top: float) -> None:
         _entry(pen, x, y, pen.look.pins[place], f"{pin}:{now}")
 
 
-def scale_height(told: Readings) -> float:
+def _scale_height(told: Readings) -> float:
     """Return the height of the scale of colours, pixels at a UI scale of 1; 0 while none is needed."""
     return 0.0 if told.top is None else 2.6 * ROW
 
 
-def scale(told: Readings, pen: Pen, top: float) -> None:
+def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
     """Draw the colours of the force on a pin."""
     if told.top is None:
         return
@@ -247,12 +247,12 @@ def scale(told: Readings, pen: Pen, top: float) -> None:
     pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
 
 
-def modes_height(told: Readings) -> float:
+def _modes_height(told: Readings) -> float:
     """Return the height of the section of the modes, pixels at a UI scale of 1."""
     return ROW * (1 + math.ceil(np.count_nonzero(told.modes) / 2))
 
 
-def modes(told: Readings, pen: Pen, top: float) -> None:
+def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
     """List how many pins are in each mode that occurs, with its colour."""
     top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):
@@ -277,9 +277,9 @@ def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], tex
 
 #: From the top down: how tall each section is, and how it is drawn.
 SECTIONS = (
-    (head_height, head),
-    (force_height, force),
-    (scale_height, scale),
-    (heights_height, heights),
-    (modes_height, modes),
+    (_head_height, _draw_head),
+    (_force_height, _draw_force),
+    (_scale_height, _draw_scale),
+    (_heights_height, _draw_heights),
+    (_modes_height, _draw_modes),
 )
