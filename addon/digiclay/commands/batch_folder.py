@@ -17,7 +17,7 @@ from ..core.base.whole_files import read_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import format_scene
 from ..core.session.finished_run import is_whole
-from ..core.studies.job_table import JOB, SCENE, Batch, Job, read_outputs
+from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, read_outputs
 from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
 from .job import FILES, RUNS, TIMING
@@ -47,7 +47,7 @@ class Folder:
     """Folder of a job series."""
 
     path: Path
-    batch: Batch
+    batch: JobSeries
 
     def job(self, job: Job) -> Path:
         """Return the folder of a job's files."""
@@ -140,13 +140,13 @@ class Folder:
 
 
 @contextmanager
-def open_batch(path: Path, batch: Batch) -> Iterator[Folder]:
+def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
     """Make a batch's folder, or go on with one; nobody else may work in it meanwhile.
 
     Parameters
     ----------
     path : Path
-    batch : Batch
+    batch : JobSeries
 
     Raises
     ------

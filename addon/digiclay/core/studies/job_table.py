@@ -27,7 +27,7 @@ from ..shapes.height_text import packed
 from ..shapes.source_file import fitted_to
 from .job_outputs import KEYS, Outputs, make_outputs
 
-__all__ = ["JOB", "MOST", "SCENE", "Batch", "Job", "find_jobs_file", "read_jobs", "read_outputs"]
+__all__ = ["JOB", "MOST", "SCENE", "Job", "JobSeries", "find_jobs_file", "read_jobs", "read_outputs"]
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
@@ -57,7 +57,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Batch:
+class JobSeries:
     """Jobs of a JOBS file, and their outputs."""
 
     name: str
@@ -65,7 +65,7 @@ class Batch:
     outputs: Outputs
 
 
-def read_jobs(path: Path) -> Batch:
+def read_jobs(path: Path) -> JobSeries:
     """Read a JOBS file.
 
     Every scene is combined with every method and every setting. A combination whose values do
@@ -94,7 +94,7 @@ def read_jobs(path: Path) -> Batch:
         jobs = tuple(_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
-    return Batch(find_name(path), jobs, made)
+    return JobSeries(find_name(path), jobs, made)
 
 
 def find_jobs_file(said: str) -> Path:
