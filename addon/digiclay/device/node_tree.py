@@ -77,7 +77,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
 def _add_settings(tree: Any) -> None:
     """Add what each bed may choose for itself."""
     socket(tree, COLOUR_BY_FORCE, "NodeSocketBool", False, "Colour the pins by force, not by mode")
-    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "From this force on a pin has the last colour, in N")
+    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last colour, in N")
     socket(tree, ARROWS, "NodeSocketBool", False, "Draw the force on each pin as an arrow onto its top")
     socket(tree, ARROW_LENGTH, "NodeSocketFloat", LENGTH, "Length of the arrow of 1 N, in mm of the device")
 

@@ -181,7 +181,7 @@ def _layout_mismatch(bed: Any, layout: Layout) -> str:
         return f"The bed has {pins} pins, not {wanted}"
     for index, place in _told_apart(layout):
         if np.abs(np.array(bed.data.vertices[index].co[:2]) / bridge.SCALE - place).max() > AWAY:
-            return "The pins stand elsewhere than Layout says"
+            return "The pins differ from the parameters of Layout"
     return ""
 
 
