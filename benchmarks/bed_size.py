@@ -97,7 +97,7 @@ def gathered_cells(side: int) -> list[int]:
     known = scene(side)
     system = assemble(known)
     run = periods(system, known.trajectories(), begin(system), known.periods)
-    return [state.gathered.cells.size for state in run]
+    return [state.active.cells.size for state in run]
 
 
 def measured(side: int, repeats: int) -> Size:
@@ -120,7 +120,7 @@ def measured(side: int, repeats: int) -> Size:
         used, moments = time.process_time(), [time.perf_counter()]
         for state in periods(system, known.trajectories(), start, known.periods):
             moments.append(time.perf_counter())
-            cells.append(state.gathered.cells.size)
+            cells.append(state.active.cells.size)
         means.append((time.process_time() - used) / known.periods)
         spent += [b - a for a, b in pairwise(moments)]
         bytes_a_pin = bytes_of(system, state) / (side * side)

@@ -181,7 +181,8 @@ def period_calls(system: System, trajectories: Sequence[Trajectory], count: int)
         One a finger.
     count : int
     """
-    system = dataclasses.replace(system, grid=_fields_counted(system.grid), plan=_fields_counted(system.plan))
+    own = {name: _fields_counted(getattr(system, name)) for name in ("grid", "selection", "plan")}
+    system = dataclasses.replace(system, **own)
     state = simulation.begin(system)
     several = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
     starts = np.arange(count)[:, None] * system.period

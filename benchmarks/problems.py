@@ -155,7 +155,7 @@ def problem(name: str, *, side: int | None = None) -> Problem:
         commands = np.full((scene.periods, scene.cells), held)
     system = replaying(scene, commands)
     run = periods(system, scene.trajectories(), begin(system), scene.periods)
-    return Problem(name, scene, commands, [(one.gathered.cells, one.gathered.near) for one in run])
+    return Problem(name, scene, commands, [(one.active.cells, one.active.near) for one in run])
 
 
 def replaying(scene: Scene, commands: Floats) -> System:

@@ -119,7 +119,7 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(
     for name in ("rows", "modes", "aged"):
         assert np.array_equal(getattr(state, name), getattr(kept, name)), name
     for name in ("cells", "block", "mode"):
-        assert np.array_equal(getattr(state.gathered, name), getattr(kept.gathered, name)), name
+        assert np.array_equal(getattr(state.active, name), getattr(kept.active, name)), name
     assert np.array_equal(whole(once), whole(again))
 
 
@@ -138,9 +138,9 @@ def test_a_session_interrupted_and_gone_on_with_is_the_whole_session(
 @given(points)
 def test_no_pin_is_higher_than_the_peaks(spots: list[tuple[float, float, float]]) -> None:
     last = shaped(spots).last
-    outside = np.delete(last.rows[0], last.gathered.cells)
+    outside = np.delete(last.rows[0], last.active.cells)
     assert outside.max(initial=0.0) <= last.peak
-    assert last.gathered.block[0, : last.gathered.near].max(initial=0.0) <= max(last.gathered.peak, last.peak)
+    assert last.active.block[0, : last.active.near].max(initial=0.0) <= max(last.active.peak, last.peak)
 
 
 commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)

@@ -66,7 +66,7 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
     trajectory = level(np.linspace(0.0, COUNT * BED.period, len(spots)), np.array(spots) * 1e-3)
     fewer = record(BED, trajectory, COUNT)
     all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, COUNT)
-    assert all_cells.last.gathered.cells.size == BED.grid.count
+    assert all_cells.last.active.cells.size == BED.grid.count
     # Rounding: sums in another order. A force grows e-fold in half a millimetre.
     assert np.abs(fewer.height - all_cells.height).max() < 1e-12
     assert np.abs(fewer.force - all_cells.force).max() < 1e-9
@@ -74,14 +74,14 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
 
 def test_a_finger_far_above_costs_no_cell() -> None:
     run = record(BED, path((0, 0, 0, 200), (1, 5, 5, 200)), 20)
-    assert run.last.gathered.cells.size == 0
+    assert run.last.active.cells.size == 0
 
 
 def test_once_the_surface_has_come_to_rest_no_cell_is_integrated() -> None:
     # The servo's flow goes with the error squared, so coming to rest takes some 20 s.
     run = record(BED, path((0, 0, 0, 45), (0.3, 0, 0, 36), (0.6, 0, 0, 60)), 6000)
     assert np.any(run.height[-1] != 40e-3)
-    assert run.last.gathered.cells.size == 0
+    assert run.last.active.cells.size == 0
 
 
 def test_a_touch_moves_the_cells_around_it_only() -> None:
@@ -89,7 +89,7 @@ def test_a_touch_moves_the_cells_around_it_only() -> None:
         make_system(Layout(25, 25), control=VirtualMaster()), path((0, 0, 0, 45), (0.3, 0, 0, 36)), 60
     )
     # Rows and columns that hold the disc to the edge ring, with a pitch to spare on every side: 15 x 15.
-    assert 20 < run.last.gathered.cells.size <= 15 * 15
+    assert 20 < run.last.active.cells.size <= 15 * 15
 
 
 def test_pins_that_rise_into_a_still_finger_meet_it_at_once() -> None:

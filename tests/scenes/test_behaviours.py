@@ -167,7 +167,7 @@ def test_a_viscous_bed_ends_at_rest() -> None:
 def test_a_viscous_bed_that_has_recovered_costs_nothing() -> None:
     system, way = _system(scene("viscous", (*PRESS[:4], (6.0, 0, 0, 70)), recovery_time=0.3))
     *_, last = periods(system, [way], begin(system), 1200)
-    assert last.gathered.cells.size == 0
+    assert last.active.cells.size == 0
     assert np.all(last.row(system.rows.target) == REST)
 
 

@@ -104,7 +104,7 @@ def test_a_finished_display_costs_nothing() -> None:
     made = scene(refresh="approximate_gradual")
     system, way = assemble(made), made.section("trajectory").trajectory()
     *_, last = periods(system, [way], begin(system), 2000)
-    assert last.gathered.cells.size == 0
+    assert last.active.cells.size == 0
 
 
 def test_a_displayed_shape_holds_against_a_finger() -> None:

@@ -110,7 +110,7 @@ def test_a_shape_that_stands_costs_nothing() -> None:
     made = scene("virtual_master")
     system, way = assemble(made), made.section("trajectory").trajectory()
     *_, last = periods(system, [way], begin(system), round(SHOWN / PERIOD))
-    assert last.gathered.cells.size == 0
+    assert last.active.cells.size == 0
 
 
 def test_a_session_without_a_shape_is_what_it_was_before() -> None:

@@ -169,7 +169,7 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     system = assemble(resolve({}))
     *_, state = periods(system, [press], begin(system), 60)
     middle, corner = 312, 0
-    assert np.isin([middle, corner], state.gathered.cells).tolist() == [True, False]
+    assert np.isin([middle, corner], state.active.cells).tolist() == [True, False]
     trace = picked(begun(PERIOD), [middle, corner], system.grid.count)
     trace = extended(trace, [row(system, state, SetPoint(0.4), trace.pins)])
     assert trace.heights.tolist() == [[state.row(0)[middle], state.row(0)[corner]]]
@@ -186,7 +186,7 @@ def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
 def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
     press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
     *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
-    held, asked = state.gathered, SetPoint(0.04, per_cell=True)
+    held, asked = state.active, SetPoint(0.04, per_cell=True)
     held.mode[:] = Mode.REST
     assert np.isnan(row(SYSTEM, state, asked, ())[2])
     held.mode[:3] = Mode.FORCE_FOLLOW

@@ -25,8 +25,8 @@ def after(start: State, period: int) -> State:
     block = np.zeros_like(start.rows)
     block[0], block[ROWS.force], block[ROWS.command] = 100 + period, 200 + period, 300 + period
     cells, mode = np.arange(CELLS), np.full(CELLS, period, np.int8)
-    held = replace(start.gathered, cells=cells, near=CELLS, block=block, mode=mode)
-    return start._replace(period=period, gathered=held)
+    held = replace(start.active, cells=cells, near=CELLS, block=block, mode=mode)
+    return start._replace(period=period, active=held)
 
 
 def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:

@@ -41,7 +41,7 @@ def same(first: State, second: State) -> bool:
 
 def packed_parts(state: State) -> list[Any]:
     """Return all of a state as things that compare exactly."""
-    held = state.gathered
+    held = state.active
     arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.place)
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
     return [*(array.tobytes() for array in arrays), *rest, state.memory, type(state.memory)]
@@ -182,7 +182,7 @@ def test_a_mode_that_does_not_exist_is_refused() -> None:
 def test_a_cell_that_is_gathered_twice_is_refused() -> None:
     system = system_of()
     state = run(system, begin(system), 70)
-    cells = state.gathered.cells
+    cells = state.active.cells
     cells[1] = cells[0]
     with pytest.raises(StateError, match="no state has"):
         snapshot.load(system, snapshot.dump(system, state))
@@ -205,7 +205,7 @@ def test_numbers_no_device_can_have_are_refused(row: str, value: float, gathered
     state, rows = run(system, begin(system), 70), system.rows
     lag = system.cell.lag_rows.start
     index = {"height": 0, "opening": lag, "command": rows.command, "force": rows.force}[row]
-    (state.gathered.block if gathered else state.rows)[index, 1] = value
+    (state.active.block if gathered else state.rows)[index, 1] = value
     with pytest.raises(StateError, match="no state has"):
         snapshot.load(system, snapshot.dump(system, state))
 

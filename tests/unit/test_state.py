@@ -37,7 +37,7 @@ def test_at_rest_every_pin_is_at_its_target_and_every_valve_shut() -> None:
 
 def test_at_rest_nothing_moves() -> None:
     state = at_rest(Rows(5, 2), 4, 40e-3, None)
-    assert (state.gathered.cells.size, state.mode().tolist()) == (0, [Mode.REST] * 4)
+    assert (state.active.cells.size, state.mode().tolist()) == (0, [Mode.REST] * 4)
 
 
 def pressed() -> State:
@@ -51,14 +51,14 @@ def test_a_copy_shares_no_array_that_a_step_changes() -> None:
     state = pressed()
     copy = state.copy()
     pairs = [(getattr(state, name), getattr(copy, name)) for name in ("rows", "modes", "aged")]
-    pairs += [(getattr(state.gathered, name), getattr(copy.gathered, name)) for name in ("block", "mode")]
+    pairs += [(getattr(state.active, name), getattr(copy.active, name)) for name in ("block", "mode")]
     assert [np.shares_memory(*pair) for pair in pairs] == [False] * 5
 
 
 def test_a_row_has_the_gathered_cells_own_values() -> None:
     state = pressed()
-    assert state.gathered.cells.size
-    assert np.array_equal(state.row(0)[state.gathered.cells], state.gathered.block[0])
+    assert state.active.cells.size
+    assert np.array_equal(state.row(0)[state.active.cells], state.active.block[0])
 
 
 def test_a_row_is_a_new_array() -> None:
@@ -69,7 +69,7 @@ def test_a_row_is_a_new_array() -> None:
 
 def test_modes_are_the_gathered_cells_own() -> None:
     state = pressed()
-    assert np.array_equal(state.mode()[state.gathered.cells], state.gathered.mode)
+    assert np.array_equal(state.mode()[state.active.cells], state.active.mode)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
 from .broadcasting import Floats
 
-__all__ = ["Fingers", "Way", "fingers", "still_coming", "undersides", "way_over"]
+__all__ = ["Fingers", "FingersPeriod", "Way", "fingers", "still_coming", "undersides", "way_over"]
 
 #: Control periods that are worked out at a time.
 CHUNK = 256
@@ -40,6 +41,27 @@ class Fingers:
     forms: Floats
     join: Floats
     window: Floats
+
+    def at(self, period: int) -> FingersPeriod:
+        """Return the fingers in one of these periods."""
+        return FingersPeriod(self, period)
+
+
+class FingersPeriod(NamedTuple):
+    """The fingers in one control period of their ways; see `touch.FingerPeriod`."""
+
+    coming: Fingers
+    period: int
+
+    @property
+    def window(self) -> Floats:
+        """Which cells the fingers may touch, shape (6, b) or (6, 1); see `touch.Window`."""
+        window: Floats = self.coming.window[self.period - self.coming.first]
+        return window
+
+    def under(self, place: Floats) -> Floats:
+        """Return their undersides over some places (6, k, b), shape (p, k, b), m."""
+        return undersides(self.coming, self.period, place)
 
 
 def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, count: int) -> Fingers:

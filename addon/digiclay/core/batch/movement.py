@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from ..model.interfaces import Movement, Stepper
 from .broadcasting import Floats
 
-__all__ = ["BatchMovement"]
+__all__ = ["BatchMovement", "BatchStepper"]
 
 #: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
 #: on one core (waking a second one takes longer than the product).
@@ -20,27 +21,41 @@ PIECE = 2048
 GROUP = 8
 
 
+@dataclass(frozen=True, eq=False)
+class BatchStepper:
+    """The runs' own stepper, for the cells of many runs; see `interfaces.Stepper`.
+
+    Attributes
+    ----------
+    stepper : Stepper
+    alike : bool
+        The cells of all runs are alike, so they are moved as those of one large bed.
+    valve : int
+        From this row on there is what moves a pin without a finger: its opening and its commands.
+    """
+
+    stepper: Stepper
+    alike: bool
+    valve: int
+
+    def prepare(self, plan: Any, rows: Floats, near: int) -> BatchMovement:
+        """Prepare to move one set of cells of all runs; see `interfaces.Stepper`."""
+        return BatchMovement(self, plan, rows, near)
+
+
 class BatchMovement:
     """Moves one set of cells of b runs, period by period.
 
     Parameters
     ----------
-    stepper : Stepper
-    plan : object
-        With the numbers of all runs.
-    alike : bool
-        The cells of all runs are alike, so they are moved as those of one large bed.
-    rows : ndarray (r + q, w, b)
-        See `interfaces.Stepper`.
-    near : int
-        Number k of cells, the first of each run, that the fingers may touch.
-    valve : int
-        From this row on there is what moves a pin without a finger: its opening and its commands.
+    batch : BatchStepper
+    plan, rows, near
+        See `interfaces.Stepper.prepare`.
     """
 
-    def __init__(self, stepper: Stepper, plan: Any, alike: bool, rows: Floats, near: int, valve: int) -> None:
-        self._stepper, self._plan, self._alike = stepper, plan, alike
-        self._rows, self._near, self._valves = rows, near, rows[valve:, near:]
+    def __init__(self, batch: BatchStepper, plan: Any, rows: Floats, near: int) -> None:
+        self._stepper, self._plan, self._alike = stepper, plan, alike = batch.stepper, plan, batch.alike
+        self._rows, self._near, self._valves = rows, near, rows[batch.valve :, near:]
         own = self._beds(rows)
         count = near * rows.shape[2] if alike else near
         parts = _pieces(count, 1 if alike else rows.shape[2])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 from ..engine.system import System
+from ..model.interfaces import Stepper
 from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
-from .advance import Stack
+from .advance import Batch
 from .broadcasting import kind, numbers, together
-from .padding import Gathering
+from .movement import BatchStepper
+from .padding import PaddedSelection
 from .run_by_run import join_controllers
 
 __all__ = ["STACKED", "put_together", "structure", "why_not"]
@@ -65,8 +67,10 @@ def structure(scene: Scene) -> Any:
     if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
     system = assemble(scene)
-    nodes = tuple((part.start, part.stop) for plan in _plans(system) for part in plan.nodes)
-    return (*common, kind(physics), system.rows, nodes, system.instants.size)
+    steps = tuple(
+        (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(system)
+    )
+    return (*common, kind(physics), system.rows, steps, system.instants.size)
 
 
 def _plans(system: System) -> tuple[BernoulliPlan, ...]:
@@ -79,15 +83,23 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
     return ()
 
 
-def put_together(systems: Sequence[System]) -> Stack:
+def put_together(systems: Sequence[System]) -> Batch:
     """Put systems of one structure together."""
     first, cell = systems[0], together([system.cell for system in systems])
     period = numbers([system.period for system in systems])
-    rise = period * numbers([system.fastest for system in systems])
-    return Stack(
-        tuple(systems),
-        first.rows,
-        join_controllers([system.controller for system in systems]) if first.controller else None,
-        together([system.plan for system in systems]),
-        Gathering(first.grid, first.rows, cell, period, rise),
+    fastest = numbers([system.fastest for system in systems])
+    plan = together([system.plan for system in systems])
+    return Batch(
+        grid=first.grid,
+        cell=cell,
+        sensors=None,
+        controller=join_controllers([system.controller for system in systems]) if first.controller else None,
+        stepper=cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start)),
+        plan=plan,
+        period=period,
+        fastest=fastest,
+        selection=PaddedSelection(first.grid, first.rows, cell, period, fastest),
+        instants=first.instants,
+        rows=first.rows,
+        systems=tuple(systems),
     )

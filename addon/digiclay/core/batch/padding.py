@@ -5,47 +5,27 @@ The set is made anew for all runs together, as soon as it no longer does for one
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.modes import Mode
-from ..engine.state import Rows
+from ..engine.active_set import KEPT, Selection
+from ..engine.state import State
 from ..model.layout import Grid
-from ..model.physics import Cell
-from .beds import NO_DISC, Beds, Cells, Disc, Gathered
 from .broadcasting import Floats
 
-__all__ = ["Gathering", "reach", "taken_along", "taking_part"]
+__all__ = ["NO_DISC", "PaddedSelection", "join_discs", "reach"]
 
 Flags = NDArray[np.bool_]
-#: Control periods after which the set is made anew, without the cells that have come to rest.
-KEPT = 32
+Cells = NDArray[np.intp]
+#: A disc of every bed: x, y and radius, (b,) each, m; a radius below 0 means no cells.
+Disc = tuple[Floats, Floats, Floats]
+NO_DISC: Disc = (np.zeros(1), np.zeros(1), np.full(1, -1.0))
 #: How much farther than it must the set goes, in pitches, so that it does for some periods.
 MARGIN = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Gathering:
-    """Criteria of active cells.
-
-    Attributes
-    ----------
-    grid : Grid
-    rows : Rows
-    cell : Cell
-    period : ndarray (b,)
-        Control period, s.
-    rise : ndarray (b,)
-        No pin rises farther in a period, m.
-    """
-
-    grid: Grid
-    rows: Rows
-    cell: Cell
-    period: Floats
-    rise: Floats
 
 
 def reach(window: Floats, peak: Floats) -> Disc:
@@ -64,77 +44,56 @@ def reach(window: Floats, peak: Floats) -> Disc:
     return x, y, np.where(square > 0.0, radius, -1.0)
 
 
-def taking_part(known: Gathering, beds: Beds, window: Floats | None, control: Disc) -> Gathered:
-    """Return the cells that can change in the coming period, taken out of the beds.
+class PaddedSelection(Selection):
+    """Selection of the active cells of many sessions, as many of each.
 
-    Parameters
-    ----------
-    known : Gathering
-    beds : Beds
-        Its arrays are used up.
-    window : ndarray (6, b) or (6, 1), or None
-        Of the fingers' ways through the period.
-    control : Disc
-        What the controllers will command.
+    Where fewer are active than in another run, others make up the number. They could as well be
+    left out, so it does no harm that they are not.
     """
-    held, grid = beds.gathered, known.grid
-    near = NO_DISC if window is None else reach(window, held.peak)
-    if beds.period < held.until and _inside(near, held.reach) and _inside(control, held.control):
-        return held
-    moving = _put_back(known, beds)
-    peak = np.minimum(beds.rows[0].max(axis=0) + KEPT * known.rise, known.cell.actuator.stroke)
-    margin = MARGIN * grid.layout.pitch
-    near = _wider(NO_DISC if window is None else reach(window, peak), margin)
-    control = _wider(control, margin)
-    touched, wanted = _cells(grid, near), moving
-    wanted |= _cells(grid, control)
-    cells, count = _ordered(np.broadcast_to(touched, wanted.shape), wanted)
-    place = grid.place(cells.ravel()).reshape(6, *cells.shape)
-    return _taken(
-        known,
-        beds,
-        Gathered(cells, count, held.block, held.mode, place, near, control, peak, beds.period + KEPT),
-    )
+
+    def update(self, state: State, finger: Any, control: Any) -> State:
+        """Return a state whose active cells are all that can change in the coming period.
+
+        Parameters
+        ----------
+        state : State
+            Its arrays are used up.
+        finger : fingers.FingersPeriod or None
+        control : list of (float, float, float) or None, or None
+            Disc x, y, radius that each controller will command, m.
+        """
+        held, grid, discs = state.active, self.grid, join_discs(control)
+        near = NO_DISC if finger is None else reach(finger.window, held.peak)
+        if state.period < held.until and _inside(near, held.reach) and _inside(discs, held.control):
+            return state
+        wanted = np.zeros(state.modes.shape, np.bool_)
+        wanted.reshape(-1)[held.flat] = self.release(state)
+        top = state.rows[0].max(axis=0)
+        peak = np.minimum(top + KEPT * (self.period * self.fastest), self.cell.actuator.stroke)
+        margin = MARGIN * grid.layout.pitch
+        near = _wider(NO_DISC if finger is None else reach(finger.window, peak), margin)
+        discs = _wider(discs, margin)
+        wanted |= _cells(grid, discs)
+        cells, count = _ordered(np.broadcast_to(_cells(grid, near), wanted.shape), wanted)
+        chosen = replace(
+            held,
+            cells=cells,
+            near=count,
+            place=grid.place(cells.ravel()).reshape(6, *cells.shape),
+            reach=near,
+            control=discs,
+            peak=peak,
+            until=state.period + KEPT,
+        )
+        return state._replace(peak=top, active=self.take(state, chosen))
 
 
-def taken_along(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
-    """Return the cells that other beds have chosen, taken out of these; their arrays are used up.
-
-    Parameters
-    ----------
-    known : Gathering
-    beds : Beds
-    chosen : Gathered
-        Of the other beds.
-    """
-    _put_back(known, beds)
-    return _taken(known, beds, chosen)
-
-
-def _taken(known: Gathering, beds: Beds, chosen: Gathered) -> Gathered:
-    """Return a set with the rows and modes that these beds have there; the pulp over it is aged."""
-    near, taken = chosen.near, chosen.flat
-    block = beds.rows.reshape(known.rows.count, -1).take(taken, axis=1)
-    block[known.rows.force, near:] = 0.0
-    if near and known.cell.touch:
-        waited = beds.period * known.period - beds.aged.take(taken[:near])
-        known.cell.touch.pulp.age(block[known.cell.pulp_rows, :near], waited)
-    return replace(chosen, block=block, mode=beds.modes.take(taken))
-
-
-def _put_back(known: Gathering, beds: Beds) -> Flags:
-    """Put the gathered cells back; return which cells still move, shape (n, b)."""
-    held, taken, cell = beds.gathered, beds.gathered.flat, known.cell
-    cell.lag.settle(held.block[cell.lag_rows])
-    beds.rows.reshape(known.rows.count, -1)[:, taken] = held.block
-    beds.modes.reshape(-1)[taken] = held.mode
-    beds.aged.reshape(-1)[taken[: held.near]] = beds.period * known.period
-    busy = held.block[cell.lag_rows.start : known.rows.target].any(axis=0)
-    busy |= held.block[known.rows.force] > 0.0
-    busy |= held.mode > Mode.HOLD
-    moving = np.zeros(beds.modes.shape, np.bool_)
-    moving.reshape(-1)[taken] = busy
-    return moving
+def join_discs(discs: Sequence[tuple[float, float, float] | None] | None) -> Disc:
+    """Return the discs x, y, radius of all runs, m, as arrays (b,); a negative radius where there is none."""
+    if discs is None:
+        return NO_DISC
+    x, y, radius = zip(*((0.0, 0.0, -1.0) if disc is None else disc for disc in discs), strict=True)
+    return np.array(x), np.array(y), np.array(radius)
 
 
 def _ordered(touched: Flags, wanted: Flags) -> tuple[Cells, int]:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine.state import State
 from ..engine.system import System
 from ..model.fingertip import require_one
 from ..model.trajectory import Trajectory
 from ..scene.schema import Scene
 from ..session.run_result import Ended, count_losses
-from .advance import Stack, advance, begin, broken, kept
-from .beds import Beds
+from .advance import Batch, advance, begin, broken, kept
 from .fingers import Fingers, still_coming
 from .packing import put_together
 
@@ -33,8 +33,8 @@ class Play:
     ways : mapping of int to Trajectory
     runs : tuple of int
         Whose the last axis is.
-    stack : Stack
-    state : Beds
+    stack : Batch
+    state : State
     coming : Fingers or None
         How the fingers come, as far as that is worked out.
     """
@@ -42,8 +42,8 @@ class Play:
     systems: Mapping[int, System]
     ways: Mapping[int, Trajectory]
     runs: tuple[int, ...]
-    stack: Stack
-    state: Beds
+    stack: Batch
+    state: State
     coming: Fingers | None = None
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
+from ..engine.state import ActiveSet
 from ..metrics.finger_path import CellSums
 from ..metrics.summary import compute_metrics_from_sums
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.run_result import Result, evaluate, report
-from .beds import Gathered
 from .broadcasting import Floats
 from .fingers import Way, way_over
 from .play import Instant, Play
@@ -110,7 +110,7 @@ class Sums:
         if now.play.runs is not self._present:
             self._present = now.play.runs
             self._columns = [self._runs.index(run) for run in self._present]
-        held, period = now.play.state.gathered, now.play.state.period
+        held, period = now.play.state.active, now.play.state.period
         if (period - 1) % self._every == 0:
             self._following[(period - 1) // self._every, self._columns] = _count_following(held)
         if period % self._every == 0:
@@ -127,7 +127,7 @@ class Sums:
             Where on the last axis the run is.
         """
         play, run, period = now.play, now.play.runs[place], now.play.state.period
-        scene, column, held = self._scenes[run], self._runs.index(run), play.state.gathered
+        scene, column, held = self._scenes[run], self._runs.index(run), play.state.active
         count = 1 - (-period // self._every)
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
@@ -147,7 +147,7 @@ class Sums:
         )
         return report(scene, now.ended(place), found)
 
-    def _sum(self, held: Gathered) -> Floats:
+    def _sum(self, held: ActiveSet) -> Floats:
         """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
         force = held.block[self._force, : held.near]
         sums = np.empty((5, force.shape[1]))
@@ -158,7 +158,7 @@ class Sums:
         return sums
 
 
-def _count_following(held: Gathered) -> NDArray[np.intp]:
+def _count_following(held: ActiveSet) -> NDArray[np.intp]:
     """Return how many cells of each run follow the force, shape (b,)."""
     count: NDArray[np.intp] = np.count_nonzero(held.mode == FORCE_FOLLOW, axis=0)
     return count

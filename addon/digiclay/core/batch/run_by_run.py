@@ -14,10 +14,9 @@ import numpy as np
 
 from ..control.runs import BatchControl
 from ..model.interfaces import Controller, Measurement, Orders
-from .beds import NO_DISC, Disc
-from .broadcasting import numbers, together
+from .broadcasting import together
 
-__all__ = ["RunByRun", "join_controllers", "join_discs"]
+__all__ = ["RunByRun", "join_controllers"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +53,6 @@ def join_controllers(controllers: Sequence[Any]) -> Any:
     if isinstance(controllers[0], BatchControl):
         return replace(together(controllers), runs=tuple(controllers))
     return RunByRun(tuple(controllers))
-
-
-def join_discs(discs: list[tuple[float, float, float] | None] | None) -> Disc:
-    """Return the discs x, y, radius of all runs, m, as arrays (b,); a negative radius where there is none."""
-    if discs is None:
-        return NO_DISC
-    x, y, radius = zip(*((0.0, 0.0, -1.0) if disc is None else disc for disc in discs), strict=True)
-    return numbers(x), numbers(y), numbers(radius)
 
 
 def _take_run(seen: Measurement, run: int) -> Measurement:

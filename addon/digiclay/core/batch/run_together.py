@@ -85,7 +85,7 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
         play = keep_runs(play, leader.runs)
     play = locate_fingers(play)
     play = replace(play, state=follow(play.stack, play.state, play.coming, leader.state))
-    own, other, force = play.state.gathered, leader.state.gathered, play.stack.rows.force
+    own, other, force = play.state.active, leader.state.active, play.stack.rows.force
     near = slice(own.near)
     found = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])
     return Monitor(play, np.maximum(largest, found))

@@ -9,17 +9,19 @@ on the size of the bed. The set is kept for some periods, with a margin around i
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..model.layout import Disc, Grid
+from ..model.physics import Cell
 from ..model.touch import FingerPeriod, reached
-from .state import Gathered, State
-from .system import System
+from .state import ActiveSet, Rows, State
 
-__all__ = ["taking_part"]
+__all__ = ["KEPT", "Selection"]
 
 Cells = NDArray[np.intp]
 
@@ -27,52 +29,95 @@ Cells = NDArray[np.intp]
 KEPT = 32
 
 
-def taking_part(
-    system: System, state: State, finger: FingerPeriod | None, control: tuple[float, float, float] | None
-) -> State:
-    """Return a state whose gathered cells are all that can change in the coming period.
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Selection of the active cells of a session; `batch.padding` has that of many.
 
-    Parameters
+    Attributes
     ----------
-    system : System
-    state : State
-        Its arrays are used up.
-    finger : FingerPeriod or None
-        The finger's way through the period.
-    control : (float, float, float) or None
-        Disc x, y, radius that the controller will command, m.
+    grid : Grid
+    rows : Rows
+    cell : Cell
+    period : float or ndarray (b,)
+        Control period, s.
+    fastest : float or ndarray (b,)
+        No pin rises faster, m/s.
     """
-    grid, held = system.grid, state.gathered
-    if (
-        state.period < held.until
-        and _holds(held.control, control)
-        and _holds(held.reach, _reach(finger, held.peak))
-    ):
-        return state
-    moving, top = _put_back(system, state)
-    peak = min(top + KEPT * system.period * system.fastest, system.cell.actuator.stroke)
-    margin = grid.layout.pitch
-    wide_control, wide_reach = _wider(control, margin), _wider(_reach(finger, peak), margin)
-    near = _inside(grid, wide_reach)
-    cells = _together(near, moving, _inside(grid, wide_control))
-    block = state.rows.take(cells, axis=1)
-    block[system.rows.force, near.size :] = 0.0
-    if near.size and system.cell.touch:
-        waited = state.period * system.period - state.aged.take(near)
-        system.cell.touch.pulp.age(block[system.cell.pulp_rows, : near.size], waited)
-    held = Gathered(
-        system.rows,
-        cells,
-        near.size,
-        block,
-        state.modes.take(cells),
-        grid.place(cells),
-        wide_reach,
-        wide_control,
-        peak,
-        state.period + KEPT,
-    )
-    return State(state.period, state.rows, state.modes, state.aged, top, held, state.memory)
+
+    grid: Grid
+    rows: Rows
+    cell: Cell
+    period: Any
+    fastest: Any
+
+    def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
+        """Return a state whose active cells are all that can change in the coming period.
+
+        Parameters
+        ----------
+        state : State
+            Its arrays are used up.
+        finger : FingerPeriod or None
+            The finger's way through the period.
+        control : (float, float, float) or None
+            Disc x, y, radius that the controller will command, m.
+        """
+        grid, held = self.grid, state.active
+        if (
+            state.period < held.until
+            and _holds(held.control, control)
+            and _holds(held.reach, _reach(finger, held.peak))
+        ):
+            return state
+        moving, top = held.cells[self.release(state)], state.peak
+        if held.cells.size:
+            top = max(top, float(held.block[0].max()))
+        peak = min(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
+        margin = grid.layout.pitch
+        wide_control, wide_reach = _wider(control, margin), _wider(_reach(finger, peak), margin)
+        near = _inside(grid, wide_reach)
+        cells = _together(near, moving, _inside(grid, wide_control))
+        chosen = replace(
+            held,
+            cells=cells,
+            near=near.size,
+            place=grid.place(cells),
+            reach=wide_reach,
+            control=wide_control,
+            peak=peak,
+            until=state.period + KEPT,
+        )
+        return state._replace(peak=top, active=self.take(state, chosen))
+
+    def release(self, state: State) -> NDArray[np.bool_]:
+        """Put the active cells back into the bed, in place; return which of them still move."""
+        held, rows, cell = state.active, self.rows, self.cell
+        cell.lag.settle(held.block[cell.lag_rows])
+        state.rows.reshape(rows.count, -1)[:, held.flat] = held.block
+        state.modes.reshape(-1)[held.flat] = held.mode
+        state.aged.reshape(-1)[held.flat[: held.near]] = state.period * self.period
+        busy: NDArray[np.bool_] = held.block[cell.lag_rows.start : rows.target].any(axis=0)
+        busy |= held.block[rows.force] > 0.0
+        busy |= held.mode > Mode.HOLD
+        return busy
+
+    def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
+        """Take cells out of the bed, the pulp over them aged.
+
+        Parameters
+        ----------
+        state : State
+            Whose active cells have been released.
+        chosen : ActiveSet
+            The cells; its block and modes are not looked at.
+        """
+        near, flat, touch = chosen.near, chosen.flat, self.cell.touch
+        block = state.rows.reshape(self.rows.count, -1).take(flat, axis=1)
+        block[self.rows.force, near:] = 0.0
+        if near and touch:
+            waited = state.period * self.period - state.aged.take(flat[:near])
+            touch.pulp.age(block[self.cell.pulp_rows, :near], waited)
+        return replace(chosen, block=block, mode=state.modes.take(flat))
 
 
 def _reach(finger: FingerPeriod | None, peak: float) -> Disc | None:
@@ -95,21 +140,6 @@ def _holds(outer: Disc | None, inner: Disc | None) -> bool:
 def _inside(grid: Grid, disc: Disc | None) -> Cells:
     """Return the cells of a disc, ascending."""
     return grid.disc(*disc) if disc else np.empty(0, np.intp)
-
-
-def _put_back(system: System, state: State) -> tuple[Cells, float]:
-    """Put the gathered cells back; return those that still move, and the highest pin's height."""
-    held, rows = state.gathered, system.rows
-    system.cell.lag.settle(held.block[system.cell.lag_rows])
-    state.rows[:, held.cells] = held.block
-    state.modes[held.cells] = held.mode
-    state.aged[held.cells[: held.near]] = state.period * system.period
-    if not held.cells.size:
-        return held.cells, state.peak
-    busy = held.block[system.cell.lag_rows.start : rows.target].any(axis=0)
-    busy |= held.block[rows.force] > 0.0
-    busy |= held.mode > Mode.HOLD
-    return held.cells[busy], max(state.peak, float(held.block[0].max()))
 
 
 def _together(near: Cells, moving: Cells, controlled: Cells) -> Cells:

@@ -15,8 +15,7 @@ from ..model.fingertip import require_one
 from ..model.interfaces import Measurement, Movement, Truth
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
-from .active_set import taking_part
-from .state import Gathered, Part, State, at_rest
+from .state import ActiveSet, Part, State, at_rest
 from .system import System
 
 __all__ = ["advance", "begin", "periods", "step", "trace_fingers"]
@@ -76,19 +75,57 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
         Not to be used again; keep a `State.copy` to come back to it.
     finger : FingerPeriod or None
         From `trace_fingers`.
+
+    Raises
+    ------
+    DivergenceError
+        When a height, force or opening is no longer finite.
+    """
+    after = simulate_period(system, state, finger)
+    numbers = after.active.numbers
+    # One product tells: what is not finite makes no finite square.
+    if not math.isfinite(numbers.dot(numbers)):
+        error = find_divergence(system, after.active.cells, after.active.block, state.period)
+        if error:
+            raise error
+    return after
+
+
+def simulate_period(system: System, state: State, finger: Any) -> State:
+    """Simulate one control period of a session, or of many, in the arrays of `state`.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+        Used up.
+    finger : FingerPeriod or fingers.FingersPeriod or None
+        The finger's way through the period; the fingers' of many sessions.
     """
     memory, control = _locate(system, state)
-    state = taking_part(system, state, finger, control)
-    held = state.gathered
-    if not held.cells.size:
-        return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
-    ready = _ready(system, held)
-    memory = _command(system, state, ready, memory)
-    held.touched.force[:] = ready.movement(_underside(system, finger, held))
-    if system.sensors:
-        system.sensors.update(held.all.sensed, _truth(held.all, state.period + 1))
-    _check_finite(system, state)
-    return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, held, memory)
+    state = system.selection.update(state, finger, control)
+    if state.active.cells.size:
+        memory = _command(system, state, memory)
+        move(system, state, finger)
+        if system.sensors:
+            part = state.active.all
+            system.sensors.update(part.sensed, _truth(part, state.period + 1))
+    return State(state.period + 1, state.rows, state.modes, state.aged, state.peak, state.active, memory)
+
+
+def move(system: System, state: State, finger: Any) -> None:
+    """Move the active cells through a control period under the commands queued, in place.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+    finger : object
+        See `simulate_period`.
+    """
+    held = state.active
+    under = _underside(system, finger, held)
+    held.touched.force[:] = _ready(system, held).movement(under)
 
 
 class _Ready(NamedTuple):
@@ -106,8 +143,8 @@ class _Ready(NamedTuple):
     movement: Movement
 
 
-def _ready(system: System, held: Gathered) -> _Ready:
-    """Return what this system needs of a gathered set."""
+def _ready(system: System, held: ActiveSet) -> _Ready:
+    """Return what this system needs of an active set."""
     known: _Ready | None = held.ready.get(system.plan)
     if known is None:
         touched, everything = (
@@ -121,66 +158,83 @@ def _ready(system: System, held: Gathered) -> _Ready:
     return known
 
 
-def _locate(system: System, state: State) -> tuple[Any, tuple[float, float, float] | None]:
+def _locate(system: System, state: State) -> tuple[Any, Any]:
     """Let the controller take in the touched cells; return its memory and the disc it will control."""
     if system.controller is None:
         return state.memory, None
-    held = state.gathered
+    held = state.active
     seen = _measured(system, _ready(system, held).touched, held.touched, state.period)
     return system.controller.locate(state.memory, seen)
 
 
 def _truth(part: Part, period: int) -> Truth:
-    """Return what there is to be measured of some gathered cells."""
+    """Return what there is to be measured of some active cells."""
     return Truth(part.cells, period, part.force, part.height, part.command)
 
 
 def _measured(system: System, true: Measurement, part: Part, period: int) -> Measurement:
-    """Measure some gathered cells."""
+    """Measure some active cells."""
     if system.sensors is None:
         return true
     force, height = system.sensors.measure(part.sensed, _truth(part, period))
     return true._replace(force=force, height=height)
 
 
-def _underside(system: System, finger: FingerPeriod | None, held: Gathered) -> Floats:
-    """Return the finger's underside over the near cells at the period's instants, shape (p, k), m."""
+def _underside(system: System, finger: Any, held: ActiveSet) -> Floats:
+    """Return the finger's underside over the near cells at the period's instants, shape (p, k[, b]), m."""
     if finger is None or not held.near:
-        return np.empty((system.instants.size, 0))
-    return finger.under(held.touched.place)
+        return np.empty((system.instants.size, 0, *held.cells.shape[1:]))
+    under: Floats = finger.under(held.touched.place)
+    return under
 
 
-def _command(system: System, state: State, ready: _Ready, memory: Any) -> Any:
-    """Let the controller command the gathered cells, and queue the commands; return its memory."""
+def _command(system: System, state: State, memory: Any) -> Any:
+    """Let the controller command the active cells, and queue the commands; return its memory."""
     if system.controller is None:
         return memory
-    part, queue = state.gathered.all, state.gathered.queue
-    seen = _measured(system, ready.all, part, state.period)
+    held = state.active
+    part = held.all
+    seen = _measured(system, _ready(system, held).all, part, state.period)
     memory, orders = system.controller.command(memory, seen)
     part.target[:] = orders.target
     part.mode[:] = orders.mode
-    for older, newer in pairwise(queue):
-        older[:] = newer
-    queue[-1][:] = orders.command
+    queue_commands(held, orders.command)
     return memory
 
 
-def _check_finite(system: System, state: State) -> None:
-    """Refuse numbers that are not finite, with their position."""
-    rows, held = system.rows, state.gathered
-    # One product tells: what is not finite makes no finite square.
-    if math.isfinite(held.flat.dot(held.flat)):
-        return
-    bad = np.argwhere(~np.isfinite(held.block))
+def queue_commands(held: ActiveSet, newest: Floats) -> None:
+    """Put the newest commands of active cells behind those on their way, in place."""
+    for older, newer in pairwise(held.queue):
+        older[:] = newer
+    held.queue[-1][:] = newest
+
+
+def find_divergence(
+    system: System, cells: NDArray[np.intp], block: Floats, period: int
+) -> DivergenceError | None:
+    """Return the error of a session with a number that is not finite; None where all are.
+
+    Parameters
+    ----------
+    system : System
+        Of this session.
+    cells : ndarray of int (m,)
+    block : ndarray (r, m)
+        Their rows.
+    period : int
+        The control period that has been simulated.
+    """
+    bad, rows = np.argwhere(~np.isfinite(block)), system.rows
     if not bad.size:
-        return
+        return None
     row, column = bad[0].tolist()
     names = {0: "height", rows.force: "force", rows.target: "commanded height"}
-    raise DivergenceError(
-        state.period * system.period,
-        int(held.cells[column]),
-        names.get(row, "valve opening" if row in range(rows.physics)[system.cell.lag_rows] else "relaxation"),
-        float(held.block[row, column]),
+    lag = range(rows.physics)[system.cell.lag_rows]
+    return DivergenceError(
+        period * system.period,
+        int(cells[column]),
+        names.get(row, "valve opening" if row in lag else "relaxation"),
+        float(block[row, column]),
         "Use a shorter physics step, or the stepper 'bernoulli'.",
     )
 

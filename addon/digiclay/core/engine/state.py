@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
-from ..model.layout import Disc
 
-__all__ = ["Gathered", "Part", "Rows", "State", "at_rest"]
+__all__ = ["ActiveSet", "Part", "Rows", "State", "at_rest"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -80,26 +79,28 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Gathered:
-    """Active cells, with their rows outside the bed's array.
+class ActiveSet:
+    """Active cells, with their rows outside the bed's array: m of one run, or m of each of b runs.
 
     Attributes
     ----------
     rows : Rows
         Which row of the block holds what.
-    cells : ndarray of int (m,)
-        First those the finger may touch, then the others that move or are controlled.
+    cells : ndarray of int (m,) or (m, b)
+        Numbers in their own beds: first those the finger may touch, then the others that move or are
+        controlled.
     near : int
         Number k of those the finger may touch.
-    block : ndarray (r, m)
+    block : ndarray (r, m) or (r, m, b)
         Their rows, see `Rows`.
-    mode : ndarray (m,) of int8
+    mode : ndarray (m,) or (m, b) of int8
         Their control modes, `modes.Mode`.
-    place : ndarray (6, m)
+    place : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
-    reach, control : (float, float, float) or None
-        Discs of which every cell is in, the finger's and the controller's: centre x, y, radius, m.
-    peak : float
+    reach, control : tuple or None
+        Discs of which every cell is in, the finger's and the controller's: centre x, y, radius, m; arrays
+        (b,) of b runs.
+    peak : float or ndarray (b,)
         No pin top in the finger's part is higher while this set is in use, m.
     until : int
         Control period by which the set is to be made anew.
@@ -111,9 +112,9 @@ class Gathered:
     block: Floats
     mode: NDArray[np.int8]
     place: Floats
-    reach: Disc | None
-    control: Disc | None
-    peak: float
+    reach: Any
+    control: Any
+    peak: Any
     until: int
 
     # Parts of the block, all of them views. Each is made once: a set lives for many periods.
@@ -121,7 +122,7 @@ class Gathered:
     @cached_property
     def all(self) -> Part:
         """All cells."""
-        return self._part(self.cells.size)
+        return self._part(len(self.cells))
 
     @cached_property
     def touched(self) -> Part:
@@ -159,13 +160,21 @@ class Gathered:
         return tuple(self.block[self.rows.commands])
 
     @cached_property
-    def flat(self) -> Floats:
+    def flat(self) -> Cells:
+        """Numbers of the cells among all cells of all beds, shape (m,) or (m, b)."""
+        if self.cells.ndim == 1:
+            return self.cells
+        runs = self.cells.shape[1]
+        return self.cells * runs + np.arange(runs)
+
+    @cached_property
+    def numbers(self) -> Floats:
         """All numbers of the block in a row."""
         return self.block.reshape(-1)
 
 
 class Part(NamedTuple):
-    """Rows of the first active cells, as `Rows` and `Gathered` define them."""
+    """Rows of the first active cells, as `Rows` and `ActiveSet` define them."""
 
     cells: Cells
     place: Floats
@@ -179,22 +188,22 @@ class Part(NamedTuple):
 
 
 class State(NamedTuple):
-    """State of a session at the start of a control period.
+    """State of a session, or of b sessions, at the start of a control period.
 
     Attributes
     ----------
     period : int
         Number of control periods done.
-    rows : ndarray (r, n)
-        See `Rows`; out of date for the cells in `gathered`: read it with `row`.
-    modes : ndarray (n,) of int8
-        Control modes; out of date for the cells in `gathered`: read them with `mode`.
-    aged : ndarray (n,)
+    rows : ndarray (r, n) or (r, n, b)
+        See `Rows`; out of date for the cells in `active`: read it with `row`.
+    modes : ndarray (n,) or (n, b) of int8
+        Control modes; out of date for the cells in `active`: read them with `mode`.
+    aged : ndarray (n,) or (n, b)
         Time up to which a cell's relaxation has been worked out, s: the pulp over cells
         out of reach goes on relaxing, and is aged exactly when it is needed again.
-    peak : float
-        No pin top outside `gathered` is higher than this, m.
-    gathered : Gathered
+    peak : float or ndarray (b,)
+        No pin top outside `active` is higher than this, m.
+    active : ActiveSet
     memory : object
         The controller's memory.
     """
@@ -203,56 +212,57 @@ class State(NamedTuple):
     rows: Floats
     modes: NDArray[np.int8]
     aged: Floats
-    peak: float
-    gathered: Gathered
+    peak: Any
+    active: ActiveSet
     memory: Any
 
     def row(self, index: int) -> Floats:
-        """Return one row of all cells, shape (n,), as a new array; `Rows` names them."""
+        """Return one row of all cells, shape (n,) or (n, b), as a new array; `Rows` names them."""
         values: Floats = self.rows[index].copy()
-        values[self.gathered.cells] = self.gathered.block[index]
+        values.reshape(-1)[self.active.flat] = self.active.block[index]
         return values
 
     def mode(self) -> NDArray[np.int8]:
-        """Return the control modes of all cells, shape (n,), as a new array."""
+        """Return the control modes of all cells, shape (n,) or (n, b), as a new array."""
         values = self.modes.copy()
-        values[self.gathered.cells] = self.gathered.mode
+        values.reshape(-1)[self.active.flat] = self.active.mode
         return values
 
     def copy(self) -> State:
         """Return a state that shares no array with this one that a step would change."""
-        held = replace(self.gathered, block=self.gathered.block.copy(), mode=self.gathered.mode.copy())
+        held = replace(self.active, block=self.active.block.copy(), mode=self.active.mode.copy())
         return self._replace(
-            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), gathered=held
+            rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), active=held
         )
 
 
-def at_rest(rows: Rows, count: int, height: float, memory: Any) -> State:
-    """Return the state before a session: every pin at `height`, every valve shut.
+def at_rest(rows: Rows, count: int, height: Any, memory: Any) -> State:
+    """Return the state before a session, or before b sessions: every valve shut.
 
     Parameters
     ----------
     rows : Rows
     count : int
-        Cells.
-    height : float
-        m.
+        Cells n of a bed.
+    height : float or ndarray (b,)
+        Of every pin, m.
     memory : object
-        Of the controller.
+        The controller's.
     """
-    values = np.zeros((rows.count, count))
+    runs = np.shape(height)
+    values = np.zeros((rows.count, count, *runs))
     values[0] = values[rows.target] = height
-    none = np.empty(0, np.intp)
-    nobody = Gathered(
+    none = ActiveSet(
         rows,
-        none,
+        np.empty((0, *runs), np.intp),
         0,
-        np.empty((rows.count, 0)),
-        np.empty(0, np.int8),
-        np.empty((6, 0)),
+        np.empty((rows.count, 0, *runs)),
+        np.empty((0, *runs), np.int8),
+        np.empty((6, 0, *runs)),
         None,
         None,
         height,
         0,
     )
-    return State(0, values, np.full(count, Mode.REST, np.int8), np.zeros(count), height, nobody, memory)
+    modes, aged = np.full((count, *runs), Mode.REST, np.int8), np.zeros((count, *runs))
+    return State(0, values, modes, aged, height, none, memory)

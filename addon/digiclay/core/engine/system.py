@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..model.interfaces import Controller, Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
+from .active_set import Selection
 from .state import Rows
 
 __all__ = ["System", "segments"]
@@ -34,10 +35,12 @@ class System:
     stepper : Stepper
     plan : object
         What the stepper works out once for all periods.
-    period : float
+    period : float, or ndarray (b,) of b runs
         Control period, s.
-    fastest : float
+    fastest : float or ndarray (b,)
         No pin rises faster, m/s.
+    selection : Selection
+        Of the active cells.
     instants : ndarray (p,)
         Times into the period at which the finger's pose is needed, first 0, last `period`, s.
     rows : Rows
@@ -49,8 +52,9 @@ class System:
     controller: Controller | None
     stepper: Stepper
     plan: Any
-    period: float
-    fastest: float
+    period: Any
+    fastest: Any
+    selection: Selection
     instants: Floats
     rows: Rows
 
@@ -71,6 +75,8 @@ def segments(stepper: Stepper, cut: float, period: float, count: int) -> tuple[t
     Returns
     -------
     segments : tuple of Segment
+    selection : Selection
+        Of the active cells.
     instants : ndarray (p,)
         When the stepper needs the finger's pose, s.
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..control.methods import METHODS
+from ..engine.active_set import Selection
 from ..engine.state import Rows
 from ..engine.system import System, segments
 from ..model.delay import Queue, queue
@@ -34,6 +35,8 @@ def assemble(scene: Scene) -> System:
     steps, instants = segments(stepper, cut, period, scene.simulation.steps)
     bed = grid(scene.layout)
     controller, sensors = _make_controller(scene, bed, cell), _make_sensors(scene, cell, line)
+    rows = Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0)
+    fastest = speeds(cell).rise
     return System(
         grid=bed,
         cell=cell,
@@ -42,11 +45,10 @@ def assemble(scene: Scene) -> System:
         stepper=stepper,
         period=period,
         plan=stepper.plan(cell, line, steps),
-        fastest=speeds(cell).rise,
+        fastest=fastest,
+        selection=Selection(bed, rows, cell, period, fastest),
         instants=instants,
-        rows=Rows(
-            cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0
-        ),
+        rows=rows,
     )
 
 

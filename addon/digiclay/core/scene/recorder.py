@@ -35,7 +35,7 @@ class Recorder(Parameters):
 
 
 class Cells(Protocol):
-    """The cells that take part, w of one run or of each of b: see `state.Gathered`."""
+    """The cells that take part, w of one run or of each of b: see `state.ActiveSet`."""
 
     @property
     def cells(self) -> NDArray[np.intp]: ...
@@ -54,7 +54,7 @@ class Observed(Protocol):
     def period(self) -> int: ...
 
     @property
-    def gathered(self) -> Cells: ...
+    def active(self) -> Cells: ...
 
 
 class Stretch(NamedTuple):
@@ -112,7 +112,7 @@ class Recording:
 
     def observe(self, state: Observed) -> None:
         """Take in the state after a control period."""
-        held = state.gathered
+        held = state.active
         if held is not self._held or len(self._given) >= CHUNK:
             self.flush()
         self._held = held

@@ -105,7 +105,7 @@ def felt(system: System, state: State) -> float:
     system : System
     state : State
     """
-    held = state.gathered
+    held = state.active
     return float(held.block[system.rows.force, : held.near].sum())
 
 
@@ -120,7 +120,7 @@ def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence
     pins : sequence of int
         Whose heights are kept.
     """
-    held = state.gathered
+    held = state.active
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
         (at,) = np.nonzero(held.cells == pin)

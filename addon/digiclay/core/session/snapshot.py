@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.errors import StateError
 from ..base.modes import Mode
 from ..engine.simulation import begin
-from ..engine.state import Gathered, Rows, State
+from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
 from ..model.fingertip import require_one
 from ..model.layout import Disc
@@ -41,7 +41,7 @@ REMEDY = "Reset the session to begin with a bed at rest."
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Content of a snapshot: the header, and the arrays by their names in `State` and `Gathered`."""
+    """Content of a snapshot: the header, and the arrays by their names in `State` and `ActiveSet`."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
@@ -57,7 +57,7 @@ def dump(system: System, state: State) -> bytes:
         The state's.
     state : State
     """
-    held, rows = state.gathered, system.rows
+    held, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
     header = {
@@ -121,7 +121,7 @@ def load(system: System, data: bytes) -> State:
     template = system.controller.begin() if system.controller else None
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
-    held = Gathered(
+    held = ActiveSet(
         rows,
         cells,
         gathered["near"],
@@ -172,7 +172,7 @@ def transfer_heights(system: System, data: bytes) -> State:
     state.rows[0] = state.rows[system.rows.target] = height
     state.modes[:] = np.where(height == actuator.rest_height, np.int8(Mode.REST), np.int8(Mode.HOLD))
     peak = float(height.max())
-    return State(0, state.rows, state.modes, state.aged, peak, state.gathered, state.memory)
+    return State(0, state.rows, state.modes, state.aged, peak, state.active, state.memory)
 
 
 def _check_limits(system: System, kept: Kept) -> None:

@@ -222,7 +222,7 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float]:
     runs = (periods(one, full.trajectories(), begin(one), full.periods) for one in pair)
     weights = [_weight(scene, system) for scene, system in zip((full, less), pair, strict=True)]
     for both in zip(*runs, strict=True):
-        done += [each * state.gathered.cells.size for each, state in zip(weights, both, strict=True)]
+        done += [each * state.active.cells.size for each, state in zip(weights, both, strict=True)]
         apart = max(apart, float(np.abs(both[0].row(0) - both[1].row(0)).max()))
         if apart > budget:
             return math.inf, math.nan
