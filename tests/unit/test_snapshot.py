@@ -251,4 +251,4 @@ def test_heights_are_not_carried_over_to_another_number_of_cells() -> None:
 
 def test_every_field_of_a_state_is_kept() -> None:
     # A field that is added to a state must be added to what is kept, and to `packed_parts`.
-    assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "gathered", "memory"}
+    assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
