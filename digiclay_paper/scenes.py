@@ -129,7 +129,8 @@ def slowed(session: Scene, factor: float) -> Scene:
 
 def free_speed(session: Scene) -> float:
     """Return how fast a pin without load rises through an open valve, m/s."""
-    return assemble(session).fastest
+    fastest: float = assemble(session).fastest
+    return fastest
 
 
 def fastest_lift(session: Scene) -> float:
