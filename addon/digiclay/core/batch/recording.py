@@ -26,7 +26,7 @@ FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
 
 
 class Histories:
-    """Records runs: stretches are kept, and written into a history when it is asked for.
+    """Histories of runs: stretches are kept, and written into a history when it is asked for.
 
     A history of all cells of all runs would fill the memory long before the stack is large enough.
 
@@ -34,25 +34,28 @@ class Histories:
     ----------
     scenes : mapping of int to Scene
         By the numbers of their runs.
-    recorder : Recorder
-        Theirs.
+    recorder : Recorder or None
+        Theirs; None: there are no histories.
     play : Play
         Before the sessions.
     """
 
-    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder, play: Play) -> None:
+    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
         self._scenes, self._runs, self._present = scenes, play.runs, play.runs
         self._first, self._mode = play.state.row(0), play.state.mode()
-        self._stretches: list[tuple[tuple[int, ...], Stretch]] = []
-        self._recording = Recording(recorder, play.stack.rows, self._store)
+        self._stretches: dict[int, list[Stretch]] = {run: [] for run in play.runs}
+        self._recording = Recording(recorder, play.stack.rows, self._store) if recorder else None
         self._history: HistoryWriter | None = None
 
     def _store(self, stretch: Stretch) -> None:
         """Keep a stretch of the runs that are present."""
-        self._stretches.append((self._present, stretch))
+        for run, own in zip(self._present, stretch.split(), strict=True):
+            self._stretches[run].append(own)
 
     def observe(self, now: Instant) -> None:
         """Record a control period."""
+        if self._recording is None:
+            return
         if now.play.runs is not self._present:
             self._recording.flush()
             self._present = now.play.runs
@@ -70,17 +73,20 @@ class Histories:
         place : int
             Where on the last axis the run is.
         """
-        self._recording.flush()
-        run, period, every = now.play.runs[place], now.play.state.period, self._recording.every
-        count, column = 1 - (-period // every), self._runs.index(run)
+        run = now.play.runs[place]
+        rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
+        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(place))
+
+    def _write(self, recording: Recording, run: int, period: int) -> dict[str, NDArray[Any]]:
+        """Write the history of a run up to a period; return its rows."""
+        recording.flush()
+        count, column = 1 - (-period // recording.every), self._runs.index(run)
         if self._history is None or self._history.count < count:
             self._history = HistoryWriter(count, len(self._first))
         self._history.begin(self._first[:, column], self._mode[:, column])
-        for runs, stretch in self._stretches:
-            if run in runs:
-                self._history.write(stretch.of(runs.index(run)))
-        rows = self._history.finish(period, every)
-        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(place))
+        for stretch in self._stretches.pop(run):
+            self._history.write(stretch)
+        return self._history.finish(period, recording.every)
 
 
 class Sums:
@@ -90,13 +96,14 @@ class Sums:
     ----------
     scenes : mapping of int to Scene
         By the numbers of their runs.
-    recorder : Recorder
-        Theirs.
+    recorder : Recorder or None
+        Theirs; None: one row a control period.
     play : Play
         Before the sessions.
     """
 
-    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder, play: Play) -> None:
+    def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
+        recorder = recorder or Recorder()
         count = recorder.rows(max(scene.periods for scene in scenes.values()))
         self._scenes, self._every, self._force = scenes, recorder.every, play.stack.rows.force
         self._runs, self._present, self._columns = play.runs, play.runs, list(range(len(play.runs)))

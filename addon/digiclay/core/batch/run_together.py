@@ -15,7 +15,7 @@ from ..scene.recorder import Recorder
 from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
-from ..session.run_result import Result, evaluate
+from ..session.run_result import Result
 from .advance import blow_up, follow
 from .broadcasting import Floats
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, play_all
@@ -32,26 +32,6 @@ class _Observer(Protocol):
     def observe(self, now: Instant) -> None: ...
 
     def finish(self, now: Instant, place: int) -> Result: ...
-
-
-class _Unrecorded:
-    """Observer of sessions without a recorder.
-
-    Parameters
-    ----------
-    scenes : mapping of int to Scene
-    """
-
-    def __init__(self, scenes: Mapping[int, Scene]) -> None:
-        self._scenes = scenes
-
-    def observe(self, now: Instant) -> None:
-        """Keep nothing."""
-
-    def finish(self, now: Instant, place: int) -> Result:
-        """Return the result of the run at a place on the last axis."""
-        run = now.play.runs[place]
-        return evaluate(self._scenes[run], now.play.systems[run], {}, now.ended(place))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +73,7 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
 
 def _run(
     scenes: Sequence[Scene],
-    observer: Callable[[Mapping[int, Scene], Recorder, Play], _Observer],
+    observer: Callable[[Mapping[int, Scene], Recorder | None, Play], _Observer],
     stopped: Callable[[], bool] | None,
     *,
     errors: bool = False,
@@ -109,9 +89,9 @@ def _run(
             yield number, error
     if not systems:
         return
-    running, recorder = {run: scenes[run] for run in systems}, scenes[0].recorder
+    running = {run: scenes[run] for run in systems}
     play = begin_play(running, systems)
-    watching = observer(running, recorder, play) if recorder else _Unrecorded(running)
+    watching = observer(running, scenes[0].recorder, play)
     monitor = _start(running) if errors and has_every_command(scenes[0]) else None
     for now in play_all(play, {run: scene.periods for run, scene in running.items()}, stopped):
         watching.observe(now)

@@ -78,16 +78,10 @@ class Stretch(NamedTuple):
     last: Floats
     last_mode: Modes
 
-    def of(self, run: int) -> Stretch:
-        """Return the stretch of the run at a place on the last axis."""
-        return Stretch(
-            self.cells[:, run],
-            self.felt[..., run],
-            self.command[..., run],
-            self.mode[..., run],
-            self.last[..., run],
-            self.last_mode[:, run],
-        )
+    def split(self) -> list[Stretch]:
+        """Return the stretches of b runs, each in memory of its own."""
+        by_run = [np.ascontiguousarray(np.moveaxis(array, -1, 0)) for array in self]
+        return [Stretch(*arrays) for arrays in zip(*by_run, strict=True)]
 
 
 class Recording:
