@@ -6,13 +6,13 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.quantity import Parameters, quantity
-from ..engine.state import Rows, State
+from ..engine.state import ActiveSet, Rows, State
 
 __all__ = ["CHUNK", "HistoryWriter", "Recorder", "Recording", "RunRecording", "Stretch", "write"]
 
@@ -32,29 +32,6 @@ class Recorder(Parameters):
     def rows(self, periods: int) -> int:
         """Return the number of rows of a session of so many control periods."""
         return 1 + -(-periods // self.every)
-
-
-class Cells(Protocol):
-    """The cells that take part, w of one run or of each of b: see `state.ActiveSet`."""
-
-    @property
-    def cells(self) -> NDArray[np.intp]: ...
-
-    @property
-    def block(self) -> Floats: ...
-
-    @property
-    def mode(self) -> Modes: ...
-
-
-class Observed(Protocol):
-    """Part of a state that is recorded, see `state.State`."""
-
-    @property
-    def period(self) -> int: ...
-
-    @property
-    def active(self) -> Cells: ...
 
 
 class Stretch(NamedTuple):
@@ -100,11 +77,11 @@ class Recording:
         self.every = recorder.every
         self._command, self._felt_rows = rows.command, (0, rows.force)
         self._keep = keep
-        self._held: Cells | None = None
+        self._held: ActiveSet | None = None
         self._felt: list[Floats] = []
         self._given: list[tuple[Floats, Modes]] = []
 
-    def observe(self, state: Observed) -> None:
+    def observe(self, state: State) -> None:
         """Take in the state after a control period."""
         held = state.active
         if held is not self._held or len(self._given) >= CHUNK:
