@@ -73,9 +73,9 @@ class Steps(Line):
     def __call__(self, doing: str = "") -> None:
         """Count one more piece as done, and draw the bar if it is time to."""
         self._done += 1
-        if self.due():
+        if self.is_due():
             share = self._done / self._total
-            said = f"{self._done} of {self._total}{self.left(share)}  {doing}"
+            said = f"{self._done} of {self._total}{self.format_left(share)}  {doing}"
             self.draw(f"{self._label} {draw_share(share)} {said}")
 
 

@@ -166,7 +166,7 @@ def test_a_process_that_dies_is_told_by_its_signal() -> None:
     worker = JobProcess(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
     until(lambda: list(Path("two/runs").glob(".*.part")))
     worker.kill()
-    assert worker.error().startswith("The process ended with signal 9")
+    assert worker.read_error().startswith("The process ended with signal 9")
 
 
 def test_a_job_can_be_done_elsewhere_from_its_files_alone(here: Path) -> None:

@@ -117,9 +117,9 @@ def test_a_jobs_own_files_say_all_there_is_to_do(tmp_path: Path) -> None:
         film=Film(speed=0.5, start=0.1, arrows=False),
     )  # fmt: skip
     path = tmp_path / "job.toml"
-    path.write_text(made.text(), encoding="utf-8")
+    path.write_text(made.format(), encoding="utf-8")
     assert read_outputs(path) == made
-    path.write_text(Outputs().text(), encoding="utf-8")
+    path.write_text(Outputs().format(), encoding="utf-8")
     assert read_outputs(path) == Outputs()
 
 
@@ -150,7 +150,7 @@ def test_the_sample_batch_makes_eight_sound_jobs() -> None:
 def test_what_is_exported_is_read_and_written_with_the_job() -> None:
     made = make_outputs({"export": ["stl"], "mesh": {"kind": "features", "skin": "smooth"}})
     assert (made.mesh.kind, made.mesh.skin) == ("features", "smooth")
-    assert make_outputs(tomllib.loads(made.text())) == made
+    assert make_outputs(tomllib.loads(made.format())) == made
 
 
 def test_a_job_without_the_section_exports_the_solid() -> None:

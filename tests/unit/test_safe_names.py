@@ -177,10 +177,10 @@ def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done(harm: str) -
         whole_without_sizes = harm not in ("history.npz", "metrics.json")
         assert not folder.is_done(job)
         assert job.scene is not None
-        assert is_whole(folder.run(job), job.scene) == whole_without_sizes
+        assert is_whole(folder.find_run(job), job.scene) == whole_without_sizes
         path.unlink()
         assert not folder.is_done(job)
-        assert is_whole(folder.run(job), job.scene) == whole_without_sizes
+        assert is_whole(folder.find_run(job), job.scene) == whole_without_sizes
 
 
 def test_a_job_of_which_the_folder_is_no_folder_is_refused(here: Path) -> None:

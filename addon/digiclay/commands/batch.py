@@ -55,7 +55,7 @@ class JobProcess(Process):
         with log.open("wb") as said:
             super().__init__(arguments, stdout=said, stderr=subprocess.STDOUT)
 
-    def fraction(self) -> float:
+    def read_fraction(self) -> float:
         """Return how much of the job is done, from 0 to 1."""
         for line in reversed(self._read_tail()):
             _, _, number = line.removeprefix(PROGRESS).partition(" ")
@@ -66,7 +66,7 @@ class JobProcess(Process):
                     break  # a line that is being written
         return 0.0
 
-    def error(self) -> str:
+    def read_error(self) -> str:
         """Return in one line why the job was not done."""
         lines = self._read_tail()
         told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
@@ -113,10 +113,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
             if not arguments.quiet:
                 print(f"{len(made.jobs)} jobs written to {out / 'jobs'}")
             return 0
-        return _carry_on(arguments, folder)
+        return _finish(arguments, folder)
 
 
-def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
+def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     """Run the jobs, report them, and return the exit code."""
     made, started = folder.batch, time.monotonic()
     failed = {job.name: job.error for job in made.jobs if job.error}
@@ -142,8 +142,10 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
 
         def draw() -> None:
             if not arguments.quiet:
-                done = before + len(ended) + sum(process.fraction() for process in list(running.values()))
-                bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
+                done = (
+                    before + len(ended) + sum(process.read_fraction() for process in list(running.values()))
+                )
+                bar(before + len(ended) + parts, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
         with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
             task = partial(_do_job, processes, running, folder)
@@ -156,7 +158,7 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
     if todo:
         at_a_time = "1 process" if count == 1 else f"{count} processes"
         said += f"; {now} of them now, in {format_duration(took)} on {at_a_time}"
-    ready = folder.start_up()
+    ready = folder.measure_start_up()
     if ready is not None:
         said += f"; a job's process takes {ready:.1f} s to start"
     index = folder.write_index(failed, f"{said}.")
@@ -175,14 +177,14 @@ def _carry_on(arguments: argparse.Namespace, folder: Folder) -> int:
 def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder, job: Job) -> None:
     """Run a job in a process of its own; DigiclayError states the reason of a failure."""
     arguments = [
-        "job", str(folder.job(job).resolve()), "--out", str(folder.run(job).resolve()),
+        "job", str(folder.find_job(job).resolve()), "--out", str(folder.find_run(job).resolve()),
         "--overwrite", "--follow", "--since", repr(time.time()),
     ]  # fmt: skip
-    process = processes.start(partial(JobProcess, arguments, folder.log(job)))
+    process = processes.start(partial(JobProcess, arguments, folder.find_log(job)))
     if process is None:
         return
     running[job.name] = process
     processes.wait(process)
     del running[job.name]
     if not folder.is_done(job):
-        raise DigiclayError(process.error())
+        raise DigiclayError(process.read_error())

@@ -49,15 +49,15 @@ class Folder:
     path: Path
     batch: JobSeries
 
-    def job(self, job: Job) -> Path:
+    def find_job(self, job: Job) -> Path:
         """Return the folder of a job's files."""
         return resolve_inside(self.path, JOBS, job.name)
 
-    def run(self, job: Job) -> Path:
+    def find_run(self, job: Job) -> Path:
         """Return the folder of a job's run."""
         return resolve_inside(self.path, RUNS, job.name)
 
-    def log(self, job: Job) -> Path:
+    def find_log(self, job: Job) -> Path:
         """Return the log file of a job's process."""
         return resolve_inside(self.path, LOGS, f"{job.name}.log")
 
@@ -65,7 +65,7 @@ class Folder:
         """Return whether there is a whole run of just this job, and not of one it once was."""
         if job.scene is None:
             return False
-        run = self.run(job)
+        run = self.find_run(job)
         try:
             same = load(run / SCENE) == job.scene and read_outputs(run / JOB) == self.batch.outputs
         except DigiclayError:
@@ -78,16 +78,16 @@ class Folder:
         if job.scene is None:
             return
         try:
-            self.job(job).mkdir(parents=True, exist_ok=True)
+            self.find_job(job).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"{self.job(job)} cannot be made: {error.strerror or error}.") from None
-        remove_abandoned(self.job(job))
-        write_whole(self.job(job) / SCENE, format_scene(job.scene).encode())
-        write_whole(self.job(job) / JOB, self.batch.outputs.text().encode())
+            raise OutputError(f"{self.find_job(job)} cannot be made: {error.strerror or error}.") from None
+        remove_abandoned(self.find_job(job))
+        write_whole(self.find_job(job) / SCENE, format_scene(job.scene).encode())
+        write_whole(self.find_job(job) / JOB, self.batch.outputs.format().encode())
 
-    def start_up(self) -> float | None:
+    def measure_start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
-        timings = (read_json(self.run(job) / TIMING) or {} for job in self.batch.jobs)
+        timings = (read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
         known = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
         return median(known) if known else None
 
@@ -105,28 +105,28 @@ class Folder:
         for job in self.batch.jobs:
             error = failed.get(job.name, "") or job.error
             if error:
-                log = self.log(job)
+                log = self.find_log(job)
                 links = [("log", f"{LOGS}/{log.name}")] if log.is_file() else []
                 cards.append(Card(job.name, links=links, error=error))
             elif self.is_done(job):
-                cards.append(self._card(job))
+                cards.append(self._make_card(job))
             else:
                 cards.append(Card(job.name, facts=[("not done yet", "")]))
         path = self.path / INDEX
         write_whole(path, page(f"Batch {self.batch.name}", said, cards).encode())
         return path
 
-    def _card(self, job: Job) -> Card:
+    def _make_card(self, job: Job) -> Card:
         """Return the content of the page for a finished job."""
-        run = self.run(job)
+        run = self.find_run(job)
         thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
         metrics, timing = (read_json(run / name) or {} for name in ("metrics.json", TIMING))
-        facts = [(said, _value(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
+        facts = [(said, _format_figure(metrics.get(key), factor, unit)) for key, said, factor, unit in FACTS]
         if metrics.get("beyond_a_finger"):
             facts.append(("not to be trusted", metrics["beyond_a_finger"]))
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts += [
-            ("start of its process", _value(timing.get("start_up"), 1.0, "s")),
+            ("start of its process", _format_figure(timing.get("start_up"), 1.0, "s")),
             ("whole job", format_duration(took)),
         ]
         hidden = {*NAMES, TIMING, JOB}
@@ -158,7 +158,7 @@ def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
         yield Folder(path, batch)
 
 
-def _value(value: Any, factor: float, unit: str) -> str:
+def _format_figure(value: Any, factor: float, unit: str) -> str:
     """Write a figure with its unit; nothing where there is none."""
     if value is None:
         return ""

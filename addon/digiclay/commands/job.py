@@ -72,13 +72,15 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Do the job."""
     if not arguments.follow:
         with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
-            out = _done(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+            out = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
         if not arguments.quiet:
             print(f"written to {out}")
         return 0
     ended = watch_input()
     try:
-        _done(arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True))
+        _do_job(
+            arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True)
+        )
         return 0
     except KeyboardInterrupt:
         return STOPPED
@@ -122,13 +124,13 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
         except argparse.ArgumentTypeError as error:
             raise OutputError(f"export: {error}.") from None
         refuse_what_has_no_surface(scene, "export")
-    if (outputs.drawn or outputs.export) and scene.recorder is None:
+    if (outputs.needs_blender or outputs.export) and scene.recorder is None:
         raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
-    if outputs.drawn:
+    if outputs.needs_blender:
         refuse_without_blender()
 
 
-def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> Path:
+def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> Path:
     """Do the job, and return its folder; KeyboardInterrupt when it was stopped."""
     folder: Path = arguments.job
     if not os.path.isfile(folder / JOB):
@@ -141,7 +143,7 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
     timing: dict[str, Any] = {"start_up": started - arguments.since if arguments.since else None}
     patience = GRACE if arguments.follow else 0.0
     with write_folder(out, overwrite=arguments.overwrite, patience=patience) as staged:
-        _make(scene, outputs, staged, timing, stopped, tell)
+        _make_outputs(scene, outputs, staged, timing, stopped, tell)
         for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
             shutil.copyfile(folder / file, staged / file)
         timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
@@ -149,7 +151,7 @@ def _done(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell
     return out
 
 
-def _make(
+def _make_outputs(
     scene: Scene,
     outputs: Outputs,
     out: Path,

@@ -28,7 +28,7 @@ class Line:
     def __enter__(self) -> Self:
         return self
 
-    def due(self) -> bool:
+    def is_due(self) -> bool:
         """Return whether to redraw; the rate is limited, since drawing takes time."""
         return time.monotonic() - self._drawn >= PAUSE
 
@@ -42,7 +42,7 @@ class Line:
         self._stream.flush()
         self._shown = True
 
-    def left(self, share: float) -> str:
+    def format_left(self, share: float) -> str:
         """Write how long the rest takes when a share from 0 to 1 was done in the time since the beginning."""
         if share <= 0.0:
             return ""
@@ -71,9 +71,9 @@ class Bar(Line):
 
     def __call__(self, done: int, total: int) -> None:
         """Draw the bar, if it is time to."""
-        if self.due():
+        if self.is_due():
             times = f"{done * self._period:.1f} of {total * self._period:.1f} s simulated"
-            said = f"{100 * done // total:3d} %{self.left(done / total)}  {times}"
+            said = f"{100 * done // total:3d} %{self.format_left(done / total)}  {times}"
             self.draw(f"{self._label} {draw_share(done / total)} {said}")
 
 
@@ -95,9 +95,9 @@ class Counted(Line):
 
     def __call__(self, done: float, total: int, note: str = "") -> None:
         """Draw the bar, if it is time to; `done` may be in the middle of one."""
-        if self.due():
+        if self.is_due():
             here = (done - self._before) / max(total - self._before, 1)
-            said = f"{int(done)} of {total} {self._unit}{self.left(here)}{note}"
+            said = f"{int(done)} of {total} {self._unit}{self.format_left(here)}{note}"
             self.draw(f"{self._label} {draw_share(done / total)} {said}")
 
 

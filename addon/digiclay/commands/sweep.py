@@ -88,7 +88,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     axes = [read_axis(said) for said in arguments.vary]
     with Counted(sys.stderr, "sweep", "points read") as bar:
         told = None if arguments.quiet else bar
-        points = make_points(find(arguments.scene), _settings(arguments, axes), axes, told)
+        points = make_points(find(arguments.scene), _read_settings(arguments, axes), axes, told)
         if not any(point.scene and point.scene.recorder for point in points):
             raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
         errors = any(name in ERRORS for name in names)
@@ -115,7 +115,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         return 0
 
 
-def _settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setting]:
+def _read_settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[Setting]:
     """Return what the options change of the scene; what varies is given by --vary alone."""
     settings = settings_of(arguments)
     varied = [one.key for one in axes]

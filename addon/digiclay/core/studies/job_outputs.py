@@ -47,11 +47,11 @@ class Outputs:
     film: Film | None = None
 
     @property
-    def drawn(self) -> bool:
+    def needs_blender(self) -> bool:
         """Whether any of it needs Blender."""
         return any(getattr(self, section) for section in PICTURES)
 
-    def text(self) -> str:
+    def format(self) -> str:
         """Return a job.toml that reads back as an equal value."""
         lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
         lines += [f"export = {format_value(list(self.export))}", f"errors = {format_value(self.errors)}"]

@@ -80,18 +80,18 @@ def read_jobs(path: Path) -> JobSeries:
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
         made = make_outputs({key: table[key] for key in table if key not in WHICH})
-        words, methods, changes = _scenes(table), _methods(table), _settings(table)
+        words, methods, changes = _read_scenes(table), _read_methods(table), _read_settings(table)
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
-        files = [_found(path, said) for said in words]
+        files = [_find_scene(path, said) for said in words]
         for file in files:
             load(file)  # what is wrong without any change is told of first
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
         _refuse_twice("methods", methods, methods)
         parts = list(itertools.product(files, methods, changes.items()))
-        names = make_unique_names([_name(file, method, label) for file, method, (label, _) in parts])
-        jobs = tuple(_job(name, *part) for name, part in zip(names, parts, strict=True))
+        names = make_unique_names([_name_job(file, method, label) for file, method, (label, _) in parts])
+        jobs = tuple(_make_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
     return JobSeries(find_name(path), jobs, made)
@@ -116,7 +116,7 @@ def read_outputs(path: Path) -> Outputs:
         raise SceneError(f"{path}: {error}") from None
 
 
-def _scenes(table: Mapping[str, Any]) -> list[str]:
+def _read_scenes(table: Mapping[str, Any]) -> list[str]:
     """Return the scenes of the file."""
     words = table.get("scenes")
     if not isinstance(words, list) or not words or not all(isinstance(said, str) and said for said in words):
@@ -125,7 +125,7 @@ def _scenes(table: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _methods(table: Mapping[str, Any]) -> list[str]:
+def _read_methods(table: Mapping[str, Any]) -> list[str]:
     """Return the methods every scene is run with; an empty one is the scene's own."""
     if "methods" not in table:
         return [""]
@@ -138,7 +138,7 @@ def _methods(table: Mapping[str, Any]) -> list[str]:
     return methods
 
 
-def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
+def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
     """Return the settings by their labels; without any, one that changes nothing."""
     if "settings" not in table:
         return {"": []}
@@ -154,40 +154,40 @@ def _settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
         if not re.fullmatch(r"\w[\w.+-]*", label):
             raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
         option = f"settings.{label}"
-        found[label] = [Setting(key, format_value(value), option) for key, value in _flat(changes)]
+        found[label] = [Setting(key, format_value(value), option) for key, value in _flatten(changes)]
     return found
 
 
-def _flat(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+def _flatten(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
     """Return the dotted keys of nested tables, and their values."""
     pairs = []
     for key, value in table.items():
         dotted = f"{above}{key}"
-        pairs += _flat(value, f"{dotted}.") if isinstance(value, dict) else [(dotted, value)]
+        pairs += _flatten(value, f"{dotted}.") if isinstance(value, dict) else [(dotted, value)]
     return pairs
 
 
-def _found(jobs: Path, said: str) -> Path:
+def _find_scene(jobs: Path, said: str) -> Path:
     """Return the file of a scene: beside the JOBS file, or as anywhere else."""
     beside = jobs.parent / said
     return find(str(beside)) if os.path.exists(beside) else find(said)
 
 
-def _name(file: Path, method: str, label: str) -> str:
+def _name_job(file: Path, method: str, label: str) -> str:
     """Return what a job is called by its parts."""
     return "-".join(part for part in (find_name(file, SCENE), method, label) if part)
 
 
-def _job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
+def _make_job(name: str, file: Path, method: str, setting: tuple[str, list[Setting]]) -> Job:
     """Make one job."""
     chosen = [Setting("control.method", format_value(method), "methods")] if method else []
     try:
-        return Job(name, _alone(load(file, [*chosen, *setting[1]])))
+        return Job(name, _embed_heights(load(file, [*chosen, *setting[1]])))
     except (SceneError, ParameterError) as error:
         return Job(name, None, one_line(error))
 
 
-def _alone(scene: Scene) -> Scene:
+def _embed_heights(scene: Scene) -> Scene:
     """Return a scene with the heights of its shape in it, so that it needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene
