@@ -252,7 +252,8 @@ def test_only_the_sensor_models_asked_for_are_imported(setting: str, modules: st
         "from digiclay.core.scene.scene_source import Setting, find, load\n"
         "from digiclay.core.session.run_scene import run\n"
         "run(load(find('slow_press'), [Setting(*one.split('=', 1)) for one in sys.argv[1:]]))\n"
-        "print(*sorted({'observer', 'sensors'} & {m.removeprefix('digiclay.core.model.') for m in sys.modules}))\n"
+        "models = {m.removeprefix('digiclay.core.model.') for m in sys.modules}\n"
+        "print(*sorted({'observer', 'sensors'} & models))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, "simulation.duration=0.1", *filter(None, [setting])],
