@@ -145,7 +145,7 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
                 done = (
                     before + len(ended) + sum(process.read_fraction() for process in list(running.values()))
                 )
-                bar(before + len(ended) + parts, len(made.jobs), f", {len(failed)} failed" if failed else "")
+                bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
         with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
             task = partial(_do_job, processes, running, folder)
