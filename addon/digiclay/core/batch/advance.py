@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import DivergenceError
-from ..engine.simulation import find_divergence, move, queue_commands, simulate_period
+from ..engine.simulation import find_divergence, simulate_period
 from ..engine.state import State, at_rest
 from ..engine.system import System
 from .broadcasting import numbers
 from .fingers import Fingers
 
-__all__ = ["Batch", "advance", "begin", "blow_up", "broken", "follow", "kept"]
+__all__ = ["Batch", "advance", "begin", "blow_up", "broken", "kept"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,29 +50,6 @@ def advance(batch: Batch, state: State, coming: Fingers | None) -> State:
         How the fingers come in some periods, this one among them.
     """
     return simulate_period(batch, state, coming and coming.at(state.period))
-
-
-def follow(batch: Batch, state: State, coming: Fingers | None, leader: State) -> State:
-    """Simulate the control period that other beds of the same runs have just done, under their commands.
-
-    Parameters
-    ----------
-    batch : Batch
-        Without a controller.
-    state : State
-        Used up.
-    coming : Fingers or None
-    leader : State
-        After the period. The cells that were active there are so here: the two differ by errors of the
-        integration, and a set of cells has room for far more.
-    """
-    if state.active.cells is not leader.active.cells:
-        batch.selection.release(state)
-        state = state._replace(active=batch.selection.take(state, leader.active))
-    if state.active.cells.size:
-        queue_commands(state.active, leader.active.all.command)
-        move(batch, state, coming and coming.at(state.period))
-    return state._replace(period=state.period + 1)
 
 
 def broken(state: State) -> NDArray[np.bool_]:

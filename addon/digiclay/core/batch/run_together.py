@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ..base.errors import DigiclayError
+from ..engine.simulation import repeat_period
 from ..engine.system import System
 from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
@@ -16,7 +17,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_result import Result
-from .advance import blow_up, follow
+from .advance import blow_up
 from .broadcasting import Floats
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, play_all
 from .recording import Histories, Sums
@@ -64,7 +65,8 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
         largest = largest[:, [play.runs.index(run) for run in leader.runs]]
         play = keep_runs(play, leader.runs)
     play = locate_fingers(play)
-    play = replace(play, state=follow(play.stack, play.state, play.coming, leader.state))
+    finger = play.coming and play.coming.at(play.state.period)
+    play = replace(play, state=repeat_period(play.stack, play.state, finger, leader.state))
     own, other, force = play.state.active, leader.state.active, play.stack.rows.force
     near = slice(own.near)
     found = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])

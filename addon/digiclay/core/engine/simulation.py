@@ -18,7 +18,7 @@ from ..model.trajectory import Trajectory, sample_poses
 from .state import ActiveSet, Part, State, at_rest
 from .system import System
 
-__all__ = ["advance", "begin", "periods", "step", "trace_fingers"]
+__all__ = ["advance", "begin", "periods", "repeat_period", "step", "trace_fingers"]
 
 Floats = NDArray[np.float64]
 
@@ -126,6 +126,30 @@ def move(system: System, state: State, finger: Any) -> None:
     held = state.active
     under = _underside(system, finger, held)
     held.touched.force[:] = _ready(system, held).movement(under)
+
+
+def repeat_period(system: System, state: State, finger: Any, leader: State) -> State:
+    """Simulate the control period that a session, or many, has just done, under its commands.
+
+    Parameters
+    ----------
+    system : System
+        Of the same bed and rows; its controller is left aside.
+    state : State
+        Before the period; used up.
+    finger : object
+        See `simulate_period`.
+    leader : State
+        After the period. The cells that were active there are so here: the two differ by errors of the
+        integration, and a set of cells has room for far more.
+    """
+    if state.active.cells is not leader.active.cells:
+        system.selection.release(state)
+        state = state._replace(active=system.selection.take(state, leader.active))
+    if state.active.cells.size:
+        queue_commands(state.active, leader.active.all.command)
+        move(system, state, finger)
+    return state._replace(period=state.period + 1)
 
 
 class _Ready(NamedTuple):

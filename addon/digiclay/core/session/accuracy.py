@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import DigiclayError
 from ..control.replay import Replay
-from ..engine.simulation import advance, begin, periods, trace_fingers
+from ..engine.simulation import begin, periods, repeat_period, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
 from ..model.trajectory import interpolate_poses
@@ -150,7 +150,8 @@ def estimate_errors(
     stopped : callable, optional
         Asked after each control period; when it says True, there is no estimate: None.
     """
-    system = _replay(assemble(make_reference(scene)), history["command"])
+    system = assemble(make_reference(scene))
+    system = replace(system, controller=Replay(system.grid, history["command"]))
     done, largest = len(history["time"]) - 1, np.zeros(3)
     for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
         height, force = state.row(0), state.row(system.rows.force)
@@ -161,11 +162,6 @@ def estimate_errors(
         if stopped and stopped():
             return None
     return Errors.estimate(largest)
-
-
-def _replay(system: System, commands: Floats) -> System:
-    """Return the system under given commands (t, n)."""
-    return replace(system, controller=Replay(system.grid, commands))
 
 
 def start(scene: Scene) -> ErrorMonitor | None:
@@ -212,15 +208,13 @@ def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMoni
     """
     if monitor.state is None:
         return begin_stretch(replace(monitor, left=monitor.left - 1), after), None
-    rows = monitor.system.rows
-    system = _replay(monitor.system, after.row(rows.command)[None])
+    system = monitor.system
     finger = trace_fingers(system, interpolate_poses(path, system.instants / system.period))[0]
-    try:
-        # A period's commands are row 0 of what is played: its own memory does not count on.
-        state = advance(system, monitor.state._replace(memory=0), finger)
-    except DigiclayError:
+    state = repeat_period(system, monitor.state, finger, after)
+    if not np.isfinite(state.active.block).all():
         return begin_stretch(reset(monitor), after), None
     if monitor.left > 1:
         return replace(monitor, state=state, left=monitor.left - 1), None
-    found = compare(state.row(0), state.row(rows.force), after.row(0), after.row(rows.force))
+    force = system.rows.force
+    found = compare(state.row(0), state.row(force), after.row(0), after.row(force))
     return replace(monitor, state=None, left=PAUSE), Errors.estimate(found)
