@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import apply_map
 from ..engine.system import System
+from ..model.fingertip import join_surfaces
 from ..model.layout import Grid
 from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
@@ -138,13 +139,7 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     """
     forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
     rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
-    under: Floats = rows[: len(least)]
-    np.maximum(under, least, out=under)
-    np.sqrt(under, under)
-    under -= root
-    under *= under
-    under += rows[len(least) :]
-    return under
+    return join_surfaces(rows[: len(least)], rows[len(least) :], least, root)
 
 
 @dataclass(frozen=True, eq=False)

@@ -191,12 +191,24 @@ def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
     count = join.shape[-2]
     # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
     rows = np.matmul(forms, place)
-    inner: Floats = rows[..., :count, :]
-    np.maximum(inner, join[..., 0, :, :], out=inner)
+    return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
+
+
+def join_surfaces(inner: Floats, tangent: Floats, least: Floats, root: Floats) -> Floats:
+    """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `forms`.
+
+    Parameters
+    ----------
+    inner, tangent : ndarray
+        R and the tangent, m.
+    least, root : ndarray
+        c, m, and its root.
+    """
+    np.maximum(inner, least, out=inner)
     np.sqrt(inner, inner)
-    inner -= join[..., 1, :, :]
+    inner -= root
     inner *= inner
-    inner += rows[..., count:, :]
+    inner += tangent
     return inner
 
 
