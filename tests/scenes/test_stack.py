@@ -256,17 +256,10 @@ def test_every_method_stands_in_stacks_or_says_why_not() -> None:
         assert bool(why_not(known)) == (method not in STACKED), method
 
 
-def test_sensors_keep_a_scene_out_of_stacks() -> None:
-    assert why_not(sample("tap", "sensors.force_noise=0.001")) == "their sensors are no part of a stack yet"
-
-
-def test_a_shape_to_start_from_keeps_a_scene_out_of_stacks() -> None:
-    assert why_not(sample("dome_peaked")) == "a shape comes up before their method takes over"
-
-
 @pytest.mark.parametrize(
     "setting",
     [
+        "sensors.delay=1",
         "layout.rows=21",
         "delay=absent",
         "simulation.physics_step=2e-3",

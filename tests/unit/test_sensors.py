@@ -13,7 +13,7 @@ from digiclay.core.base.errors import ParameterError, SceneError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
-from digiclay.core.model.sensors import Delayed, Noisy, Quantised, Sensing, normals
+from digiclay.core.model.sensors import Delayed, Noisy, Quantised, Sensing, draw_normals
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -52,7 +52,7 @@ def truth(period: int, force: Sequence[float], height: Sequence[float]) -> Truth
 
 def field(seed: int = 3) -> tuple[Floats, Floats]:
     """Return both kinds of noise, (PERIODS, CELLS) each."""
-    both = np.array([normals(seed, period, np.arange(CELLS)) for period in range(PERIODS)])
+    both = np.array([draw_normals(seed, period, np.arange(CELLS)) for period in range(PERIODS)])
     return both[:, 0], both[:, 1]
 
 
@@ -96,12 +96,14 @@ def test_noise_of_other_seeds_is_independent() -> None:
 
 def test_noise_of_a_cell_does_not_depend_on_which_others_are_read() -> None:
     some = np.array([7, 400, 3])
-    np.testing.assert_array_equal(normals(1, 9, some), np.array(normals(1, 9, np.arange(CELLS)))[:, some])
+    np.testing.assert_array_equal(
+        draw_normals(1, 9, some), np.array(draw_normals(1, 9, np.arange(CELLS)))[:, some]
+    )
 
 
 def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
     sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), truth(4, [0.1, 0.2], [0.04, 0.05])
-    first, second = normals(8, 4, seen.cells)
+    first, second = draw_normals(8, 4, seen.cells)
     force, height = sensors.measure(np.empty((0, 2)), seen)
     np.testing.assert_array_equal(force, seen.force + 2e-3 * first)
     np.testing.assert_array_equal(height, seen.height + 5e-6 * second)

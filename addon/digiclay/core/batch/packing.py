@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
 
+from ..control.methods import METHODS
 from ..engine.system import System
 from ..model.interfaces import Stepper
 from ..scene.assembly import assemble
@@ -26,17 +27,13 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 #: Methods whose orders for a cell are the same whichever others take part.
-STACKED = (
-    "virtual_master", "cell_states", "elastic", "plastic", "force_display", "shape_display",
-)  # fmt: skip
+STACKED = tuple(name for name, method in METHODS.items() if not method.by_set)
 
 
 def why_not(scene: Scene) -> str:
     """Return why a scene cannot stand in a stack; empty for one that can."""
-    if scene.sensors is not None:
-        return "their sensors are no part of a stack yet"
-    if scene.shape and not (scene.control and scene.method == "shape_display"):
-        return "a shape comes up before their method takes over"
+    if scene.sensors and (scene.sensors.force_noise or scene.sensors.height_noise):
+        return "what noisy sensors make of a cell depends on which cells take part"
     if scene.control and scene.method not in STACKED:
         return f"what {scene.method} does depends on which cells take part"
     return ""
@@ -54,13 +51,14 @@ def structure(scene: Scene) -> Any:
         When the scene's parts do not go together.
     """
     physics = tuple(scene.section(name) for name in PHYSICS)
+    fingertips = tuple(finger.fingertip for finger in scene.fingers)
+    rounds = scene.sensors and bool(scene.sensors.force_step or scene.sensors.height_step)
     common = (
         scene.layout,
         scene.method if scene.control else None,
-        *(
-            kind(part)
-            for part in (tuple(finger.fingertip for finger in scene.fingers), scene.control, scene.blister)
-        ),
+        scene.shape is None,
+        *(kind(part) for part in (fingertips, scene.control, scene.blister, scene.sensors)),
+        rounds,
         scene.recorder,
         scene.simulation.stepper,
     )
@@ -92,7 +90,7 @@ def put_together(systems: Sequence[System]) -> Batch:
     return Batch(
         grid=first.grid,
         cell=cell,
-        sensors=None,
+        sensors=together([system.sensors for system in systems]) if first.sensors else None,
         controller=join_controllers([system.controller for system in systems]) if first.controller else None,
         stepper=cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start)),
         plan=plan,

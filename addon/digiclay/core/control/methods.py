@@ -35,12 +35,15 @@ class Method:
         Its defaults for the blister where they differ; None: it forms no blister.
     recovers : bool
         Whether its cells go back to the height they had at rest.
+    by_set : bool
+        Whether its orders for a cell depend on which other cells are active, which differ in a batch.
     """
 
     module: str
     parameters: str
     blister: Mapping[str, float] | None = field(default=None)
     recovers: bool = False
+    by_set: bool = False
 
 
 METHODS: dict[str, Method] = {
@@ -50,8 +53,8 @@ METHODS: dict[str, Method] = {
     ),
     "elastic": Method("control.elastic", "Elastic", recovers=True),
     "plastic": Method("control.plastic", "Plastic"),
-    "viscous": Method("control.viscous", "Viscous", recovers=True),
-    "push_pull": Method("control.push_pull", "PushPull"),
+    "viscous": Method("control.viscous", "Viscous", recovers=True, by_set=True),
+    "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
     "shape_display": Method("control.shape_display", "ShapeDisplay"),
 }

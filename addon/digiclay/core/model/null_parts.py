@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,7 @@ class Unrelaxed:
         """
 
 
+@dataclass(frozen=True)
 class PerfectSensors:
     """No sensor model: measured forces and heights are the true ones."""
 

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import apply_map
 from .delay import Queue
 from .interfaces import Sensors, Truth
 from .physics import Cell
 
-__all__ = ["SHUT", "ValveObserver", "valve_observer"]
+__all__ = ["SHUT", "ValveObserver", "make_valve_observer"]
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class ValveObserver:
         commands, lag = own[3 + self.cell.lag.rows :], own[3 : 3 + self.cell.lag.rows]
         commands[:-1] = commands[1:]
         commands[-1] = truth.command
-        opening = self.response @ own[3:]
+        opening = apply_map(self.response, own[3:])
         own[0] = self._estimate(opening[:-1], before, after, own[0])
         if lag.shape[0]:
             lag[:] = opening[-1]
@@ -93,25 +94,30 @@ class ValveObserver:
 
     def _height(self, truth: Truth) -> Floats:
         """Return the heights as the inner sensors read them."""
-        return self.inner.measure(np.empty((0, truth.cells.size)), truth)[1]
+        return self.inner.measure(np.empty((0, *truth.cells.shape)), truth)[1]
 
     def _estimate(self, opening: Floats, before: Floats, after: Floats, held: Floats) -> Floats:
-        """Return the forces, N, from openings (nodes, m) and the heights before and after, m."""
-        actuator, weights = self.cell.actuator, self.weights
-        told = weights @ opening**2 > SHUT**2
+        """Return the forces, N, from openings (nodes, m[, b]) and the heights before and after, m."""
+        actuator = self.cell.actuator
+        told = self._average(opening**2) > SHUT**2
         told &= (after > 0.0) & (after < actuator.stroke)
         flow = actuator.area * (after - before) / self.period
         pressure, force = self.cell.supply.pressure(opening), held
         for _ in range(ROUNDS):
             conductance = self.cell.flow.conductance(opening, pressure - force / actuator.area)
-            open_for = np.where(told, weights @ conductance, 1.0)
-            found = actuator.area * (weights @ (conductance * pressure) - flow) / open_for
+            open_for = np.where(told, self._average(conductance), 1.0)
+            found = actuator.area * (self._average(conductance * pressure) - flow) / open_for
             least = actuator.area**2 * self.doubt / self.period / open_for
             force = np.where(told, np.where(found > least, found, 0.0), held)
         return force
 
+    def _average(self, values: Floats) -> Floats:
+        """Return the mean over a period of values at the nodes."""
+        mean: Floats = apply_map(self.weights[None], values)[0]
+        return mean
 
-def valve_observer(
+
+def make_valve_observer(
     inner: Sensors, cell: Cell, line: Queue, period: float, doubt: float = 0.0
 ) -> ValveObserver:
     """Make an observer for cells whose commands go through `line`; `doubt` as in `ValveObserver`, m.

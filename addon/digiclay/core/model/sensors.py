@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from .interfaces import Sensors, Truth
 
-__all__ = ["Delayed", "Noisy", "Quantised", "Sensing", "normals"]
+__all__ = ["Delayed", "Noisy", "Quantised", "Sensing", "draw_normals"]
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
@@ -86,7 +87,7 @@ class Sensing(Parameters):
                 raise ParameterError("Sensing", name, rule, f"{getattr(self, name):g} N")
 
 
-def normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def draw_normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """Return two independent standard normal numbers a cell, a pure function of the arguments.
 
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
@@ -103,15 +104,15 @@ def normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Fl
     first, second : ndarray (m,)
         By Box and Muller's method; no farther from 0 than 8.6.
     """
-    start = _mixed(np.array([seed % WORD], np.uint64))
-    start = _mixed(start + np.uint64(period % WORD))
+    start = _mix(np.array([seed % WORD], np.uint64))
+    start = _mix(start + np.uint64(period % WORD))
     counter = start + np.uint64(WEYL) * (2 * cells.astype(np.uint64))
-    radius = np.sqrt(-2.0 * np.log(_uniform(counter)))
-    angle = 2.0 * np.pi * _uniform(counter + np.uint64(WEYL))
+    radius = np.sqrt(-2.0 * np.log(_draw_uniform(counter)))
+    angle = 2.0 * np.pi * _draw_uniform(counter + np.uint64(WEYL))
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
-def _mixed(words: Words) -> Words:
+def _mix(words: Words) -> Words:
     """Scramble 64-bit words: any bit of one changes about half the bits of its result."""
     words = words + np.uint64(WEYL)
     words = (words ^ (words >> np.uint64(30))) * np.uint64(FIRST)
@@ -119,9 +120,9 @@ def _mixed(words: Words) -> Words:
     return words ^ (words >> np.uint64(31))
 
 
-def _uniform(counter: Words) -> Floats:
+def _draw_uniform(counter: Words) -> Floats:
     """Return numbers spread evenly in (0, 1), without both ends."""
-    uniform: Floats = ((_mixed(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
+    uniform: Floats = ((_mix(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
     return uniform
 
 
@@ -150,7 +151,7 @@ class Noisy:
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return forces and heights with noise; a force may read below 0."""
         force, height = self.inner.measure(own, truth)
-        first, second = normals(self.seed, truth.period, truth.cells)
+        first, second = draw_normals(self.seed, truth.period, truth.cells)
         return force + self.force * first, height + self.height * second
 
     def update(self, own: Floats, truth: Truth) -> None:
@@ -181,16 +182,19 @@ class Quantised:
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return rounded forces and heights."""
         force, height = self.inner.measure(own, truth)
-        return _rounded(force, self.force), _rounded(height, self.height)
+        return _round_to_step(force, self.force), _round_to_step(height, self.height)
 
     def update(self, own: Floats, truth: Truth) -> None:
         """Nothing of its own to remember."""
         self.inner.update(own, truth)
 
 
-def _rounded(values: Floats, step: float) -> Floats:
-    """Return values in whole steps."""
-    return np.rint(values / step) * step if step else values
+def _round_to_step(values: Floats, step: Any) -> Floats:
+    """Return values in whole steps; a step, or each run's (b,), of 0 rounds nothing."""
+    if not np.any(step):
+        return values
+    whole: Floats = np.rint(values / np.where(step, step, 1.0)) * step
+    return np.where(step, whole, values)
 
 
 @dataclass(frozen=True)
@@ -224,13 +228,13 @@ class Delayed:
 
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return the readings made `periods` ago."""
-        force, height = self._reading(own, truth.cells, max(truth.period - self.periods, 0))
+        force, height = self._read(own, truth.cells, max(truth.period - self.periods, 0))
         return force, height
 
     def update(self, own: Floats, truth: Truth) -> None:
         """Make up for the readings a cell has missed, and take new ones."""
         for period in range(max(truth.period - self.periods, 0), truth.period):
-            own[self._slot(period)] = self._reading(own, truth.cells, period)
+            own[self._slot(period)] = self._read(own, truth.cells, period)
         inner = own[self._inner]
         self.inner.update(inner, truth)
         own[self._slot(truth.period)] = self.inner.measure(inner, truth)
@@ -247,13 +251,13 @@ class Delayed:
         first = 3 + 2 * (period % (self.periods + 1))
         return slice(first, first + 2)
 
-    def _reading(self, own: Floats, cells: NDArray[np.intp], period: int) -> Floats:
-        """Return force and height read in a period, shape (2, m)."""
+    def _read(self, own: Floats, cells: NDArray[np.intp], period: int) -> Floats:
+        """Return force and height read in a period, shape (2, m[, b])."""
         stored: Floats = own[self._slot(period)]
         missed = own[0] <= period
         if not missed.any():
             return stored
         height = np.where(own[0] > 0.0, own[2], self.rest)
         # A cell that takes no part has its valve shut and nothing on its way to it.
-        still = Truth(cells, period, own[1], height, np.zeros(cells.size))
+        still = Truth(cells, period, own[1], height, np.zeros(cells.shape))
         return np.where(missed, self.inner.measure(own[self._inner], still), stored)

@@ -109,10 +109,10 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     if known.force_step or known.height_step:
         sensors = Quantised(sensors, known.force_step, known.height_step)
     if known.observer == "valve":
-        from ..model.observer import valve_observer
+        from ..model.observer import make_valve_observer
 
         period = scene.simulation.control_period
-        sensors = valve_observer(sensors, cell, line, period, known.motion_floor)
+        sensors = make_valve_observer(sensors, cell, line, period, known.motion_floor)
     if known.delay:
         sensors = Delayed(sensors, known.delay, scene.actuator.rest_height)
     return sensors
