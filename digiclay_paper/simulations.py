@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.metrics.signal import amplitude, frequency, settling_time
-from digiclay.core.model.set_point import asked
+from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -157,7 +157,7 @@ def _boiled_down(done: Result) -> Session:
         name: np.concatenate([done.history[name][:-1:THINNED], done.history[name][-1:]])
         for name in ("time", "height", "total_force", "fingertip")
     }
-    wanted = asked(done.scene.set_point, follow)
+    wanted = find_set_point(done.scene.set_point, follow)
     for name, values in (("set_point", wanted), ("following", follow)):
         kept[name] = np.concatenate([values[:-1:THINNED], values[-1:]])
     kept["position"] = done.history["position"]
@@ -175,7 +175,7 @@ def _swing(
     done = _run(case)
     end = float(done.history["time"][-1])
     late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
-    wanted = asked(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
+    wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
     settled = settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     found = Swing(
         gain, position_gain, amplitude(late["total_force"]),

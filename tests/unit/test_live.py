@@ -13,7 +13,7 @@ from digiclay.core.model.set_point import SetPoint
 from digiclay.core.model.trajectory import interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import accuracy, snapshot
+from digiclay.core.session import accuracy, recent_trace, snapshot
 from digiclay.core.session.accuracy import PAUSE, STRETCH, Errors
 from digiclay.core.session.live_periods import (
     Clock,
@@ -23,7 +23,7 @@ from digiclay.core.session.live_periods import (
     simulate_path,
     update_cost,
 )
-from digiclay.core.session.recent_trace import ROWS, begun, extended, felt, picked, row
+from digiclay.core.session.recent_trace import ROWS
 from numpy.typing import NDArray
 
 from tests.assemble import path
@@ -150,18 +150,18 @@ def test_a_finger_stays_where_a_finger_can_be(given: tuple[float, ...], wanted: 
 
 
 def test_a_trace_never_holds_more_than_its_rows() -> None:
-    trace = begun(PERIOD)
+    trace = recent_trace.start(PERIOD)
     state = begin(SYSTEM)
     for time in range(5 * ROWS):
-        line = row(SYSTEM, state, SetPoint(0.4), ())
+        line = recent_trace.sample(SYSTEM, state, SetPoint(0.4), ())
         line[0] = time
-        trace = extended(trace, [line])
+        trace = recent_trace.extend(trace, [line])
     assert len(trace.rows) == ROWS
     assert trace.time[0] == 4 * ROWS
 
 
 def test_a_trace_spans_ten_seconds_also_with_a_short_control_period() -> None:
-    assert begun(1e-4).every * 1e-4 * ROWS >= 10.0
+    assert recent_trace.start(1e-4).every * 1e-4 * ROWS >= 10.0
 
 
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
@@ -170,8 +170,8 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
     *_, state = periods(system, [press], begin(system), 60)
     middle, corner = 312, 0
     assert np.isin([middle, corner], state.active.cells).tolist() == [True, False]
-    trace = picked(begun(PERIOD), [middle, corner], system.grid.count)
-    trace = extended(trace, [row(system, state, SetPoint(0.4), trace.pins)])
+    trace = recent_trace.pick(recent_trace.start(PERIOD), [middle, corner], system.grid.count)
+    trace = recent_trace.extend(trace, [recent_trace.sample(system, state, SetPoint(0.4), trace.pins)])
     assert trace.heights.tolist() == [[state.row(0)[middle], state.row(0)[corner]]]
     assert trace.force[0] == pytest.approx(state.row(system.rows.force).sum(), rel=1e-12)
     assert trace.force[0] > 0.1
@@ -179,7 +179,9 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins() -> None:
 
 
 def test_a_method_without_a_set_point_has_none_in_the_trace() -> None:
-    trace = extended(begun(PERIOD), [row(SYSTEM, begin(SYSTEM), None, ())])
+    trace = recent_trace.extend(
+        recent_trace.start(PERIOD), [recent_trace.sample(SYSTEM, begin(SYSTEM), None, ())]
+    )
     assert np.isnan(trace.set_point).all()
 
 
@@ -188,23 +190,25 @@ def test_a_set_point_of_each_cell_is_traced_as_their_number_changes() -> None:
     *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
     held, asked = state.active, SetPoint(0.04, per_cell=True)
     held.mode[:] = Mode.REST
-    assert np.isnan(row(SYSTEM, state, asked, ())[2])
+    assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
     held.mode[:3] = Mode.FORCE_FOLLOW
-    assert row(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
+    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
 
 
 def test_a_pin_that_stays_picked_keeps_its_past() -> None:
-    trace = picked(begun(PERIOD), [3, 4], 121)
-    trace = extended(trace, [row(SYSTEM, begin(SYSTEM), SetPoint(0.4), trace.pins)])
-    other = picked(trace, [9, 4, 500, -1], 121)
+    trace = recent_trace.pick(recent_trace.start(PERIOD), [3, 4], 121)
+    trace = recent_trace.extend(
+        trace, [recent_trace.sample(SYSTEM, begin(SYSTEM), SetPoint(0.4), trace.pins)]
+    )
+    other = recent_trace.pick(trace, [9, 4, 500, -1], 121)
     assert other.pins == (9, 4)
     assert np.isnan(other.heights[0, 0])
     assert other.heights[0, 1] == trace.heights[0, 1]
 
 
 def test_time_that_goes_back_takes_the_trace_along() -> None:
-    trace = extended(begun(PERIOD), [[float(time)] + [0.0] * 8 for time in range(10)])
-    assert extended(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    trace = recent_trace.extend(recent_trace.start(PERIOD), [[float(time)] + [0.0] * 8 for time in range(10)])
+    assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
@@ -262,7 +266,7 @@ def test_a_monitor_leaves_the_session_alone() -> None:
     for index, state in enumerate(simulate_path(SYSTEM, start, finger)):
         monitor, _ = accuracy.follow(monitor, state, finger[index : index + 2])
     assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
-    assert felt(SYSTEM, state) > 0.0
+    assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
 
 
 def test_a_step_that_cannot_be_halved_has_no_monitor() -> None:

@@ -16,7 +16,7 @@ from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
 from ..core.control.methods import METHODS
 from ..core.metrics.finger_path import sum_cells
-from ..core.model.set_point import asked
+from ..core.model.set_point import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
@@ -98,7 +98,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         for method, scene in scenes.items():
             done = _run(scene, method, quiet=arguments.quiet)
             found[method] = done.figures | (_speeds(scene) if arguments.speed else {})
-            wanted = asked(scene.set_point, sum_cells(done.history).following)
+            wanted = find_set_point(scene.set_point, sum_cells(done.history).following)
             forces[method] = done.history["time"], done.history["total_force"], wanted
             beyond[method] = done.metrics.get("beyond_a_finger", "")
         units = {name: unit for name, (unit, _) in {**RUN_METRICS, **SPEEDS}.items()}

@@ -16,7 +16,7 @@ from ..core.engine.system import System
 from ..core.model.fingertip import wrap_one
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session import accuracy, snapshot
+from ..core.session import accuracy, recent_trace, snapshot
 from ..core.session.live_periods import (
     Clock,
     clamp_pose,
@@ -25,8 +25,6 @@ from ..core.session.live_periods import (
     simulate_path,
     update_cost,
 )
-from ..core.session.recent_trace import begun as trace_begun
-from ..core.session.recent_trace import extended, felt, picked, row
 from .running import Gesture, Recording, Running
 from .stroke_queue import take_path
 
@@ -83,7 +81,8 @@ def begin_session(
     now = snapshot.dump(system, state)
     running = Running(
         uid, name, scene, system, state, now, pose, tick + 1, Clock(),
-        trace_begun(system.period), accuracy.start(scene), next_gesture=Gesture(state.period, now, pose),
+        recent_trace.start(system.period), accuracy.start(scene),
+        next_gesture=Gesture(state.period, now, pose),
     )  # fmt: skip
     return running, said
 
@@ -126,7 +125,7 @@ def advance(
         The session is used up then: `restore` takes it up again.
     """
     if pins is not None:
-        running = replace(running, trace=picked(running.trace, pins, running.system.grid.count))
+        running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
@@ -168,12 +167,12 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
                 monitor, found = accuracy.follow(monitor, state, paths[index : index + 2])
                 errors = found or errors
             if state.period % running.trace.every == 0:
-                rows.append(row(system, state, running.scene.set_point, running.trace.pins))
+                rows.append(recent_trace.sample(system, state, running.scene.set_point, running.trace.pins))
     clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
         running, state=state, snapshot=snapshot.dump(system, state), pose=path[-1],
         clock=clock, monitor=monitor,
-        errors=errors, trace=extended(running.trace, rows),
+        errors=errors, trace=recent_trace.extend(running.trace, rows),
         recording=running.recording and running.recording.extend(paths[1:], running.tick),
     )  # fmt: skip
     return _count_gesture(gone)
@@ -184,7 +183,7 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     moved = float(np.abs(pose - running.pose).max()) > STILL
     rest_time = 0.0 if moved else running.rest_time + count * running.system.period
     next_gesture = running.next_gesture
-    free = next_gesture is None and felt(running.system, running.state) == 0.0
+    free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
     if free or (moved and running.rest_time >= REST):
         next_gesture = Gesture(running.state.period, running.snapshot, running.pose)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
@@ -192,7 +191,7 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
 
 def _count_gesture(running: Running) -> Running:
     """Count a gesture that has touched among the last ones."""
-    if running.next_gesture is None or felt(running.system, running.state) == 0.0:
+    if running.next_gesture is None or recent_trace.measure_total_force(running.system, running.state) == 0.0:
         return running
     room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
     return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)
@@ -217,7 +216,7 @@ def restore(running: Running, kept: bytes | None, pose: Floats, tick: int | None
     if keep is not None:
         keep = keep.cut_at_tick(running.tick if tick is None else tick, state.period)
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
-    free = felt(running.system, state) == 0.0
+    free = recent_trace.measure_total_force(running.system, state) == 0.0
     return replace(
         running, state=state, snapshot=now, pose=clamp_pose(pose, running.system.cell.actuator.stroke),
         clock=running.clock.stopped(), monitor=running.monitor and accuracy.reset(running.monitor), stale=0,
@@ -239,7 +238,7 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
     other, said = begin_session(
         running.uid, running.name, scene, running.pose, running.snapshot, running.tick
     )
-    trace = picked(other.trace, running.trace.pins, other.system.grid.count)
+    trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
     other = replace(
         other,
         paused=running.paused,

@@ -14,7 +14,7 @@ import numpy as np
 from .. import preferences
 from ..compat import bpy
 from ..core.base.modes import Mode
-from ..core.model.set_point import asked
+from ..core.model.set_point import find_set_point
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import project
@@ -81,7 +81,7 @@ def read_session(
     colours : dict of Mode to (float, float, float)
     """
     trace, scene = session.trace, session.scene
-    wanted = float(trace.set_point[-1] if len(trace.rows) else asked(scene.set_point, 0))
+    wanted = float(trace.set_point[-1] if len(trace.rows) else find_set_point(scene.set_point, 0))
     errors = session.errors
     return Readings(
         name=bed.name,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import ParameterError
-from ..model.set_point import SetPoint, asked
+from ..model.set_point import SetPoint, find_set_point
 from ..surface.skin_mesh import grid_shape
 from .finger_path import CellSums, in_contact, lag, ridge_errors, sum_cells, surface_under
 from .force import contact_loss_share, first_touch, rfd, touchdown
@@ -158,7 +158,7 @@ def compute_metrics_from_sums(
     above = surface_under(sums, fingertip)
     ridge = ridge_errors(position[near], sums.last[near], fingertip, rows)
     each = np.ones(len(ridge))
-    wanted = asked(set_point, sums.following)
+    wanted = find_set_point(set_point, sums.following)
     beyond, settled = touchdown(time, total, wanted)
     formed, area = sums.last - sums.first, cell_area(position)
     found: dict[str, float | None] = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SetPoint", "asked"]
+__all__ = ["SetPoint", "find_set_point"]
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class SetPoint:
         return total
 
 
-def asked(set_point: SetPoint | None, following: ArrayLike) -> Floats:
+def find_set_point(set_point: SetPoint | None, following: ArrayLike) -> Floats:
     """Return the `SetPoint.total`, N; NaN throughout for a method without a set point.
 
     Parameters

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..engine.state import State
 from ..engine.system import System
-from ..model.set_point import SetPoint, asked
+from ..model.set_point import SetPoint, find_set_point
 
-__all__ = ["PICKED", "Trace", "begun", "extended", "felt", "picked"]
+__all__ = ["PICKED", "ROWS", "SPAN", "Trace", "extend", "measure_total_force", "pick", "sample", "start"]
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class Trace:
         return self.rows[:, 3 : 3 + len(self.pins)]
 
 
-def begun(period: float, pins: Sequence[int] = ()) -> Trace:
+def start(period: float, pins: Sequence[int] = ()) -> Trace:
     """Return an empty trace for a control period, s.
 
     Parameters
@@ -77,7 +77,7 @@ def begun(period: float, pins: Sequence[int] = ()) -> Trace:
     return Trace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED)))
 
 
-def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
+def pick(trace: Trace, pins: Sequence[int], count: int) -> Trace:
     """Return a trace that follows other pins; those a bed of `count` cells does not have are left out.
 
     Parameters
@@ -97,7 +97,7 @@ def picked(trace: Trace, pins: Sequence[int], count: int) -> Trace:
     return replace(trace, pins=kept, rows=rows)
 
 
-def felt(system: System, state: State) -> float:
+def measure_total_force(system: System, state: State) -> float:
     """Return the total force on the bed, N.
 
     Parameters
@@ -109,7 +109,7 @@ def felt(system: System, state: State) -> float:
     return float(held.block[system.rows.force, : held.near].sum())
 
 
-def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
+def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
     """Return what a trace keeps of a state.
 
     Parameters
@@ -125,18 +125,18 @@ def row(system: System, state: State, set_point: SetPoint | None, pins: Sequence
     for column, pin in enumerate(pins):
         (at,) = np.nonzero(held.cells == pin)
         heights[column] = float(held.block[0, at[0]] if at.size else state.rows[0, pin])
-    wanted = asked(set_point, np.count_nonzero(held.mode == Mode.FORCE_FOLLOW))
-    return [state.period * system.period, felt(system, state), float(wanted), *heights]
+    wanted = find_set_point(set_point, np.count_nonzero(held.mode == Mode.FORCE_FOLLOW))
+    return [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
 
 
-def extended(trace: Trace, rows: list[list[float]]) -> Trace:
+def extend(trace: Trace, rows: list[list[float]]) -> Trace:
     """Return the trace with rows added, each as wide as its own; time may have gone back in between.
 
     Parameters
     ----------
     trace : Trace
     rows : list of list of float
-        From `row`.
+        From `sample`.
     """
     if not rows:
         return trace
