@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-import sys
-from filecmp import dircmp
 from pathlib import Path
 
 import pytest
 
-from tests.patience import HANGS
-
-ROOT = Path(__file__).parents[2]
+from tests.package_copy import copy_package, find_changes, run_python
 
 #: An equal-percentage valve: the lift grows exponentially with the opening.
 VALVE = '''
@@ -123,10 +117,8 @@ print(json.dumps({
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """Return a copy of the package, and of what makes the nomenclature."""
-    for name in ("addon/digiclay", "tools", "docs"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
-    return tmp_path
+    """Return a copy of the package."""
+    return copy_package(tmp_path)
 
 
 def add_law(copy: Path, section: str, row: str, name: str, text: str) -> None:
@@ -137,25 +129,6 @@ def add_law(copy: Path, section: str, row: str, name: str, text: str) -> None:
     lines = laws.read_text(encoding="utf-8").splitlines(keepends=True)
     place = lines.index(f'    "{section}": {{\n') + 2
     laws.write_text("".join([*lines[:place], f"        {row}\n", *lines[place:]]), encoding="utf-8")
-
-
-def run_python(copy: Path, *arguments: str) -> str:
-    """Run Python on the copy; return what it printed."""
-    done = subprocess.run(
-        [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
-        capture_output=True, text=True, check=False, timeout=HANGS,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def touched(compared: dircmp[str]) -> list[str]:
-    """Return the files of the package that are new or differ."""
-    names = [*compared.right_only, *compared.diff_files]
-    return [
-        *(name for name in names if name.endswith(".py")),
-        *(name for inner in compared.subdirs.values() for name in touched(inner)),
-    ]
 
 
 @pytest.mark.parametrize(
@@ -181,9 +154,7 @@ def test_a_new_law_is_one_file_and_one_line(
     copy: Path, section: str, row: str, name: str, text: str, asked: tuple[str, ...]
 ) -> None:
     add_law(copy, section, row, name, text)
-    assert sorted(touched(dircmp(ROOT / "addon" / "digiclay", copy / "addon" / "digiclay"))) == sorted(
-        [name, "laws.py"]
-    )
+    assert find_changes(copy) == sorted([name, "laws.py"])
     found = json.loads(run_python(copy, "-c", SESSION, section, *asked))
     # Sums in another order: a last bit here and there.
     assert found.pop("batch") < 1e-12

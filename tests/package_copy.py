@@ -1,0 +1,44 @@
+"""A copy of the package that a test may change: a new part is written into it and run."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from filecmp import dircmp
+from pathlib import Path
+
+from tests.patience import HANGS
+
+ROOT = Path(__file__).parents[1]
+
+
+def copy_package(folder: Path) -> Path:
+    """Copy the package, and what makes the nomenclature, into a folder; return it."""
+    for name in ("addon/digiclay", "tools", "docs"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+    return folder
+
+
+def run_python(copy: Path, *arguments: str) -> str:
+    """Run Python on the copy; return what it printed."""
+    done = subprocess.run(
+        [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
+        capture_output=True, text=True, check=False, timeout=HANGS,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def find_changes(copy: Path) -> list[str]:
+    """Return the Python files of the copied package that are new or differ, sorted by name."""
+    return sorted(_compare(dircmp(ROOT / "addon" / "digiclay", copy / "addon" / "digiclay")))
+
+
+def _compare(compared: dircmp[str]) -> list[str]:
+    """Return the files that are new or differ in the second of two folders."""
+    names = [*compared.right_only, *compared.diff_files]
+    return [
+        *(name for name in names if name.endswith(".py")),
+        *(name for inner in compared.subdirs.values() for name in _compare(inner)),
+    ]
