@@ -266,6 +266,15 @@ def test_a_bundle_that_no_worker_survives_is_told() -> None:
             evaluate_elsewhere(processes, dead, some(2), errors=False)
 
 
+def test_a_worker_that_cannot_read_its_bundle_ends() -> None:
+    with idle() as processes:
+        worker = processes.start(Evaluator)
+        assert worker is not None
+        worker.input.write(b"cdigiclay.no_such_module\nPoint\n.")  # as another version may send it
+        worker.input.flush()
+        assert worker.process.wait(HANGS) == 0
+
+
 def test_after_a_stop_a_bundle_has_no_records() -> None:
     processes = Processes(lambda: True, lambda: None)
     assert processes.stopped()

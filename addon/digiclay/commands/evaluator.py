@@ -104,6 +104,8 @@ def serve() -> None:
             while True:
                 bundles.put(pickle.load(source))
         except (EOFError, OSError, pickle.UnpicklingError):  # it may end in the middle
+            pass
+        finally:  # also when a bundle of another version of this program cannot be read
             ended.set()
             bundles.put(None)
 
