@@ -227,7 +227,14 @@ def _command(system: System, state: State, memory: Any) -> Any:
 
 
 def queue_commands(held: ActiveSet, newest: Floats) -> None:
-    """Put the newest commands of active cells behind those on their way, in place."""
+    """Put the newest commands of active cells behind those on their way, in place.
+
+    Parameters
+    ----------
+    held : ActiveSet
+    newest : ndarray (m,) or (m, b)
+        Valve commands, 1.
+    """
     for older, newer in pairwise(held.queue):
         older[:] = newer
     held.queue[-1][:] = newest
