@@ -65,7 +65,7 @@ def build(parameters: Sponge, device: DeviceInfo) -> SpongeControl:
 SESSION = """
 import json, sys, tomllib
 import numpy as np
-from digiclay.core.batch.packing import put_together
+from digiclay.core.batch.packing import make_batch
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -84,7 +84,7 @@ text = format_scene(scenes[1])
 print(json.dumps({
     "batch": max(float(np.abs(batch[i] - alone[i]).max()) for i in range(3)),
     "apart": float(np.abs(alone[0] - alone[-1]).max()),
-    "joined": type(put_together([assemble(one) for one in scenes]).controller).__name__,
+    "joined": type(make_batch([assemble(one) for one in scenes]).controller).__name__,
     "in file": 'method = "sponge"' in text and resolve(tomllib.loads(text)) == scenes[1],
     "panel": "swelling_time" in METHOD_GROUPS["sponge"].__annotations__,
 }))

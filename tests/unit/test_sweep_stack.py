@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.batch.advance import advance, begin
-from digiclay.core.batch.broadcasting import kind, together
+from digiclay.core.batch.broadcasting import kind, merge_parts
 from digiclay.core.batch.fingers import fingers
-from digiclay.core.batch.packing import put_together
+from digiclay.core.batch.packing import make_batch
 from digiclay.core.batch.padding import reach
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.supply import Supply
@@ -51,7 +51,7 @@ def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
 
 
 def test_numbers_that_differ_become_an_array_and_the_others_stay() -> None:
-    part = together([Contact(stiffness=100.0), Contact(stiffness=200.0)])
+    part = merge_parts([Contact(stiffness=100.0), Contact(stiffness=200.0)])
     np.testing.assert_array_equal(part.stiffness, [100.0, 200.0])
     assert part.exponent == Contact().exponent
 
@@ -60,7 +60,7 @@ def test_the_formulas_of_a_part_hold_for_many_runs() -> None:
     supplies = [Supply(high=4e4), Supply(low=-3e4)]
     openings = np.linspace(-1.0, 1.0, 12).reshape(6, 2)
     alone = np.column_stack([one.pressure(openings[:, run]) for run, one in enumerate(supplies)])
-    np.testing.assert_array_equal(together(supplies).pressure(openings), alone)
+    np.testing.assert_array_equal(merge_parts(supplies).pressure(openings), alone)
 
 
 def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
@@ -86,7 +86,7 @@ def calls(count: int) -> list[int]:
     """Return how many functions of numpy and others each control period of so many taps calls."""
     scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
     systems = [assemble(scene) for scene in scenes if scene]
-    stack = put_together(systems)
+    stack = make_batch(systems)
     state, ways = begin(stack), [scene.section("trajectory").trajectory() for scene in scenes if scene]
     made, counted = [0], []
 

@@ -16,7 +16,7 @@ from ..engine.system import System
 from .broadcasting import numbers
 from .fingers import Fingers
 
-__all__ = ["Batch", "advance", "begin", "blow_up", "broken", "kept"]
+__all__ = ["Batch", "advance", "begin", "find_diverged", "make_divergence_error", "select_runs"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def advance(batch: Batch, state: State, coming: Fingers | None) -> State:
     return simulate_period(batch, state, coming and coming.at(state.period))
 
 
-def broken(state: State) -> NDArray[np.bool_]:
+def find_diverged(state: State) -> NDArray[np.bool_]:
     """Return which runs, (b,), hold numbers that are not finite."""
     block = state.active.block
     # One sum tells that all is well, as it nearly always is.
@@ -62,7 +62,7 @@ def broken(state: State) -> NDArray[np.bool_]:
     return ~finite
 
 
-def blow_up(batch: Batch, state: State, run: int) -> DivergenceError:
+def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceError:
     """Return the error that a run with a number that is not finite ends in.
 
     Parameters
@@ -79,7 +79,7 @@ def blow_up(batch: Batch, state: State, run: int) -> DivergenceError:
     return error
 
 
-def kept(state: State, runs: Sequence[int]) -> State:
+def select_runs(state: State, runs: Sequence[int]) -> State:
     """Return the state of some of the runs.
 
     Parameters

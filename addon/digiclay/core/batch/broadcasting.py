@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "kind", "numbers", "together"]
+__all__ = ["Floats", "kind", "merge_parts", "numbers"]
 
 Part = TypeVar("Part")
 Floats = NDArray[np.float64]
 
 
 def kind(value: Any) -> Any:
-    """Return all of a part but its numbers: parts of one kind can be stacked.
+    """Return all of a part but its numbers: parts of one kind can be merged.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def kind(value: Any) -> Any:
     return float if isinstance(value, float) else value
 
 
-def together(parts: Sequence[Part]) -> Part:
+def merge_parts(parts: Sequence[Part]) -> Part:
     """Return a part that stands for those of all runs; the first one itself where all are alike.
 
     Parameters
@@ -59,7 +59,7 @@ def _one(values: list[Any]) -> Any:
         alike = all(value is first or np.array_equal(value, first) for value in values)
         return first if alike else np.stack(values, axis=-1)
     if is_dataclass(first):
-        return together(values)
+        return merge_parts(values)
     if isinstance(first, tuple):
         own = tuple(_one(list(several)) for several in zip(*values, strict=True))
         return first if all(map(operator.is_, own, first)) else own

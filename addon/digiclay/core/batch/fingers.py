@@ -17,7 +17,7 @@ from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
 from .broadcasting import Floats
 
-__all__ = ["Fingers", "FingersPeriod", "Way", "fingers", "still_coming", "undersides", "way_over"]
+__all__ = ["Fingers", "FingersPeriod", "Way", "extend_fingers", "fingers", "undersides", "way_over"]
 
 #: Control periods that are worked out at a time.
 CHUNK = 256
@@ -83,7 +83,7 @@ def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, c
     return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
 
 
-def still_coming(
+def extend_fingers(
     coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
 ) -> Fingers | None:
     """Return how the fingers come in a period and some more: what is known, or worked out anew.

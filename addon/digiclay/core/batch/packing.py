@@ -13,12 +13,12 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Batch
-from .broadcasting import kind, numbers, together
+from .broadcasting import kind, merge_parts, numbers
 from .movement import BatchStepper
 from .padding import PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["STACKED", "put_together", "structure", "why_not"]
+__all__ = ["STACKED", "make_batch", "structure", "why_not"]
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
@@ -31,7 +31,7 @@ STACKED = tuple(name for name, method in METHODS.items() if not method.by_set)
 
 
 def why_not(scene: Scene) -> str:
-    """Return why a scene cannot stand in a stack; empty for one that can."""
+    """Return why a scene cannot stand in a batch; empty for one that can."""
     if scene.sensors and (scene.sensors.force_noise or scene.sensors.height_noise):
         return "what noisy sensors make of a cell depends on which cells take part"
     if scene.control and scene.method not in STACKED:
@@ -40,7 +40,7 @@ def why_not(scene: Scene) -> str:
 
 
 def structure(scene: Scene) -> Any:
-    """Return what scenes must have in common to stand in one stack; see also `why_not`.
+    """Return what scenes must have in common to stand in one batch; see also `why_not`.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
     The other steppers know no runs, so for them all cells must be alike.
@@ -81,16 +81,16 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
     return ()
 
 
-def put_together(systems: Sequence[System]) -> Batch:
+def make_batch(systems: Sequence[System]) -> Batch:
     """Put systems of one structure together."""
-    first, cell = systems[0], together([system.cell for system in systems])
+    first, cell = systems[0], merge_parts([system.cell for system in systems])
     period = numbers([system.period for system in systems])
     fastest = numbers([system.fastest for system in systems])
-    plan = together([system.plan for system in systems])
+    plan = merge_parts([system.plan for system in systems])
     return Batch(
         grid=first.grid,
         cell=cell,
-        sensors=together([system.sensors for system in systems]) if first.sensors else None,
+        sensors=merge_parts([system.sensors for system in systems]) if first.sensors else None,
         controller=join_controllers([system.controller for system in systems]) if first.controller else None,
         stepper=cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start)),
         plan=plan,

@@ -15,9 +15,9 @@ from ..model.fingertip import require_one
 from ..model.trajectory import Trajectory
 from ..scene.schema import Scene
 from ..session.run_result import Ended, count_losses
-from .advance import Batch, advance, begin, broken, kept
-from .fingers import Fingers, still_coming
-from .packing import put_together
+from .advance import Batch, advance, begin, find_diverged, select_runs
+from .fingers import Fingers, extend_fingers
+from .packing import make_batch
 
 __all__ = ["Instant", "Play", "begin_play", "keep_runs", "locate_fingers", "play_all"]
 
@@ -33,7 +33,7 @@ class Play:
     ways : mapping of int to Trajectory
     runs : tuple of int
         Whose the last axis is.
-    stack : Batch
+    batch : Batch
     state : State
     coming : Fingers or None
         How the fingers come, as far as that is worked out.
@@ -42,7 +42,7 @@ class Play:
     systems: Mapping[int, System]
     ways: Mapping[int, Trajectory]
     runs: tuple[int, ...]
-    stack: Batch
+    batch: Batch
     state: State
     coming: Fingers | None = None
 
@@ -56,15 +56,15 @@ def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Pl
         By the numbers of their runs.
     systems : mapping of int to System
     """
-    stack = put_together([systems[run] for run in scenes])
+    batch = make_batch([systems[run] for run in scenes])
     ways = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
-    return Play(systems, ways, tuple(scenes), stack, begin(stack))
+    return Play(systems, ways, tuple(scenes), batch, begin(batch))
 
 
 def locate_fingers(play: Play) -> Play:
     """Return the sessions with the way of their fingers through the coming control period."""
     ways = [play.ways[run] for run in play.runs]
-    return replace(play, coming=still_coming(play.coming, play.stack.systems, ways, play.state.period))
+    return replace(play, coming=extend_fingers(play.coming, play.batch.systems, ways, play.state.period))
 
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
@@ -76,9 +76,9 @@ def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
     runs : tuple of int
         Those that go on.
     """
-    state = kept(play.state, [play.runs.index(run) for run in runs])
-    stack = put_together([play.systems[run] for run in runs])
-    return replace(play, runs=runs, stack=stack, state=state, coming=None)
+    state = select_runs(play.state, [play.runs.index(run) for run in runs])
+    batch = make_batch([play.systems[run] for run in runs])
+    return replace(play, runs=runs, batch=batch, state=state, coming=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Instant:
     over, failed : ndarray of bool (b,)
         Which have come to their end, and which of them in an error.
     share : float
-        The time each has taken, s: every period's, divided by the runs that were in the stack.
+        The time each has taken, s: every period's, divided by the runs that were in the batch.
     """
 
     play: Play
@@ -106,7 +106,7 @@ class Instant:
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
-    """Play all sessions to their ends; what is over leaves the stack before the next control period.
+    """Play all sessions to their ends; what is over leaves the batch before the next control period.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | 
     while play.runs:
         started = time.perf_counter()
         play = locate_fingers(play)
-        play = replace(play, state=advance(play.stack, play.state, play.coming))
-        failed = broken(play.state)
+        play = replace(play, state=advance(play.batch, play.state, play.coming))
+        failed = find_diverged(play.state)
         share += (time.perf_counter() - started) / len(play.runs)
         if stopped and stopped():
             return

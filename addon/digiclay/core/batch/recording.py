@@ -28,7 +28,7 @@ FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
 class Histories:
     """Histories of runs: stretches are kept, and written into a history when it is asked for.
 
-    A history of all cells of all runs would fill the memory long before the stack is large enough.
+    A history of all cells of all runs would fill the memory long before the batch is large enough.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Histories:
         self._scenes, self._runs, self._present = scenes, play.runs, play.runs
         self._first, self._mode = play.state.row(0), play.state.mode()
         self._stretches: dict[int, list[Stretch]] = {run: [] for run in play.runs}
-        self._recording = Recording(recorder, play.stack.rows, self._store) if recorder else None
+        self._recording = Recording(recorder, play.batch.rows, self._store) if recorder else None
         self._history: HistoryWriter | None = None
 
     def _store(self, stretch: Stretch) -> None:
@@ -105,7 +105,7 @@ class Sums:
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
         recorder = recorder or Recorder()
         count = recorder.rows(max(scene.periods for scene in scenes.values()))
-        self._scenes, self._every, self._force = scenes, recorder.every, play.stack.rows.force
+        self._scenes, self._every, self._force = scenes, recorder.every, play.batch.rows.force
         self._runs, self._present, self._columns = play.runs, play.runs, list(range(len(play.runs)))
         self._first = play.state.row(0)
         self._sums = np.zeros((count, 5, len(play.runs)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..control.runs import BatchControl
 from ..model.interfaces import Controller, Measurement, Orders
-from .broadcasting import together
+from .broadcasting import merge_parts
 
 __all__ = ["RunByRun", "join_controllers"]
 
@@ -51,7 +51,7 @@ class RunByRun:
 def join_controllers(controllers: Sequence[Any]) -> Any:
     """Return one controller for all runs: the method's own where its formulas hold for many at once."""
     if isinstance(controllers[0], BatchControl):
-        return replace(together(controllers), runs=tuple(controllers))
+        return replace(merge_parts(controllers), runs=tuple(controllers))
     return RunByRun(tuple(controllers))
 
 

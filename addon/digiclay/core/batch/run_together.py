@@ -17,7 +17,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, has_every_command, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_result import Result
-from .advance import blow_up
+from .advance import make_divergence_error
 from .broadcasting import Floats
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, play_all
 from .recording import Histories, Sums
@@ -66,8 +66,8 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
         play = keep_runs(play, leader.runs)
     play = locate_fingers(play)
     finger = play.coming and play.coming.at(play.state.period)
-    play = replace(play, state=repeat_period(play.stack, play.state, finger, leader.state))
-    own, other, force = play.state.active, leader.state.active, play.stack.rows.force
+    play = replace(play, state=repeat_period(play.batch, play.state, finger, leader.state))
+    own, other, force = play.state.active, leader.state.active, play.batch.rows.force
     near = slice(own.near)
     found = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])
     return Monitor(play, np.maximum(largest, found))
@@ -101,7 +101,7 @@ def _run(
         for place in np.flatnonzero(now.over).tolist():
             run = now.play.runs[place]
             if now.failed[place]:
-                yield run, blow_up(now.play.stack, now.play.state, place)
+                yield run, make_divergence_error(now.play.batch, now.play.state, place)
                 continue
             result = watching.finish(now, place)
             if monitor:
