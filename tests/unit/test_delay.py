@@ -71,7 +71,7 @@ def test_a_free_pin_moves_as_the_delayed_opening_says(dead_time: float, stepper:
 def laminar(system: System, opening: float) -> float:
     """Return the share of full flow at an opening, with its sign: the valve, and the conduit in series."""
     law = system.cell.flow
-    series = law.resistance * law.laminar
+    series = law.resistance * law.valve.laminar
     return math.copysign(opening**2 * (1.0 + series) / (1.0 + series * opening**2), opening)
 
 

@@ -82,17 +82,19 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
 
 
 def make_batch(systems: Sequence[System]) -> Batch:
-    """Put systems of one structure together."""
+    """Return the batch of systems of one structure."""
     first, cell = systems[0], merge_parts([system.cell for system in systems])
     period = numbers([system.period for system in systems])
     fastest = numbers([system.fastest for system in systems])
     plan = merge_parts([system.plan for system in systems])
+    # Of its stepper a control period uses `prepare` alone.
+    stepper = cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start))
     return Batch(
         grid=first.grid,
         cell=cell,
         sensors=merge_parts([system.sensors for system in systems]) if first.sensors else None,
         controller=join_controllers([system.controller for system in systems]) if first.controller else None,
-        stepper=cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start)),
+        stepper=stepper,
         plan=plan,
         period=period,
         fastest=fastest,
