@@ -198,11 +198,23 @@ class MasterControl(BatchControl):
             surface,
             0.0,
             reference=surface,
-            edge=self.keep_in_stroke(surface),
+            edge=min(max(surface, 0.0), self.actuator.stroke),
             felt=surface,
             heading=Heading(x, y),
             losses=master.losses,
         )
+
+    def track(self, master: Master, total: float, *sums: float) -> Master:
+        """Locate the finger, then move the master; arguments as `follow` takes them.
+
+        Parameters
+        ----------
+        master : Master
+        total : float
+            N.
+        *sums : float
+        """
+        return self.lead(self.follow(master, total, *sums), total)
 
     def wait(self, master: Master) -> Master:
         """Count the periods without a finger; give it up after the loss time."""
@@ -271,11 +283,7 @@ class MasterControl(BatchControl):
         count : int
             Cells in the sum.
         """
-        return master.with_edge(self.keep_in_stroke(level / count)) if count else master
-
-    def keep_in_stroke(self, height: float) -> float:
-        """Return a height that a pin can have, m."""
-        return min(max(height, 0.0), self.actuator.stroke)
+        return master.with_edge(min(max(level / count, 0.0), self.actuator.stroke)) if count else master
 
     def get_heights(self, master: Master) -> tuple[float, float, int]:
         """Return the heights of the surface around a master and of itself, m, and the mode of felt cells."""

@@ -55,7 +55,8 @@ class MasterCell:
         opening, command : float
         """
         (a, b), (c, d), (e, f) = self.openings
-        speed = 0.5 * (self.speed(a * opening + b * command) + self.speed(c * opening + d * command))
+        first, second = a * opening + b * command, c * opening + d * command
+        speed = 0.5 * (self.speed(first) + self.speed(second))
         return min(max(height + self.period * speed, 0.0), self.stroke), e * opening + f * command
 
     def speed(self, opening: float) -> float:

@@ -53,7 +53,7 @@ class BatchControl:
             As `decide` takes it.
         memory : object
         """
-        return any(self.decide(rule, memory)) if self.runs else rule(self, memory)
+        return any(map(rule, self.runs, memory)) if self.runs else rule(self, memory)
 
     def gather(self, rule: Callable[..., tuple[Any, ...]], memory: Any) -> tuple[Any, ...]:
         """Return the numbers that a rule finds in a memory; in a stack arrays (b,); see `decide`.

@@ -64,9 +64,12 @@ class VirtualMasterControl(MasterControl):
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Locate the finger and move the master; see `interfaces.Controller`."""
         sums = self._sum_forces(memory, touched)
-        memory = self.decide(MasterControl.follow, memory, *sums)
-        held = self._sum_held(memory, touched, sums[0]) if self._noisy else sums[0]
-        memory = self.decide(MasterControl.lead, memory, held)
+        if self._noisy:
+            memory = self.decide(MasterControl.follow, memory, *sums)
+            held = self._sum_held(memory, touched, sums[0])
+            memory = self.decide(MasterControl.lead, memory, held)
+        else:
+            memory = self.decide(MasterControl.track, memory, *sums)
         return memory, self.decide(MasterControl.find_disc, memory)
 
     def _sum_forces(self, memory: Any, touched: Measurement) -> tuple[Any, ...]:
