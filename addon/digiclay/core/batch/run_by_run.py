@@ -7,7 +7,7 @@ asks for one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,9 @@ class RunByRun:
 def join_controllers(controllers: Sequence[Any]) -> Any:
     """Return one controller for all runs: the method's own where its formulas hold for many at once."""
     if isinstance(controllers[0], BatchControl):
-        return replace(merge_parts(controllers), runs=tuple(controllers))
+        merged = merge_parts(controllers)
+        parts = {part.name: getattr(merged, part.name) for part in fields(merged)}
+        return merged.batch_class(**parts | {"runs": tuple(controllers)})
     return RunByRun(tuple(controllers))
 
 

@@ -1,10 +1,8 @@
-"""Virtual master of Method I: gains, thresholds, memory and the decisions of a control period."""
+"""Virtual master of Method I: gains, thresholds and the decisions of a control period."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import NamedTuple
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -12,6 +10,7 @@ from ..model.actuator import Actuator
 from ..model.set_point import SetPoint
 from .blister import Blister
 from .master_cell import MasterCell
+from .master_memory import Master, Phase
 from .runs import BatchControl
 from .servo import Tracking
 from .travel import Heading, update_heading
@@ -23,85 +22,6 @@ __all__ = ["Master", "MasterControl", "Phase", "VirtualMaster"]
 NOWHERE = 1e3
 #: Plain numbers: numpy takes an enumeration's member ten times as long.
 SPRING, FORCE_FOLLOW = int(Mode.SPRING), int(Mode.FORCE_FOLLOW)
-
-
-class Phase(IntEnum):
-    """Phase of the master."""
-
-    IDLE = 0
-    SPRING = 1
-    SHAPING = 2
-
-
-class Master(NamedTuple):
-    """Memory of the controller.
-
-    Attributes
-    ----------
-    phase : Phase
-    x, y, height : float
-        Where the master is, m.
-    opening : float
-        Of its own valve.
-    reference : float
-        Surface height at first touch, from which the virtual spring is pressed down, m.
-    edge : float
-        Height of the surface around the blister, m.
-    heading : Heading
-        Which way it travels.
-    felt : float
-        Its height when the finger was last felt, m.
-    alone : int
-        Control periods since the finger was last felt.
-    losses : int
-        How often the finger was lost while shaping.
-    """
-
-    phase: Phase = Phase.IDLE
-    x: float = 0.0
-    y: float = 0.0
-    height: float = 0.0
-    opening: float = 0.0
-    reference: float = 0.0
-    edge: float = 0.0
-    heading: Heading = Heading()
-    felt: float = 0.0
-    alone: int = 0
-    losses: int = 0
-
-    # What changes every period is written out: `_replace` takes nearly twice as long.
-
-    def move_to(self, x: float, y: float, heading: Heading) -> Master:
-        """Return the master where it has felt the finger.
-
-        Parameters
-        ----------
-        x, y : float
-            m.
-        heading : Heading
-        """
-        kept = self.height, self.opening, self.reference, self.edge
-        return Master(self.phase, x, y, *kept, heading, self.felt, 0, self.losses)
-
-    def lead(self, phase: Phase, height: float, opening: float) -> Master:
-        """Return the master after a period, with its valve's opening.
-
-        Parameters
-        ----------
-        phase : Phase
-        height : float
-            m.
-        opening : float
-            Of its valve.
-        """
-        felt = height if self.alone == 0 else self.felt
-        place, kept = (self.x, self.y), (self.reference, self.edge)
-        return Master(phase, *place, height, opening, *kept, self.heading, felt, self.alone, self.losses)
-
-    def with_edge(self, edge: float) -> Master:
-        """Return the master in a surface of this height."""
-        kept = self.phase, self.x, self.y, self.height, self.opening, self.reference
-        return Master(*kept, edge, self.heading, self.felt, self.alone, self.losses)
 
 
 @dataclass(frozen=True)
@@ -252,6 +172,17 @@ class MasterControl(BatchControl):
             effort = known.force_gain * (known.force_setpoint - force)
         height, opening = self.model.advance(master.height, master.opening, min(max(effort, -1.0), 1.0))
         return master.lead(phase, height, opening)
+
+    def add_noise(self, master: Master, felt: float, noise: float) -> float:
+        """Return the controlled force with what noise hides, N, once there is a master to be near to.
+
+        Parameters
+        ----------
+        master : Master
+        felt, noise : float
+            N.
+        """
+        return felt if master.phase is Phase.IDLE else felt + noise
 
     def find_disc(self, master: Master) -> tuple[float, float, float] | None:
         """Return the disc that a master controls, m."""

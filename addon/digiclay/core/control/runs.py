@@ -9,63 +9,61 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BatchControl", "sum_weighted", "take_cells"]
+__all__ = ["BatchControl", "decide_by_run", "gather_by_run", "sum_weighted", "take_cells"]
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class BatchControl:
-    """A controller whose formulas hold for the cells of one run and for those of a stack.
+    """Controller whose formulas hold for the cells of one run and for those of a batch.
 
-    In a stack a number that differs from run to run is an array (b,), which numpy puts against the last
-    axis by itself. The memory of a stack is a list, one memory a run, and what is decided about a run is
-    decided run by run, in plain numbers.
+    In a batch a number that differs from run to run is an array (b,), which numpy puts against the last
+    axis by itself. The memory of a batch is a list, one memory a run.
 
     Attributes
     ----------
     runs : tuple of BatchControl
-        In a stack the controllers of its runs; empty in a single run.
+        In a batch the controllers of its runs, with plain numbers; empty in a single run.
     """
 
     runs: tuple[Any, ...] = field(default=(), kw_only=True)
 
-    def decide(self, rule: Callable[..., Any], memory: Any, *columns: Any) -> Any:
-        """Return what a rule about one run comes to; in a stack a list, one result a run.
+    @property
+    def batch_class(self) -> type[BatchControl]:
+        """Class of the controller of a batch, with the same fields."""
+        return type(self)
 
-        Parameters
-        ----------
-        rule : callable
-            Takes a controller of one run, its memory, and one number of each column.
-        memory : object
-        *columns : float or list (b,)
-        """
-        if self.runs:
-            return list(map(rule, self.runs, memory, *columns))
-        return rule(self, memory, *columns)
 
-    def any_run(self, rule: Callable[..., bool], memory: Any) -> bool:
-        """Tell whether a rule holds for the run, or for any of a stack; see `decide`.
+def decide_by_run(rule: Callable[..., Any]) -> Any:
+    """Return a method of a batch's controller: a list of what a rule about one run comes to for each of them.
 
-        Parameters
-        ----------
-        rule : callable
-            As `decide` takes it.
-        memory : object
-        """
-        return any(map(rule, self.runs, memory)) if self.runs else rule(self, memory)
+    Parameters
+    ----------
+    rule : callable
+        Method of the controller of a run: takes it, its memory, and one number of each further column.
+    """
 
-    def gather(self, rule: Callable[..., tuple[Any, ...]], memory: Any) -> tuple[Any, ...]:
-        """Return the numbers that a rule finds in a memory; in a stack arrays (b,); see `decide`.
+    def decide(batch: BatchControl, memory: list[Any], *columns: list[Any]) -> list[Any]:
+        return list(map(rule, batch.runs, memory, *columns))
 
-        Parameters
-        ----------
-        rule : callable
-            As `decide` takes it.
-        memory : object
-        """
-        found = self.decide(rule, memory)
-        return tuple(np.array(column) for column in zip(*found, strict=True)) if self.runs else found
+    return decide
+
+
+def gather_by_run(rule: Callable[..., tuple[Any, ...]]) -> Any:
+    """Return a method of a batch's controller: the numbers that a rule finds for each run, as arrays (b,).
+
+    Parameters
+    ----------
+    rule : callable
+        Method of the controller of a run: takes it and its memory.
+    """
+
+    def gather(batch: BatchControl, memory: list[Any]) -> tuple[NDArray[Any], ...]:
+        columns = zip(*map(rule, batch.runs, memory), strict=True)
+        return tuple(np.array(column) for column in columns)
+
+    return gather
 
 
 def take_cells(values: NDArray[Any], cells: NDArray[np.intp]) -> NDArray[Any]:

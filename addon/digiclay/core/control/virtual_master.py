@@ -25,11 +25,11 @@ from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster
 from .master_cell import make_master_cell
-from .runs import sum_weighted
+from .runs import decide_by_run, gather_by_run, sum_weighted
 from .servo import lock_overloaded
 from .travel import ABEAM, measure_excess, measure_offsets
 
-__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterControl", "build"]
+__all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterBatch", "VirtualMasterControl", "build"]
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +57,11 @@ class VirtualMasterControl(MasterControl):
     name = "virtual_master"
     rows = 0
 
+    @property
+    def batch_class(self) -> type[VirtualMasterControl]:
+        """Class of the controller of a batch."""
+        return VirtualMasterBatch
+
     def begin(self) -> Master:
         """Return the memory before a session."""
         return Master()
@@ -65,12 +70,12 @@ class VirtualMasterControl(MasterControl):
         """Locate the finger and move the master; see `interfaces.Controller`."""
         sums = self._sum_forces(memory, touched)
         if self._noisy:
-            memory = self.decide(MasterControl.follow, memory, *sums)
+            memory = self.follow(memory, *sums)
             held = self._sum_held(memory, touched, sums[0])
-            memory = self.decide(MasterControl.lead, memory, held)
+            memory = self.lead(memory, held)
         else:
-            memory = self.decide(MasterControl.track, memory, *sums)
-        return memory, self.decide(MasterControl.find_disc, memory)
+            memory = self.track(memory, *sums)
+        return memory, self.find_disc(memory)
 
     def _sum_forces(self, memory: Any, touched: Measurement) -> tuple[Any, ...]:
         """Return what `_follow` takes: sums over all cells, and over those near the master."""
@@ -94,15 +99,11 @@ class VirtualMasterControl(MasterControl):
         hidden = self._measure_excess(memory, touched.place) <= 0.0
         hidden &= touched.force < self.floor
         noise = sum_weighted(touched.force, hidden.astype(float)).tolist()
-        return self.decide(VirtualMasterControl._add_noise, memory, felt, noise)
-
-    def _add_noise(self, master: Master, felt: float, noise: float) -> float:
-        """Return the force with what noise hides, N, once there is a master to be near to."""
-        return felt if master.phase is Phase.IDLE else felt + noise
+        return self.add_noise(memory, felt, noise)
 
     def _measure_excess(self, memory: Any, place: Floats) -> Floats:
         """Return by how much cells are beyond the circle in which the finger is looked for, m²."""
-        x, y = self.gather(MasterControl.get_place, memory)
+        x, y = self.get_place(memory)
         return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), place)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
@@ -113,7 +114,7 @@ class VirtualMasterControl(MasterControl):
         np.abs(off, off)
         # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
         mode: NDArray[np.int8] = (off > band).view(np.int8)
-        if self.any_run(MasterControl.is_active, memory):
+        if self.is_active(memory):
             memory, target = self._create_blister(memory, seen, mode, limits)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Orders(target, mode, command)
@@ -124,7 +125,7 @@ class VirtualMasterControl(MasterControl):
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         abeam, radius, edge_radius, flat_radius, behind, release, noise = limits
         edge_mode, formed, froze = constants(CODES, mode.shape, np.int8)
-        x, y, toward_x, toward_y = self.gather(MasterControl.get_pose, memory)
+        x, y, toward_x, toward_y = self.get_pose(memory)
         distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.place)
         inside = distance <= radius
         ring = distance <= edge_radius
@@ -133,8 +134,8 @@ class VirtualMasterControl(MasterControl):
         facing = ahead >= abeam
         facing &= ring
         level = sum_weighted(seen.height, facing.astype(float)).tolist()
-        memory = self.decide(MasterControl.set_edge, memory, level, count_true(facing))
-        edge, top, kind = self.gather(MasterControl.get_heights, memory)
+        memory = self.set_edge(memory, level, count_true(facing))
+        edge, top, kind = self.get_heights(memory)
         profile = self.blister.interpolate(distance, edge, top)
         frozen = ahead < behind * distance
         frozen &= distance > flat_radius
@@ -179,6 +180,25 @@ class VirtualMasterControl(MasterControl):
         return (
             -ABEAM, *wider, known.behind, release, self.floor, self.actuator.rest_height, known.dead_band
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualMasterBatch(VirtualMasterControl):
+    """Controller of Method I for the beds of a batch: its masters are decided about run by run."""
+
+    follow = decide_by_run(MasterControl.follow)
+    lead = decide_by_run(MasterControl.lead)
+    track = decide_by_run(MasterControl.track)
+    add_noise = decide_by_run(MasterControl.add_noise)
+    find_disc = decide_by_run(MasterControl.find_disc)
+    set_edge = decide_by_run(MasterControl.set_edge)
+    get_place = gather_by_run(MasterControl.get_place)
+    get_pose = gather_by_run(MasterControl.get_pose)
+    get_heights = gather_by_run(MasterControl.get_heights)
+
+    def is_active(self, master: Any) -> bool:
+        """Tell whether a master of some run follows a finger."""
+        return any(map(MasterControl.is_active, self.runs, master))
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:
