@@ -9,17 +9,8 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, grid
-from digiclay.live.stroke import (
-    APPROACH,
-    DEEPEST,
-    DRAG,
-    SPEED,
-    Stroke,
-    deepen,
-    draw,
-    follow,
-    start,
-)
+from digiclay.live.stroke import DEEPEST, SYMMETRIES, Stroke, deepen, draw, start
+from digiclay.live.stroke_motion import APPROACH, DRAG, SPEED, follow
 from numpy.typing import NDArray
 
 CELLS = grid(Layout(rows=20, columns=20))
@@ -165,3 +156,23 @@ def test_the_finger_never_goes_below_the_beds_floor() -> None:
 @pytest.mark.parametrize(("by", "depth"), [(-1.0, 0.1e-3), (1.0, DEEPEST), (1e-3, 5e-3)])
 def test_the_depth_stays_within_what_can_be_pressed(by: float, depth: float) -> None:
     assert deepen(start(1, 0.0, 0.0, 4e-3), 0.1, by).samples[-1].depth == pytest.approx(depth, rel=1e-12)
+
+
+@pytest.mark.parametrize("symmetry", list(SYMMETRIES))
+def test_the_finger_goes_along_the_path_and_along_each_of_its_mirror_images(symmetry: str) -> None:
+    stroke, poses = path(replace(line(0.3), mirrors=SYMMETRIES[symmetry]))
+    assert stroke.done
+    down = pressed(poses)
+    for along, across in SYMMETRIES[symmetry]:
+        side = down[np.abs(down[:, 1] - across * 0.005) < 1e-12, 0] * along
+        side = side[side >= 0.0]
+        assert (side.min(), side.max()) == pytest.approx((0.0, 0.02), abs=1e-12)
+    # Between two of them it crosses above all pins: once more than there are images it is up there.
+    top = np.abs(poses[:, 2] - 0.059) < 1e-9
+    assert np.count_nonzero(np.diff(top.astype(int)) == 1) == 1 + len(SYMMETRIES[symmetry])
+
+
+def test_a_mirror_image_waits_until_the_hand_has_let_go() -> None:
+    held = replace(line(0.2, held=True), mirrors=SYMMETRIES["X"])
+    stroke, _ = follow(held, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD, 0.0)
+    assert (stroke.image, stroke.done) == (0, False)

@@ -173,6 +173,8 @@ class Running:
         Where the first of them began.
     finished_strokes : int
         How many strokes the finger has finished.
+    last_place : (float, float) or None
+        Where the last of those ended, x and y, m.
     """
 
     uid: int
@@ -198,6 +200,7 @@ class Running:
     strokes: tuple[Stroke, ...] = ()
     stroke_start: Gesture | None = None
     finished_strokes: int = 0
+    last_place: tuple[float, float] | None = None
 
     @property
     def factor(self) -> float:

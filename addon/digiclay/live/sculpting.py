@@ -245,6 +245,7 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
         blocking_reason=running.blocking_reason,
         trace=trace,
         finished_strokes=running.finished_strokes,
+        last_place=running.last_place,
     )
     if not said:
         other = replace(

@@ -1,52 +1,36 @@
-"""Press stroke: the drawn path, and the fingertip along it.
-
-The hand draws in its own time, and the finger follows later, in the session's: it comes from above,
-presses to its depth where the mouse went down, goes along the whole path, never ahead of the hand and
-never faster than a drag may be, and leaves upwards. A slow machine, or clay that gives way slowly, thus
-makes the finger late, and loses nothing of the path. Depth counts from the surface as it was when the
-finger began: pins that give way do not draw the finger after them. No Blender in here.
-"""
+"""Press stroke: the path that the hand draws, and how far the fingertip has come along it. No Blender."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.model.fingertip import Fingertip
-from ..core.model.layout import Grid
-from ..core.surface.pointing import ground
-
-__all__ = ["DEEPEST", "Sample", "Stroke", "deepen", "draw", "follow", "start"]
+__all__ = [
+    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "SYMMETRIES", "WAITING", "Mirror",
+    "Sample", "Stroke", "deepen", "draw", "start",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
+#: Factors of x and y of a path and of its mirror images about the middle of the bed.
+Mirror = tuple[float, float]
 
 #: What the finger does: it waits for its turn, goes above the path's first place, presses there, goes along
 #: the path, leaves it; and the end.
 WAITING, ABOVE, PRESSING, DRAGGING, LEAVING, DONE = range(6)
-#: How fast the finger comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
-#: valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.
-APPROACH, SPEED = 0.1, 0.02
-#: How fast it leaves, m/s: well above any pin's free speed, so that no blister follows it up; and how fast
-#: it crosses the bed above all pins.
-LIFT, CROSS = 0.4, 1.0
-#: Fastest drag, m/s. On the paper's device a valley is as even at 100 mm/s as at 20 mm/s; at 200 mm/s
-#: the master is left behind, and its depth grows from 4 to 11 mm along 60 mm.
-DRAG = 0.1
-#: How far above the highest pin the finger passes over the bed, m.
-CLEARANCE = 4e-3
+#: Paths of a stroke, by its symmetry. There is one finger: it goes along them one after the other.
+SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
+    "NONE": ((1.0, 1.0),),
+    "X": ((1.0, 1.0), (-1.0, 1.0)),
+    "Y": ((1.0, 1.0), (1.0, -1.0)),
+    "XY": ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)),
+}
 #: Deepest press, m, and least one.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
-#: Heights that differ by less count as equal, m.
-NEAR = 1e-9
 #: Moves that come within this time of each other have waited together while Blender drew, s: their times are
 #: spread over the time since the one before, of which no more than this is taken for drawing, s.
 BURST, DRAWING = 4e-3, 1.0
-#: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
-#: in seconds is not to take minutes. The path stays whole, since the finger drags no faster than `DRAG`.
-LATE = 0.5
 
 
 @dataclass(frozen=True)
@@ -91,6 +75,10 @@ class Stroke:
         When it came there, by the wall, s.
     height : ndarray (n,) or None
         Heights of the pins when the finger began, m; None before.
+    mirrors : tuple of (float, float)
+        Factors of x and y: the path itself, then its mirror images.
+    image : int
+        Index of the one that the finger is at.
     known : float
         Up to when every move has come, s; what was drawn since may still wait in Blender's queue.
     heard : float
@@ -107,6 +95,8 @@ class Stroke:
     clock: float = 0.0
     began: float = 0.0
     height: Floats | None = None
+    mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
+    image: int = 0
     known: float = 0.0
     heard: float = 0.0
     burst: int = 0
@@ -117,12 +107,21 @@ class Stroke:
         return self.phase == DONE
 
     @property
-    def ahead(self) -> Floats:
-        """Places the finger has not come to yet, shape (k, 2), m."""
-        return np.array([(one.x, one.y) for one in self.samples[self.reached :]]).reshape(-1, 2)
+    def ahead(self) -> tuple[Floats, ...]:
+        """Places the finger has not come to yet, (k, 2), m: of the path it is at, and of those after it."""
+        path = np.array([(one.x, one.y) for one in self.samples])
+        later = tuple(path * mirror for mirror in self.mirrors[self.image + 1 :])
+        return (path[self.reached :] * self.mirrors[self.image], *later)
+
+    def place(self, index: int) -> tuple[float, float]:
+        """Return where a sample is on the path the finger is at, m."""
+        (along, across), one = self.mirrors[self.image], self.samples[index]
+        return along * one.x, across * one.y
 
 
-def start(number: int, x: float, y: float, depth: float) -> Stroke:
+def start(
+    number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
+) -> Stroke:
     """Return the stroke of a mouse that goes down at a place, m.
 
     Parameters
@@ -130,8 +129,10 @@ def start(number: int, x: float, y: float, depth: float) -> Stroke:
     number : int
     x, y, depth : float
         m.
+    mirrors : tuple of (float, float), optional
+        See `SYMMETRIES`.
     """
-    return Stroke(number, (Sample(0.0, x, y, _limit_depth(depth)),))
+    return Stroke(number, (Sample(0.0, x, y, _limit_depth(depth)),), mirrors=mirrors)
 
 
 def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Stroke:
@@ -176,122 +177,3 @@ def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
 
 def _limit_depth(depth: float) -> float:
     return min(max(depth, SHALLOWEST), DEEPEST)
-
-
-def follow(
-    stroke: Stroke,
-    grid: Grid,
-    height: Floats,
-    finger: Fingertip,
-    pose: Floats,
-    count: int,
-    period: float,
-    now: float,
-) -> tuple[Stroke, Floats]:
-    """Advance the fingertip along a press stroke.
-
-    Parameters
-    ----------
-    stroke : Stroke
-        Not done yet.
-    grid : Grid
-    height : ndarray (n,)
-        Heights of the pins now, m; taken for the surface by a stroke that begins.
-    finger : Fingertip
-    pose : ndarray (7,)
-        Where the finger is.
-    count : int
-        Most control periods to go on for.
-    period : float
-        Control period, s.
-    now : float
-        Time by the wall, s, by a clock that never goes back.
-
-    Returns
-    -------
-    stroke : Stroke
-    path : ndarray (k + 1, 7)
-        Poses between the periods, row 0 where the finger was; k is at most `count`.
-    """
-    if stroke.height is None:
-        stroke = replace(stroke, height=height.copy(), phase=ABOVE)
-    path = [pose]
-    while len(path) <= count and not stroke.done:
-        stroke, place = _step(stroke, grid, finger, path[-1], period, now)
-        path.append(np.array([*place, *pose[3:]]))
-    return stroke, np.array(path)
-
-
-Place = tuple[float, float, float]
-
-
-def _step(
-    stroke: Stroke, grid: Grid, finger: Fingertip, pose: Floats, period: float, now: float
-) -> tuple[Stroke, Place]:
-    """Return the stroke after a control period, and where the finger is then."""
-    assert stroke.height is not None
-    height = stroke.height
-    x, y, z = pose[:3].tolist()
-    # It waits for moves that may have been made, or it would stop short and then make haste.
-    if not stroke.held or stroke.clock < stroke.known:
-        stroke = replace(stroke, clock=max(stroke.clock + period, now - stroke.began - LATE))
-    safe = float(height.max()) + CLEARANCE
-    if stroke.phase == ABOVE:
-        return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
-    if stroke.phase == LEAVING:
-        z = min(safe, z + LIFT * period)
-        return (replace(stroke, phase=DONE) if z >= safe - NEAR else stroke), (x, y, z)
-    if stroke.phase == DRAGGING:
-        stroke, x, y = _drag(stroke, x, y, DRAG * period)
-    surface = ground(grid, height, x, y, finger.width / 2)
-    # Pins bottom out on the bed's floor.
-    lowest = max(0.0, surface - stroke.samples[stroke.reached].depth)
-    z = _sink(z, surface, lowest, period)
-    pressed = abs(z - lowest) < NEAR
-    if stroke.phase == PRESSING and pressed:
-        return replace(stroke, phase=DRAGGING), (x, y, z)
-    over = not stroke.held and stroke.reached == len(stroke.samples) - 1
-    if stroke.phase == DRAGGING and over and pressed:
-        return replace(stroke, phase=LEAVING), (x, y, z)
-    return stroke, (x, y, z)
-
-
-def _cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Stroke, Place]:
-    """Go up to a safe height, m, then over to the path's first place."""
-    x, y, z = place
-    if z < safe - NEAR:
-        return stroke, (x, y, min(safe, z + LIFT * period))
-    first = stroke.samples[0]
-    far, length = math.hypot(first.x - x, first.y - y), CROSS * period
-    if far > length:
-        return stroke, (x + (first.x - x) * length / far, y + (first.y - y) * length / far, z)
-    return replace(stroke, phase=PRESSING), (first.x, first.y, z)
-
-
-def _sink(z: float, surface: float, lowest: float, period: float) -> float:
-    """Return the height after a control period on the way to the lowest, m."""
-    if z > surface:
-        return max(surface, lowest, z - APPROACH * period)
-    if z > lowest:
-        return max(lowest, z - SPEED * period)
-    return min(lowest, z + APPROACH * period)
-
-
-def _drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, float, float]:
-    """Return the stroke and the place after a length of its path, m, never ahead of the hand."""
-    reached, samples = stroke.reached, stroke.samples
-    while reached + 1 < len(samples):
-        last, aim = samples[reached], samples[reached + 1]
-        passed = aim.time <= stroke.clock
-        # On the way to a move yet to come the finger is no farther than the hand was.
-        part = 1.0 if passed else (stroke.clock - last.time) / (aim.time - last.time)
-        to_x, to_y = last.x + part * (aim.x - last.x), last.y + part * (aim.y - last.y)
-        far = math.hypot(to_x - x, to_y - y)
-        if far > length:
-            x, y = x + length / far * (to_x - x), y + length / far * (to_y - y)
-            break
-        x, y, length = to_x, to_y, length - far
-        if not passed:
-            break
-        reached += 1
-    return replace(stroke, reached=reached), x, y

@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
-from .stroke import Stroke, follow, start
+from .stroke import SYMMETRIES, Mirror, Stroke, start
+from .stroke_motion import follow
 
-__all__ = ["change_stroke", "drop_strokes", "find_stroke", "queue_stroke", "take_path"]
+__all__ = ["change_stroke", "drop_strokes", "find_stroke", "last_place", "queue_stroke", "take_path"]
 
 Floats = NDArray[np.float64]
 
 
-def queue_stroke(running: Running, x: float, y: float, depth: float) -> tuple[Running, int]:
+def queue_stroke(
+    running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
+) -> tuple[Running, int]:
     """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
 
     Parameters
@@ -25,9 +28,11 @@ def queue_stroke(running: Running, x: float, y: float, depth: float) -> tuple[Ru
     running : Running
     x, y, depth : float
         m.
+    mirrors : tuple of (float, float), optional
+        See `stroke.SYMMETRIES`.
     """
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
-    return replace(running, strokes=(*running.strokes, start(number, x, y, depth))), number
+    return replace(running, strokes=(*running.strokes, start(number, x, y, depth, mirrors))), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
@@ -39,6 +44,14 @@ def find_stroke(running: Running, number: int) -> Stroke | None:
     number : int
     """
     return next((stroke for stroke in running.strokes if stroke.number == number), None)
+
+
+def last_place(running: Running) -> tuple[float, float] | None:
+    """Return where the last stroke ends, x and y, m; None before the first."""
+    if not running.strokes:
+        return running.last_place
+    end = running.strokes[-1].samples[-1]
+    return end.x, end.y
 
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
@@ -89,7 +102,9 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
+        end = stroke.samples[-1]
         running = replace(
-            running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1
-        )
+            running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1,
+            last_place=(end.x, end.y),
+        )  # fmt: skip
     return running, path

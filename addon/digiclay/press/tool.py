@@ -71,8 +71,8 @@ def _trail(found: aim.Target) -> list[Floats]:
         return []
     finger, pose = find_ellipsoid(session.scene), session.pose
     rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
-    places = [stroke.ahead for stroke in session.strokes]
-    ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], places[0]]), *places[1:]]
+    first, *later = [path for stroke in session.strokes for path in stroke.ahead]
+    ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
     return [
         np.column_stack([way, found.height[found.grid.at(way[:, 0], way[:, 1])]])
         for way in ways
