@@ -9,8 +9,8 @@ import pytest
 from digiclay.core.session import live_periods
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
-from digiclay.live.stroke import draw
-from digiclay.live.stroke_queue import change_stroke, find_stroke, queue_stroke
+from digiclay.live.stroke import SYMMETRIES, draw
+from digiclay.live.stroke_queue import change_stroke, find_stroke, last_place, queue_stroke
 
 from tests.hand import TICK, heights, started
 
@@ -109,3 +109,11 @@ def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
 
 def test_a_reset_forgets_what_the_finger_has_not_finished() -> None:
     assert gestures.reset(tap(started(), 0.0, 0.0)).strokes == ()
+
+
+def test_a_symmetric_stroke_forms_all_its_images_as_one_gesture() -> None:
+    session, number = queue_stroke(started(), 12e-3, 12e-3, DEPTH, SYMMETRIES["XY"])
+    done = finish(change_stroke(session, number, lambda stroke: replace(stroke, held=False)))
+    assert min(depth_at(done, x, y) for x in (-12.0, 12.0) for y in (-12.0, 12.0)) > FORMED
+    assert (done.finished_strokes, len(done.gestures)) == (1, 1)
+    assert last_place(done) == (12e-3, 12e-3)

@@ -9,9 +9,9 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..device import view
 from ..live import running, tick
-from ..live.stroke import DEEPEST, deepen, draw
+from ..live.stroke import DEEPEST, SYMMETRIES, deepen, draw
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
-from ..press import aim
+from ..press import aim, brush
 from . import status
 from .action import Polled
 
@@ -42,6 +42,24 @@ class Press(Polled, bpy.types.Operator):
         soft_max=10.0,
         precision=2,
         step=25,
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="Share of the depth that a stroke reaches; pen pressure scales it further",
+        default=1.0,
+        min=0.01,
+        max=1.0,
+        subtype="FACTOR",
+        precision=2,
+    )
+    symmetry: bpy.props.EnumProperty(
+        name="Symmetry",
+        description=(
+            "Mirror images of a stroke about the middle of the bed. The device has one finger: "
+            "it forms them one after the other, as one undo step"
+        ),
+        items=brush.SYMMETRY_ITEMS,
+        default="NONE",
     )
     use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
@@ -75,7 +93,8 @@ class Press(Polled, bpy.types.Operator):
         self.full, self.pressure, self.ticked = 1e-3 * self.depth, 1.0, 0.0
         self._feel(event)
         place = float(found.point[0]), float(found.point[1])
-        session, self.number = queue_stroke(session, *place, self.full * self.pressure)
+        mirrors = SYMMETRIES[self.symmetry]
+        session, self.number = queue_stroke(session, *place, self._pressed_depth(), mirrors)
         running.put(session)
         context.window_manager.modal_handler_add(self)
         self._tell(context)
@@ -96,11 +115,10 @@ class Press(Polled, bpy.types.Operator):
         if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE"):
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl:
-            self._deepen(WHEELS[event.type])
+            self._deepen(context, WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(lambda stroke: replace(stroke, held=False))
-            self._keep_depth(context)
             # A press while it is held: another operator has had the release. That one is another stroke.
             again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
             return self._end({"FINISHED"} | again)
@@ -123,19 +141,24 @@ class Press(Polled, bpy.types.Operator):
         down, self.before = self.before - event.mouse_y, event.mouse_y
         self._feel(event)
         if event.ctrl and event.type != "LEFTMOUSE":
-            self._deepen(PIXEL * down / context.preferences.system.ui_scale)
+            self._deepen(context, PIXEL * down / context.preferences.system.ui_scale)
             return
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
             point = aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
         if point is not None and event.value != "PRESS":
             x, y = float(point[0]), float(point[1])
-            self._change(partial(draw, time=self._time(), x=x, y=y, depth=self.full * self.pressure))
+            self._change(partial(draw, time=self._time(), x=x, y=y, depth=self._pressed_depth()))
 
-    def _deepen(self, by: float) -> None:
-        """Press deeper, m, from here on."""
+    def _deepen(self, context: Any, by: float) -> None:
+        """Press deeper, m, from here on; the tool shows the new depth beside the cursor and in the header."""
         self.full = min(max(self.full + by, 0.0), DEEPEST)
-        self._change(partial(deepen, time=self._time(), by=by * self.pressure))
+        self._change(partial(deepen, time=self._time(), by=by * self.strength * self.pressure))
+        self._keep_depth(context)
+
+    def _pressed_depth(self) -> float:
+        """Return how deep to press now, m."""
+        return float(self.full * self.strength * self.pressure)
 
     def _change(self, change: Any) -> None:
         """Put a changed stroke into the session's queue."""
@@ -153,15 +176,15 @@ class Press(Polled, bpy.types.Operator):
             self.pressure = min(max(float(event.pressure), 0.0), 1.0)
 
     def _keep_depth(self, context: Any) -> None:
-        """Let the next press start with the depth this one ended with; the tool's header shows it."""
+        """Let the next press have the depth of this one."""
         self.depth = 1e3 * self.full
-        tool = context.workspace.tools.from_space_view3d_mode("OBJECT")
-        if tool is not None and tool.idname == "digiclay.press_tool":
-            tool.operator_properties(self.bl_idname).depth = self.depth
+        settings = brush.tool_settings(context)
+        if settings is not None:
+            settings.depth = self.depth
 
     def _tell(self, context: Any) -> None:
         """Show depth and keys in the status bar."""
-        status.show(context, KEYS.format(1e3 * self.full * self.pressure))
+        status.show(context, KEYS.format(1e3 * self._pressed_depth()))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar."""

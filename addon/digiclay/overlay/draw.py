@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import blf
@@ -45,13 +46,22 @@ def draw(picture: Picture, width: float, height: float) -> None:
         gpu.state.blend_set("NONE")
 
 
-def cursor(lines: list[Line]) -> None:
-    """Draw lines about the mouse, in pixels of the window."""
+def cursor(lines: list[Line], words: Sequence[Words] = ()) -> None:
+    """Draw lines and text about the mouse.
+
+    Parameters
+    ----------
+    lines : list of Line
+    words : sequence of Words, optional
+        In pixels of the window.
+    """
     _, _, width, height = gpu.state.viewport_get()
     gpu.state.blend_set("ALPHA")
     try:
         for line in lines:
             _stroke(line, (width, height))
+        for text in words:
+            _write(text)
     finally:
         gpu.state.blend_set("NONE")
 

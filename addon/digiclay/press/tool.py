@@ -13,8 +13,10 @@ from ..core.surface.pointing import patch
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
-from ..overlay.picture import Line
+from ..live.stroke import SYMMETRIES
+from ..overlay.picture import Line, Words
 from . import aim
+from .brush import OPERATOR, TOOL, describe_brush
 
 __all__ = ["PressTool", "register", "touch_outline", "unregister"]
 
@@ -54,14 +56,38 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     found = aim.find_target(context, (xy[0] - region.x, xy[1] - region.y))
     if found is None or view.fingertip_of(found.bed) is None:
         return
-    depth = 1e-3 * tool.operator_properties("digiclay.press").depth
-    rim = touch_outline(found.bed, found.grid, found.height, found.point, depth)
-    drawn = [np.concatenate([rim, rim[:1]]), *_trail(found)]
+    settings = tool.operator_properties(OPERATOR)
+    depth = 1e-3 * settings.depth
+    rims = [
+        touch_outline(found.bed, found.grid, found.height, found.point * [*mirror, 1.0], depth)
+        for mirror in SYMMETRIES[settings.symmetry]
+    ]
+    drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(found)]
     corner = np.array([region.x, region.y])
     lines = [corner + aim.project(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
-    cursor([Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown])
+    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), depth, settings.strength)
+    cursor(
+        [Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown],
+        label(text, xy, context.preferences.system.ui_scale),
+    )
+
+
+def label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
+    """Return text beside the cursor, light on a dark edge.
+
+    Parameters
+    ----------
+    text : str
+    xy : (float, float)
+        Of the cursor, pixels of the window.
+    scale : float
+        Of Blender's interface.
+    """
+    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
+    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [*edge, Words(x, y, size, LIGHT, text)]
 
 
 def _trail(found: aim.Target) -> list[Floats]:
@@ -85,7 +111,7 @@ class PressTool(bpy.types.WorkSpaceTool):
 
     bl_space_type = "VIEW_3D"
     bl_context_mode = "OBJECT"
-    bl_idname = "digiclay.press_tool"
+    bl_idname = TOOL
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
@@ -93,8 +119,8 @@ class PressTool(bpy.types.WorkSpaceTool):
     )
     bl_icon = "ops.transform.push_pull"
     bl_keymap = (
-        ("digiclay.press", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
-        ("digiclay.press", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
+        (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
     )
     draw_cursor = staticmethod(_draw_cursor)
 
@@ -108,9 +134,11 @@ class PressTool(bpy.types.WorkSpaceTool):
         layout : bpy.types.UILayout
         tool : bpy.types.WorkSpaceTool
         """
-        settings = tool.operator_properties("digiclay.press")
+        settings = tool.operator_properties(OPERATOR)
         layout.prop(settings, "depth")
+        layout.prop(settings, "strength")
         layout.prop(settings, "use_pressure")
+        layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")
 
 
 def register() -> None:
