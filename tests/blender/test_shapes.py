@@ -72,7 +72,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
     state = snapshot.load(system, bed_state.read_snapshot(made))
-    assert system.controller.displayed(state.memory)
+    assert system.controller.is_displayed(state.memory)
     assert np.abs(state.row(0) - wanted).max() <= SHOWN
 
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from digiclay.core.control.drive import Drive
-from digiclay.core.control.named_shapes import SHAPES, named
+from digiclay.core.control.named_shapes import SHAPES, evaluate_shape
 from digiclay.core.control.viscous import make_exchange
 from digiclay.core.model.layout import Grid, Layout, grid
 from digiclay.core.scene.assembly import assemble
@@ -141,15 +141,15 @@ def test_a_bed_of_one_cell_has_no_neighbours() -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_named_shape_lies_between_minus_one_and_one(shape: str) -> None:
-    values = named(shape, bed("aligned", 41, 41))
+    values = evaluate_shape(shape, bed("aligned", 41, 41))
     assert np.all(np.abs(values) <= 1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("shape", [name for name in SHAPES if name != "flat"])
 def test_a_named_shape_has_heights_to_show(shape: str) -> None:
-    assert np.ptp(named(shape, bed("aligned", 41, 41))) > 0.9
+    assert np.ptp(evaluate_shape(shape, bed("aligned", 41, 41))) > 0.9
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_named_shape_fits_a_bed_of_one_cell(shape: str) -> None:
-    assert np.all(np.isfinite(named(shape, bed("aligned", 1, 1))))
+    assert np.all(np.isfinite(evaluate_shape(shape, bed("aligned", 1, 1))))

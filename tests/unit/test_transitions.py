@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, changed
+from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, follow_arrows
 
 #: Fig. 5, written down from the paper: from, to, when. VS is any cell on a virtual spring.
 FIGURE_5 = [
@@ -39,8 +39,8 @@ CONDITIONS = sorted({arrow.condition for arrow in (*BY_FORCE, *BY_PLACE)})
 def after(mode: Mode, condition: str | None) -> Mode:
     """Return where one cell goes when only `condition` holds."""
     holds = {name: np.array([name == condition]) for name in CONDITIONS}
-    modes = changed(np.array([mode], np.int8), BY_FORCE, holds)
-    return Mode(int(changed(modes, BY_PLACE, holds)[0]))
+    modes = follow_arrows(np.array([mode], np.int8), BY_FORCE, holds)
+    return Mode(int(follow_arrows(modes, BY_PLACE, holds)[0]))
 
 
 @pytest.mark.parametrize(("source", "goal", "condition"), FIGURE_5)
@@ -67,4 +67,4 @@ def test_of_two_arrows_from_one_mode_the_later_wins() -> None:
     holds = {
         name: np.array([name in ("below_critical_trigger", "above_critical_trigger")]) for name in CONDITIONS
     }
-    assert changed(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW
+    assert follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW

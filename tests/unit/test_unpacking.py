@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
 from digiclay.core.base.toml_text import LARGEST
-from digiclay.core.control.named_shapes import from_file
+from digiclay.core.control.named_shapes import read_values
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
@@ -254,7 +254,7 @@ def test_an_array_that_promises_more_than_there_is_is_refused(tmp_path: Path, co
     path.write_bytes(content)
     assert "heights.npy" in refused(lambda: read_shape(Shape(file=str(path))))
     bed = grid(Layout(2, 2, 3e-3))
-    assert "heights.npy" in refused(lambda: from_file("shape", str(path), bed, 0.0, 1.0, "m"))
+    assert "heights.npy" in refused(lambda: read_values("shape", str(path), bed, 0.0, 1.0, "m"))
 
 
 def test_an_array_of_too_many_heights_is_refused() -> None:
@@ -267,7 +267,7 @@ def test_an_array_for_another_bed_is_not_read(tmp_path: Path) -> None:
     np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
     bed = grid(Layout(2, 2, 3e-3))
     path = str(tmp_path / "large.npy")
-    assert "2 x 2 cells" in refused(lambda: from_file("shape", path, bed, 0.0, 1.0, "m"))
+    assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))
 
 
 def test_a_missing_scene_file_is_told() -> None:

@@ -25,7 +25,7 @@ from ..model.set_point import SetPoint
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .servo import Tracking, lock_overloaded
-from .transitions import BY_FORCE, BY_PLACE, changed
+from .transitions import BY_FORCE, BY_PLACE, follow_arrows
 from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
 
 __all__ = ["CellStates", "CellStatesControl", "Patch", "build"]
@@ -169,7 +169,7 @@ class CellStatesControl:
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
         """Apply the transitions of every cell, then the control of its mode; see `interfaces.Controller`."""
         seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
-        mode = changed(seen.mode, BY_FORCE, self._by_force(seen))
+        mode = follow_arrows(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
@@ -178,7 +178,7 @@ class CellStatesControl:
             memory = memory._replace(felt=True)
         else:
             gone = {"in_blister": under, "left_behind": under, "at_edge": under, "outside": ~under}
-            mode = changed(mode, BY_PLACE, gone)
+            mode = follow_arrows(mode, BY_PLACE, gone)
             memory = memory._replace(felt=False, losses=memory.losses + memory.felt)
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
@@ -226,7 +226,7 @@ class CellStatesControl:
             "at_edge": at_edge,
             "outside": ~(in_blister | at_edge),
         }
-        mode = changed(mode, BY_PLACE, conditions)
+        mode = follow_arrows(mode, BY_PLACE, conditions)
         weight = np.maximum(blister.evaluate_profile(distance), 0.0)
         top = np.dot(seen.height[under], weight) / np.maximum(weight.sum(axis=0), 1e-12)
         shape = blister.interpolate(nearest, memory.edge, top + self.parameters.rise)

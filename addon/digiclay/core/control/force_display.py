@@ -14,7 +14,7 @@ from ..base.quantity import quantity
 from ..model.interfaces import Measurement, Orders
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
-from .named_shapes import FILE, check_shape, from_file, named
+from .named_shapes import FILE, check_shape, evaluate_shape, read_values
 from .runs import take_cells
 
 __all__ = ["ForceDisplay", "ForceDisplayControl", "build"]
@@ -102,9 +102,9 @@ def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
     check_floor(parameters.force, "force", parameters.force, device.force_floor)
     parameters = raise_felt_force(device.force_floor, parameters)
     if parameters.field.endswith(FILE):
-        field = from_file("field", parameters.field, device.grid, parameters.felt_force, device.lift, "N")
+        field = read_values("field", parameters.field, device.grid, parameters.felt_force, device.lift, "N")
     else:
-        field = parameters.force * (1.0 + parameters.contrast * named(parameters.field, device.grid))
+        field = parameters.force * (1.0 + parameters.contrast * evaluate_shape(parameters.field, device.grid))
         if field.max() >= device.lift:
             rule = f"must keep the field below what a pin can press, {device.lift:.3g} N"
             raise ParameterError("control", "force", rule, f"{field.max():.3g} N at its largest")

@@ -14,7 +14,7 @@ from .device_info import DeviceInfo
 from .drive import DriveParameters
 from .shape_display import Progress, ShapeDisplay, ShapeDisplayControl, build
 
-__all__ = ["Handed", "Handover", "handover"]
+__all__ = ["Handed", "Handover", "make_handover"]
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Handover:
         """Return the memory before a session."""
         return Handed(self.display.begin(), self.method.begin() if self.method else None)
 
-    def displayed(self, memory: Handed) -> bool:
+    def is_displayed(self, memory: Handed) -> bool:
         """Return whether the shape stands, and the method has taken over."""
         return memory.display.move >= len(self.display.moves)
 
@@ -70,26 +70,26 @@ class Handover:
         self, memory: Handed, touched: Measurement
     ) -> tuple[Handed, tuple[float, float, float] | None]:
         """Let the one whose turn it is look at the touched cells; see `interfaces.Controller`."""
-        if not self.displayed(memory):
+        if not self.is_displayed(memory):
             progress, disc = self.display.locate(memory.display, touched)
             return memory._replace(display=progress), disc
         if self.method is None:
             return memory, None
-        known, disc = self.method.locate(memory.method, self._lowered(touched))
+        known, disc = self.method.locate(memory.method, self._subtract_shape(touched))
         return memory._replace(method=known), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Orders]:
         """Let the one whose turn it is command the cells; see `interfaces.Controller`."""
-        if self.method is None or not self.displayed(memory):
+        if self.method is None or not self.is_displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
             return memory._replace(display=progress), orders
-        known, orders = self.method.command(memory.method, self._lowered(seen))
+        known, orders = self.method.command(memory.method, self._subtract_shape(seen))
         if self.raised is not None:
             target = orders.target + self.raised.take(seen.cells)
             orders = Orders(target, orders.mode, orders.command)
         return memory._replace(method=known), orders
 
-    def _lowered(self, seen: Measurement) -> Measurement:
+    def _subtract_shape(self, seen: Measurement) -> Measurement:
         """Return what the method is to see: the bed without the shape, where its cells go back to rest."""
         if self.raised is None:
             return seen
@@ -97,7 +97,7 @@ class Handover:
         return seen._replace(height=seen.height - raised, target=seen.target - raised)
 
 
-def handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
+def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
     """Put a shape's display in front of a method.
 
     Parameters

@@ -13,7 +13,7 @@ from ..base.errors import ParameterError
 from ..base.npz import map_array
 from ..model.layout import Grid
 
-__all__ = ["FILE", "SHAPES", "check_shape", "from_file", "named"]
+__all__ = ["FILE", "SHAPES", "check_shape", "evaluate_shape", "read_values"]
 
 Floats = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def check_shape(owner: str, field: str, shape: str) -> None:
         raise ParameterError(owner, field, rule, repr(shape))
 
 
-def named(shape: str, grid: Grid) -> Floats:
+def evaluate_shape(shape: str, grid: Grid) -> Floats:
     """Return the values of a named shape for all cells of a bed, shape (n,), from -1 to 1.
 
     A shape's square is the bed; a bed longer than wide stretches it.
@@ -166,7 +166,7 @@ def _half(values: Floats) -> float:
     return float(np.abs(values).max()) or 1.0
 
 
-def from_file(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
+def read_values(field: str, path: str, grid: Grid, low: float, high: float, unit: str) -> Floats:
     """Return the values a file of numpy's gives for all cells, shape (n,).
 
     Parameters

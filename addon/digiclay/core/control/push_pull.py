@@ -115,7 +115,7 @@ class PushPullControl:
         listening = measure_square(memory.x, memory.y, seen.place) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle lies behind: what is left of it is no ripple
-            target = self._dragged(seen, listening)
+            target = self._drag_targets(seen, listening)
         touched = seen.own[0] > 0.0
         error = target - seen.height
         stroke = np.where(touched, known.following_speed, known.listening_speed)
@@ -128,7 +128,7 @@ class PushPullControl:
         np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
         return memory, Orders(target, mode, self.drive.open_for(speed))
 
-    def _dragged(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
+    def _drag_targets(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
         """Return the targets after a cycle; what the cells remember is brought up to date in place."""
         known, left = self.parameters, seen.own[0]
         error = seen.target - seen.height

@@ -17,7 +17,7 @@ from ..model.interfaces import Measurement, Orders
 from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
-from .named_shapes import FILE, check_shape, from_file, named
+from .named_shapes import FILE, check_shape, evaluate_shape, read_values
 
 __all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "build"]
 
@@ -122,7 +122,7 @@ class ShapeDisplayControl:
         """Set the heights of the move under way, and command every cell; see `interfaces.Controller`."""
         rest, target = self.actuator.rest_height, seen.target
         if memory.move < len(self.moves):
-            memory, target = self._moved(memory, seen)
+            memory, target = self._make_moves(memory, seen)
         error = target - seen.height
         command = self.drive.command(self.drive.approach(error), seen.force)
         formed = np.abs(target - rest) > self.parameters.dead_band
@@ -130,7 +130,7 @@ class ShapeDisplayControl:
         np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
         return memory, Orders(target, mode, command)
 
-    def _moved(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
+    def _make_moves(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
         """Return the progress and the targets of the move under way; on to the next if it is over."""
         cells, rest = seen.cells, self.actuator.rest_height
         row, target = cells // self.grid.layout.columns, seen.target.copy()
@@ -163,9 +163,9 @@ def build(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
     if device.heights is not None:
         heights = device.heights
     elif parameters.shape.endswith(FILE):
-        heights = from_file("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
+        heights = read_values("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
     else:
-        heights = actuator.rest_height + parameters.amplitude * named(parameters.shape, grid)
+        heights = actuator.rest_height + parameters.amplitude * evaluate_shape(parameters.shape, grid)
         low, high = float(heights.min()), float(heights.max())
         if low < 0.0 or high > actuator.stroke:
             rule = f"must keep the shape between 0 and the stroke, {actuator.stroke:g} m"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 
-__all__ = ["BY_FORCE", "BY_PLACE", "Arrow", "changed"]
+__all__ = ["BY_FORCE", "BY_PLACE", "Arrow", "follow_arrows"]
 
 Modes = NDArray[np.int8]
 Flags = NDArray[np.bool_]
@@ -22,7 +22,7 @@ VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
 
 class Arrow(NamedTuple):
-    """From some modes to another, when a condition holds (its name is a key of what `changed` is given)."""
+    """From some modes to another, when a condition holds; `follow_arrows` has them by name."""
 
     source: tuple[Mode, ...]
     goal: Mode
@@ -47,7 +47,7 @@ BY_PLACE = (
 )
 
 
-def changed(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]) -> Modes:
+def follow_arrows(mode: Modes, arrows: tuple[Arrow, ...], conditions: dict[str, Flags]) -> Modes:
     """Return the modes after all arrows were followed at once; of two from one mode the later wins.
 
     Parameters

@@ -135,7 +135,7 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
     if scene.control:
         controller = import_part(METHODS[scene.method].module, "build")(scene.control, device)
     if scene.shape and not (controller and controller.name == "shape_display"):
-        from ..control.handover import handover
+        from ..control.handover import make_handover
 
-        controller = handover(scene.shape, device, controller, recovers=METHODS[scene.method].recovers)
+        controller = make_handover(scene.shape, device, controller, recovers=METHODS[scene.method].recovers)
     return controller
