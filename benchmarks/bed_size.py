@@ -163,11 +163,11 @@ def _draw(sizes: Sequence[Size], out: Path) -> Path:
     with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
         pins = [one.pins for one in sizes]
-        for values, label, colour, marker in (
+        for values, label, color, marker in (
             ([one.period * 1e6 for one in sizes], "median", "#0072B2", "o"),
             ([one.mean * 1e6 for one in sizes], "mean, with the finger's poses", "#D55E00", "s"),
         ):
-            panel.semilogx(pins, values, "-", color=colour, marker=marker, label=label)
+            panel.semilogx(pins, values, "-", color=color, marker=marker, label=label)
         panel.set_ylim(0.0, 1.2e6 * max(one.mean for one in sizes))
         panel.set_xlabel("pins of the bed")
         panel.set_ylabel("a control period, µs")

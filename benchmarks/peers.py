@@ -201,7 +201,7 @@ def peer(
     state = begin(system).rows[: system.rows.physics].T.copy()
     cut = system.rows.queue > 1
     dead = known.scene.delay.dead_time if known.scene.delay else 0.0
-    ageing = np.exp(-line.pulp.rates[:, 0] * system.period)
+    aging = np.exp(-line.pulp.rates[:, 0] * system.period)
     scale = np.array([1e-2, 1.0, 1.0, 1.0, 1.0])  # 10 mm, 1 N, and an open valve
     nothing, heights, forces, evaluations = np.zeros(grid.count), [], [], 0
     started = time.process_time()
@@ -218,7 +218,7 @@ def peer(
             evaluations += calls
         away = np.ones(grid.count, bool)
         away[near] = False
-        state[away, 1:4] *= ageing
+        state[away, 1:4] *= aging
         heights.append(state[:, 0].copy())
         forces.append(_force(line, start + system.period, state[near], x, y))
     took = time.process_time() - started

@@ -1,6 +1,6 @@
 """Style of the benchmark plots, and the work-precision plot.
 
-Colours are Okabe and Ito's palette; markers and line styles say the same once more.
+Colors are Okabe and Ito's palette; markers and line styles say the same once more.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .work_precision import Work
 
 __all__ = ["STYLE", "draw_precision", "write"]
 
-#: Colour, marker and line style of each method: ours are filled and drawn through, peers are open and dashed.
+#: Color, marker and line style of each method: ours are filled and drawn through, peers are open and dashed.
 LOOKS: dict[str, tuple[str, str, str]] = {
     "bernoulli": ("#0072B2", "o", "-"), "richardson": ("#009E73", "s", "-"),
     "runge_kutta_4": ("#CC79A7", "D", "-"), "heun": ("#E69F00", "^", "-"), "euler": ("#56B4E9", "v", "-"),
@@ -63,13 +63,13 @@ def draw_precision(work: Sequence[Work], out: Path, lines: str = "full lines: ou
 
 def _panel(panel: Any, work: Sequence[Work]) -> None:
     """Draw one problem: error of height over CPU time."""
-    for method, (colour, marker, line) in LOOKS.items():
+    for method, (color, marker, line) in LOOKS.items():
         own = [one for one in work if one.method == method and 0.0 < one.height_error < 2e-3]
         if own:
-            filled = colour if line == "-" else "white"
+            filled = color if line == "-" else "white"
             panel.loglog(
                 [one.seconds * 1e3 for one in own], [one.height_error * 1e6 for one in own], line,
-                color=colour, marker=marker, markerfacecolor=filled, markersize=5.5, linewidth=1.5,
+                color=color, marker=marker, markerfacecolor=filled, markersize=5.5, linewidth=1.5,
                 label=method,
             )  # fmt: skip
     panel.set_xlabel("CPU time, ms")

@@ -40,7 +40,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
     tau = line.cell.lag.time_constant
     own = Scalar(line, step)
     state = begin(system).rows[: system.rows.physics].T.tolist()
-    ageing = [math.exp(-rate * system.period) for rate in own.speeds]
+    aging = [math.exp(-rate * system.period) for rate in own.speeds]
     xs, ys, heights, forces = grid.x.tolist(), grid.y.tolist(), [], []
     nothing = [0.0] * grid.count
     started = time.process_time()
@@ -51,7 +51,7 @@ def loop(known: Problem, step: float, periods: int) -> tuple[Measured, float]:
         total, touched = 0.0, set(cells[:k].tolist())
         for i in range(grid.count):
             if i not in touched:
-                state[i][1:4] = [z * a for z, a in zip(state[i][1:4], ageing, strict=True)]
+                state[i][1:4] = [z * a for z, a in zip(state[i][1:4], aging, strict=True)]
         for i in cells.tolist():
             y, near = state[i], i in touched
             unders = [own.underside(pose, xs[i], ys[i]) for pose in poses] if near else []

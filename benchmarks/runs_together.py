@@ -149,7 +149,7 @@ def _draw(sizes: Sequence[Size], out: Path) -> Path:
     """Draw how many times the runs a second a stack comes to, over its runs, and return the path."""
     with empty(6.0, 3.6, STYLE, layout="constrained") as figure:
         panel = figure.subplots()
-        for study, colour, marker in (("control", "#0072B2", "o"), ("device", "#D55E00", "s")):
+        for study, color, marker in (("control", "#0072B2", "o"), ("device", "#D55E00", "s")):
             own = [one for one in sizes if one.study == study]
             runs = [one.runs for one in own]
             for gains, line, label in (
@@ -158,8 +158,8 @@ def _draw(sizes: Sequence[Size], out: Path) -> Path:
                 ([one.errors_alone / one.errors_stacked for one in own], ":", "errors estimated too"),
             ):
                 panel.loglog(
-                    runs, gains, line, color=colour, marker=marker,
-                    markerfacecolor=colour if line == "-" else "white", label=f"{study} varies, {label}",
+                    runs, gains, line, color=color, marker=marker,
+                    markerfacecolor=color if line == "-" else "white", label=f"{study} varies, {label}",
                 )  # fmt: skip
         panel.axhline(6.0, color="#777777", linewidth=1.0, label="the goal")
         panel.set_xticks(runs, [str(count) for count in runs])

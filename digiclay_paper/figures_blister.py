@@ -14,7 +14,7 @@ from .scenes import METHODS, NAMES
 
 __all__ = ["blisters", "freezing"]
 
-#: Colour, marker and its size of each profile.
+#: Color, marker and its size of each profile.
 PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
 #: Instants of a drag that are drawn.
 INSTANTS = 5
@@ -50,10 +50,10 @@ def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -
     """Draw the heights of the middle row; cells that feel the finger are filled."""
     place, height, force = (done.history[key] for key in ("position", "height", "force"))
     row = np.abs(place[:, 1]) < 1e-6
-    colour, marker, size = look
+    color, marker, size = look
     across, top, felt = place[row, 0] * MM, height[-1, row] * MM, force[-1, row] > 0.0
-    axes.plot(across, top, color=colour, marker=marker, markersize=size, markerfacecolor="white", label=name)
-    axes.plot(across[felt], top[felt], marker, color=colour, markersize=size)
+    axes.plot(across, top, color=color, marker=marker, markersize=size, markerfacecolor="white", label=name)
+    axes.plot(across[felt], top[felt], marker, color=color, markersize=size)
 
 
 def _finger(axes: Any, done: Result, row: int) -> None:
@@ -79,15 +79,15 @@ def freezing(results: Results) -> Any:
             across = done.history["position"][ridge, 0] * MM
             for number, moment in enumerate(np.linspace(start, end, INSTANTS)):
                 instant = int(np.argmin(np.abs(moments - moment)))
-                colour = colormaps["cividis"](0.9 * number / (INSTANTS - 1))
+                color = colormaps["cividis"](0.9 * number / (INSTANTS - 1))
                 top = done.history["height"][instant, ridge] * MM
                 frozen = done.history["mode"][instant, ridge] == Mode.FROZEN
-                axes.plot(across, top, color=colour, label=f"{moment - start:.1f} s")
+                axes.plot(across, top, color=color, label=f"{moment - start:.1f} s")
                 axes.plot(
-                    across[frozen], top[frozen], "s", color=colour, markersize=8, markeredgecolor="white"
+                    across[frozen], top[frozen], "s", color=color, markersize=8, markeredgecolor="white"
                 )
                 x, z = done.history["fingertip"][instant, [0, 2]] * MM
-                axes.plot(x, z + 6.0, "v", color=colour, markersize=9)
+                axes.plot(x, z + 6.0, "v", color=color, markersize=9)
             axes.set(xlim=(-38, 38), ylim=(38, 65), ylabel="height (mm)", title=NAMES[method])
             if panel == 0:
                 axes.plot([], [], "s", color=INK, label="frozen cell")

@@ -11,8 +11,8 @@ from .scenes import METHODS, NAMES, PRESSED
 
 __all__ = ["oscillation", "tracking"]
 
-#: Told apart with any colour vision; markers say the same once more.
-METHOD_COLOURS = {"virtual_master": LINES[0], "cell_states": LINES[1]}
+#: Told apart with any color vision; markers say the same once more.
+METHOD_COLORS = {"virtual_master": LINES[0], "cell_states": LINES[1]}
 MARKERS = "os^D"
 
 
@@ -67,10 +67,10 @@ def _details(axes: Any, results: Results, position_gain: float) -> float:
     gains = sorted(gain for gain, known in results.details if known == position_gain)
     calm, wild = results.onset(position_gain)
     chosen = list(dict.fromkeys(gain for gain in (gains[0], calm, wild) if gain is not None))
-    for colour, gain in zip(LINES, chosen, strict=False):
+    for color, gain in zip(LINES, chosen, strict=False):
         done, quick = results.details[gain, position_gain]
         axes.plot(
-            done.history["time"] - quick, done.history["total_force"], color=colour,
+            done.history["time"] - quick, done.history["total_force"], color=color,
             linewidth=1.4, label=f"$K_f$ = {gain:g} 1/N",
         )  # fmt: skip
     assert done.scene.set_point is not None  # Method I has one
@@ -87,13 +87,13 @@ def tracking(results: Results) -> Any:
         )
         for name, label, factor, limit, axes in panels:
             for marker, method in zip(MARKERS, METHODS, strict=False):
-                row, colour = results.tracks[method], METHOD_COLOURS[method]
+                row, color = results.tracks[method], METHOD_COLORS[method]
                 speed = [one.speed * MM for one in row]
                 value = [getattr(one, name) * factor for one in row]
-                axes.plot(speed, value, color=colour, alpha=0.9, label=NAMES[method])
+                axes.plot(speed, value, color=color, alpha=0.9, label=NAMES[method])
                 for one, x, y in zip(row, speed, value, strict=True):
-                    fill = colour if one.losses == 0 and one.loss_share == 0.0 else "white"
-                    axes.plot(x, y, marker, color=colour, markerfacecolor=fill, markersize=7)
+                    fill = color if one.losses == 0 and one.loss_share == 0.0 else "white"
+                    axes.plot(x, y, marker, color=color, markerfacecolor=fill, markersize=7)
             axes.axhline(limit * factor, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
             axes.axvline(PAPER_SPEED * MM, color=INK, linewidth=1.0, linestyle=(0, (1, 2)))
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))

@@ -49,8 +49,8 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
                     history["time"], 0, 1, where=touching, transform=over, color=SHADE, linewidth=0
                 )
                 axes.set_xlim(history["time"][0], history["time"][-1])
-            for name, colour, cell in zip(names, LINES, cells, strict=False):
-                heights.plot(history["time"], history["height"][:, cell] * MM, color=colour, label=name)
+            for name, color, cell in zip(names, LINES, cells, strict=False):
+                heights.plot(history["time"], history["height"][:, cell] * MM, color=color, label=name)
             heights.set(ylim=(lowest, highest), title=NAMES[method])
             heights.tick_params(labelbottom=False)
             force.plot(history["time"], history["total_force"], color=INK, linewidth=1.2, label="total force")
@@ -179,13 +179,13 @@ def profiles(sessions: Mapping[str, Session], title: str) -> Any:
         for number in range(count):
             row, column = divmod(number, 3)
             axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
-            for method, colour, marker in zip(METHODS, LINES, "os", strict=False):
+            for method, color, marker in zip(METHODS, LINES, "os", strict=False):
                 one = found[method][number]
                 name = NAMES[method].split(",")[0]
-                asked: dict[str, Any] = {"color": colour, "linewidth": 1.1, "linestyle": (0, (4, 2))}
+                asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": (0, (4, 2))}
                 axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
                 axes.plot(
-                    one.along * MM, one.found * MM, color=colour, marker=marker, markersize=4.5, label=name
+                    one.along * MM, one.found * MM, color=color, marker=marker, markersize=4.5, label=name
                 )
             axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
             axes.set_ylabel("height over rest (mm)")

@@ -54,7 +54,7 @@ def _ahead(axes: Any, results: Results) -> None:
 
 
 def _across(axes: Any, names: list[str], values: list[float], number: int, called: str) -> None:
-    """Draw a marker for each name, a colour and shape for each call."""
+    """Draw a marker for each name, a color and shape for each call."""
     y = -np.arange(len(names)) + 0.12 - 0.24 * number
     style: dict[str, Any] = {"color": LINES[number], "linestyle": "", "markersize": 9}
     axes.plot(values, y, "os"[number], label=called, **style)
@@ -67,10 +67,10 @@ def _gains(axes: Any, results: Results) -> None:
     used = getattr(results.printed[METHODS[0]].scene.control, "position_gain", 0.0)
     one = [swing for swing in results.swings if swing.position_gain == used]
     shown = (("Method I", one, LINES[0], "o-"), ("Method II", results.cell_swings, LINES[1], "s-"))
-    for called, swings, colour, look in shown:
+    for called, swings, color, look in shown:
         row = sorted(swings, key=lambda swing: swing.gain)
         values = [swing.gain for swing in row], [swing.amplitude for swing in row]
-        axes.plot(*values, look, color=colour, label=called)
+        axes.plot(*values, look, color=color, label=called)
     axes.axhline(SUSTAINED, color=INK, linewidth=1.0, linestyle=DASHED)
     axes.set_xscale("log")
     ticks = [2, 5, 10, 20, 50, 100, 200, 400]

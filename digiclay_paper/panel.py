@@ -13,7 +13,7 @@ __all__ = ["COLUMNS", "NAMED", "curves", "letter", "table"]
 
 #: Columns of the tables: which panel and curve, and a point of it, with what the axes are called.
 COLUMNS = ("panel", "curve", "x", "x_axis", "y", "y_axis")
-#: Label of axes that only hold a scale of colours.
+#: Label of axes that only hold a scale of colors.
 SCALE = "scale"
 #: Identifier of axes whose vertical axis has names for its ticks, and no numbers.
 NAMED = "named"

@@ -185,7 +185,7 @@ def one_cell(**parts: Any) -> System:
 
 
 def master(*toward: float, **known: Any) -> Master:
-    """Return a master that shapes at the bed's centre, 5 mm above it, and travels some way or none."""
+    """Return a master that shapes at the bed's center, 5 mm above it, and travels some way or none."""
     start = Master(Phase.SHAPING, height=45e-3, reference=40e-3, edge=40e-3)
     return start._replace(heading=Heading(0.0, 0.0, *toward), **known)
 

@@ -17,8 +17,8 @@ from PIL import Image
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "export.jpg"
 #: Size of each of the four views, pixels; how much of the world one shows, mm.
 SIZE, SHOWN = (576, 395), 116.0
-#: Colours of solids, bosses and creases: told apart with any colour vision.
-GREY, ORANGES, BLUE = (0.55, 0.60, 0.65), ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)), (0.02, 0.32, 0.75)
+#: Colors of solids, bosses and creases: told apart with any color vision.
+GRAY, ORANGES, BLUE = (0.55, 0.60, 0.65), ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)), (0.02, 0.32, 0.75)
 #: What is exported for each view.
 VIEWS = (
     ["--kind", "solid"],
@@ -55,10 +55,10 @@ def render(meshes: list[Path], out: Path) -> Image.Image:
     bosses = 0
     for mesh in sorted(meshes):
         bpy.ops.wm.stl_import(filepath=str(mesh))
-        colour = BLUE if mesh.stem.startswith("crease") else GREY
+        color = BLUE if mesh.stem.startswith("crease") else GRAY
         if mesh.stem.startswith("boss"):
-            colour, bosses = ORANGES[bosses % len(ORANGES)], bosses + 1
-        bpy.context.object.color = (*colour, 1.0)
+            color, bosses = ORANGES[bosses % len(ORANGES)], bosses + 1
+        bpy.context.object.color = (*color, 1.0)
     bpy.context.scene.render.filepath = str(out)
     bpy.ops.render.render(write_still=True)
     drawn = Image.open(out).convert("RGBA")

@@ -49,7 +49,7 @@ TERMS = (
         "control method",
         "algorithm that maps measurements to valve commands; Method I and Method II are the paper's",
     ),
-    ("behaviour", "one of the six control methods without a blister"),
+    ("behavior", "one of the six control methods without a blister"),
     ("blister", "raised or lowered patch of pins under the fingertip, moved by Method I or II"),
     ("virtual master", "simulated cell of Method I that follows the fingertip"),
     ("set point", "total force that a control method holds"),

@@ -47,7 +47,7 @@ def mapped(name: str, side: int) -> Floats:
 
 
 def png(values: Floats, bits: int) -> bytes:
-    """Return a grey picture of values from 0 to 1, the highest row first as in every picture."""
+    """Return a gray picture of values from 0 to 1, the highest row first as in every picture."""
     levels = np.rint(np.flipud(values) * (2**bits - 1)).astype(">u2" if bits == 16 else "u1")
     lines = b"".join(b"\0" + line.tobytes() for line in levels)
 

@@ -21,7 +21,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-#: Blender units per metre of the device: a millimetre is drawn as a hundredth of a unit,
+#: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,
 #: which suits Blender's default clipping, snapping and lights.
 SCALE = 10.0
 
@@ -158,7 +158,7 @@ def pose(tip: Any) -> Floats:
     Parameters
     ----------
     tip : bpy.types.Object
-        The empty, child of its bed; it is the ellipsoid's centre.
+        The empty, child of its bed; it is the ellipsoid's center.
 
     Raises
     ------
@@ -168,11 +168,11 @@ def pose(tip: Any) -> Floats:
     bed = tip.parent
     uniform(bed)
     local = bed.matrix_world.inverted() @ tip.matrix_world
-    centre, turn, _ = local.decompose()
+    center, turn, _ = local.decompose()
     quaternion = np.array(turn.normalized())
-    # The centre of a finger whose lowest point is the origin, taken away again.
+    # The center of a finger whose lowest point is the origin, taken away again.
     above = finger_of(tip).outline(np.array([[0.0, 0.0, 0.0, *quaternion]]))[0, :3]
-    return np.array([*(np.array(centre) / SCALE - above), *quaternion])
+    return np.array([*(np.array(center) / SCALE - above), *quaternion])
 
 
 def uniform(bed: Any) -> float:
@@ -202,21 +202,21 @@ def uniform(bed: Any) -> float:
     return largest
 
 
-def linear(colour: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
-    """Return an sRGB colour in the linear light of Blender's materials.
+def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
+    """Return an sRGB color in the linear light of Blender's materials.
 
     Parameters
     ----------
-    colour : (float, float, float)
+    color : (float, float, float)
         sRGB, 0 to 1.
     alpha : float
         0 to 1.
     """
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return r, g, b, alpha
 
 
 def srgb(light: Sequence[float]) -> tuple[float, float, float]:
-    """Return a colour of linear light as sRGB; what `linear` gave comes back."""
+    """Return a color of linear light as sRGB; what `linear` gave comes back."""
     r, g, b = (c * 12.92 if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in light[:3])
     return r, g, b

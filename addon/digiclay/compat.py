@@ -28,6 +28,8 @@ __all__ = [
 
 #: The name Blender knows the extension by.
 PACKAGE = __package__
+#: What inputs of the bed's geometry nodes are called in older files.
+FORMER_INPUTS = {"Color by Force": "Colour by Force", "Top Color at (N)": "Top Colour at (N)"}
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
     "scenes", "objects", "collections", "meshes", "curves", "fonts", "lights",
@@ -51,7 +53,7 @@ def node_setting(modifier: Any, name: str) -> Any:
     name : str
         Of the input.
     """
-    identifier = modifier.node_group.interface.items_tree[name].identifier
+    identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
@@ -68,7 +70,7 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
     value : object
         Of the input's kind.
     """
-    identifier = modifier.node_group.interface.items_tree[name].identifier
+    identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).value = value
     else:
@@ -86,11 +88,18 @@ def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
         Of the input.
     frame : int
     """
-    identifier = modifier.node_group.interface.items_tree[name].identifier
+    identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
         getattr(modifier.properties.inputs, identifier).keyframe_insert("value", frame=frame)
     else:
         modifier.keyframe_insert(f'["{identifier}"]', frame=frame)
+
+
+def _identifier(modifier: Any, name: str) -> str:
+    """Return the identifier of an input of a geometry nodes modifier's tree, also of an older file's tree."""
+    inputs = modifier.node_group.interface.items_tree
+    found: str = inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
+    return found
 
 
 def curves(owner: Any) -> list[Any]:

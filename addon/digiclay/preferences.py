@@ -1,4 +1,4 @@
-"""Preferences of all beds: redraw rate, colours, control periods to catch up in a tick."""
+"""Preferences of all beds: redraw rate, colors, control periods to catch up in a tick."""
 
 # No postponed annotations here: Blender reads the preferences' properties from them.
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Choices:
 
 
 def take_palette(preferences: Any, context: Any) -> None:
-    """Recolour the beds of the open file.
+    """Recolor the beds of the open file.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ class Preferences(bpy.types.AddonPreferences):
         soft_max=100,
     )
     palette: bpy.props.EnumProperty(
-        name="Mode Colours",
-        description="Colours of the modes; a choice recolours the beds of the open file",
+        name="Mode Colors",
+        description="Colors of the modes; a choice recolors the beds of the open file",
         items=[(name, *words) for name, words in palettes.WORDS.items()],
         default=Choices.palette,
         update=take_palette,

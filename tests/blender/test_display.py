@@ -16,7 +16,7 @@ from digiclay.core.session.accuracy import Errors
 from digiclay.device import display, palettes, view
 from digiclay.live import bed_state, running, sculpting
 from digiclay.overlay import views
-from digiclay.overlay.look import choose_colours
+from digiclay.overlay.look import choose_colors
 from digiclay.overlay.placement import lay_out
 from digiclay.panels.live_session import error_line
 from digiclay.settings import properties
@@ -60,25 +60,25 @@ def forces(bed: Any) -> np.ndarray:
 
 def test_the_properties_are_the_settings_of_the_geometry_nodes(bed: Any) -> None:
     shown = bed.digiclay_display
-    shown.colour, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
-    assert (view.colour_source(bed), view.shows_arrows(bed)) == ("force", True)
-    assert view.top_colour(bed) == 0.5
+    shown.color, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
+    assert (view.color_source(bed), view.shows_arrows(bed)) == ("force", True)
+    assert view.top_color(bed) == 0.5
     assert view.arrow_length(bed) == pytest.approx(0.25, rel=1e-12)
-    view.colour_by(bed, "mode")
-    assert shown.colour == "mode"
+    view.color_by(bed, "mode")
+    assert shown.color == "mode"
 
 
 def test_a_bed_without_its_nodes_has_nothing_to_set_and_says_nothing(bed: Any) -> None:
     bed.modifiers.clear()
     shown = bed.digiclay_display
-    shown.colour, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
-    assert (shown.colour, shown.arrows) == ("mode", False)
+    shown.color, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0
+    assert (shown.color, shown.arrows) == ("mode", False)
 
 
 def test_turning_the_heat_map_on_shows_the_forces_of_now(bed: Any, session: running.Running) -> None:
     view.show_state(bed, session.system, session.state)
     assert not forces(bed).any()
-    bed.digiclay_display.colour = "force"
+    bed.digiclay_display.color = "force"
     felt = session.state.row(session.system.rows.force)
     assert felt.max() > 0.01
     np.testing.assert_allclose(forces(bed), felt, rtol=2.0**-23)
@@ -132,7 +132,7 @@ def test_the_overlay_tells_what_the_session_is(bed: Any, session: running.Runnin
     assert told.force[-1] == pytest.approx(total, rel=1e-12)
     stopped = views.read_session(bed, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
     assert stopped.paused
-    assert told.colours[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
+    assert told.colors[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
 
 
 @pytest.mark.parametrize("errors", [None, Errors(2.1e-6, 4.6e-4, 9e-4), Errors(9e-12, 0.0, 0.0)])
@@ -141,7 +141,7 @@ def test_panel_and_overlay_say_the_same_of_the_error(
 ) -> None:
     known = replace(session, errors=errors)
     told = views.read_session(bed, known, palettes.PALETTES["okabe_ito"])
-    chosen = choose_colours((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
+    chosen = choose_colors((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
     written = [words.text for words in lay_out(told, chosen, (0.0, 0.0, 900.0, 700.0), 1.0).words]
     assert error_line(known) in written
 

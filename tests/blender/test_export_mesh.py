@@ -133,7 +133,7 @@ def test_without_features_the_export_says_what_was_looked_for(bed, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_lengths_are_millimetres_of_the_device_whatever_the_size_of_the_bed(bed, tmp_path):
+def test_lengths_are_millimeters_of_the_device_whatever_the_size_of_the_bed(bed, tmp_path):
     bed.scale = (3.0, 3.0, 3.0)
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), kind="surface")
     bpy.ops.wm.stl_import(filepath=str(tmp_path / "bed.stl"))

@@ -1,4 +1,4 @@
-"""Preferences: colours that can be told apart, worn by the beds of a file; defaults where there are none."""
+"""Preferences: colors that can be told apart, worn by the beds of a file; defaults where there are none."""
 
 from __future__ import annotations
 
@@ -39,39 +39,39 @@ def lab(light: np.ndarray) -> np.ndarray:
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def mode_colour(mode: Mode) -> tuple[float, ...]:
-    """Return the linear colour the pins of a mode have in the viewport."""
+def mode_color(mode: Mode) -> tuple[float, ...]:
+    """Return the linear color the pins of a mode have in the viewport."""
     (material,) = (item for item in bpy.data.materials if item.get(ROLE) == mode.name.lower())
     return tuple(material.diffuse_color)
 
 
 @pytest.mark.parametrize("vision", VISION)
 @pytest.mark.parametrize("name", palettes.PALETTES)
-def test_any_two_modes_look_different_with_any_colour_vision(name: str, vision: str) -> None:
+def test_any_two_modes_look_different_with_any_color_vision(name: str, vision: str) -> None:
     seen = [
-        lab(np.clip(VISION[vision] @ linear(colour)[:3], 0.0, 1.0))
-        for colour in palettes.PALETTES[name].values()
+        lab(np.clip(VISION[vision] @ linear(color)[:3], 0.0, 1.0))
+        for color in palettes.PALETTES[name].values()
     ]
     # A difference of 2.3 is just noticeable side by side; 10 is told apart at a glance.
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 10.0
 
 
 @pytest.mark.usefixtures("extension")
-def test_a_palette_recolours_the_beds_of_the_file() -> None:
+def test_a_palette_recolors_the_beds_of_the_file() -> None:
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
     palettes.set_palette("tol_muted")
-    for mode, colour in palettes.PALETTES["tol_muted"].items():
+    for mode, color in palettes.PALETTES["tol_muted"].items():
         # float32 numbers up to 1.
-        np.testing.assert_allclose(mode_colour(mode), linear(colour), rtol=0, atol=1e-6)
+        np.testing.assert_allclose(mode_color(mode), linear(color), rtol=0, atol=1e-6)
 
 
 @pytest.mark.usefixtures("extension")
-def test_a_second_bed_leaves_colours_the_user_has_changed() -> None:
+def test_a_second_bed_leaves_colors_the_user_has_changed() -> None:
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
     (material,) = (item for item in bpy.data.materials if item.get(ROLE) == "rest")
     material.diffuse_color = (1.0, 0.0, 0.0, 1.0)
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
-    assert mode_colour(Mode.REST) == (1.0, 0.0, 0.0, 1.0)
+    assert mode_color(Mode.REST) == (1.0, 0.0, 0.0, 1.0)
 
 
 def test_a_palette_in_a_file_without_a_bed_does_nothing() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from digiclay.compat import scratch, strips
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.session.render_settings import Film, Turntable
@@ -61,11 +61,11 @@ def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
 
 
 def looks_like(pixels: np.ndarray, mode: Mode) -> int:
-    """Count pixels of the bed, right of the legend and above the strip, in the direction of a colour."""
+    """Count pixels of the bed, right of the legend and above the strip, in the direction of a color."""
     bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
-    wanted = np.array(COLOURS[mode])
+    wanted = np.array(COLORS[mode])
     cosine = bed @ wanted / np.maximum(np.linalg.norm(bed, axis=1) * np.linalg.norm(wanted), 1e-6)
-    # Blue and vermilion are 70 degrees apart; grey is 25 degrees or more from both.
+    # Blue and vermilion are 70 degrees apart; gray is 25 degrees or more from both.
     return int((cosine > 0.97).sum())
 
 
@@ -76,7 +76,7 @@ def inventory() -> dict[str, int]:
     return {kind: count for kind, count in found.items() if kind != "images"}  # Blender's own Render Result
 
 
-def test_a_film_shows_the_rows_in_their_colours_at_its_rate(tmp_path: Path, history: Any) -> None:
+def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path: Path, history: Any) -> None:
     before = inventory()
     told: list[tuple[int, int]] = []
     looks = Film(**SMALL, arrows=False)
@@ -101,7 +101,7 @@ def test_the_strip_fills_up_as_time_goes_on(tmp_path: Path, history: Any) -> Non
     path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, arrows=False))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
-    # Along the strip's lower edge, what has been is blue and what is to come is grey.
+    # Along the strip's lower edge, what has been is blue and what is to come is gray.
     lower = [picture[6, :, 2] - picture[6, :, 0] > 0.25 for picture in pictures]
     shares = [np.flatnonzero(row).max(initial=0) / WIDTH for row in lower]
     # The strip goes from 3 % to 97 % of the width; letters and the cursor are 2 % wide.
@@ -138,9 +138,9 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path: Path, history: A
     assert counts[0] < 5 < counts[1]
 
 
-def test_a_bed_coloured_by_force_changes_its_colours_with_the_force(tmp_path: Path, history: Any) -> None:
+def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path: Path, history: Any) -> None:
     history["force"] = history["force"] * 10.0
-    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, colour="force", arrows=False))
+    path = films.render_film(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
     assert path is not None
     _, pictures = frames_of(path, tmp_path / "frames")
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]

@@ -61,7 +61,7 @@ def test_a_run_is_filmed_and_turned_from_the_command_line(capsys: pytest.Capture
     settings = ["--set", "simulation.duration=0.2", "--no-errors", "--quiet"]
     assert main(["run", "tap", "--out", "run", *settings]) == 0
     small = ["--size", "64x40", "--rate", "10", "--quiet"]
-    assert main(["render", "run", "--film", "--speed", "0.5", "--colour", "force", *small]) == 0
+    assert main(["render", "run", "--film", "--speed", "0.5", "--color", "force", *small]) == 0
     assert main(["render", "run", "--turntable", "--frames", "2", *small]) == 0
     assert {path.name for path in Path("run").iterdir() if path.suffix == ".mp4"} == {
         "film.mp4",

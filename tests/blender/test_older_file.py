@@ -64,6 +64,15 @@ def test_the_session_goes_on_to_the_stored_heights(name: str, x: float) -> None:
     np.testing.assert_allclose(exact(bed(name)), stored, rtol=0, atol=FLOAT32)
 
 
+def test_an_older_bed_is_colored_by_force_under_the_former_names() -> None:
+    found = bed("Session")
+    shown_as = found.digiclay_display
+    shown_as.color, shown_as.top_force = "force", 0.5
+    assert (shown_as.color, view.top_color(found)) == ("force", 0.5)
+    names = set(found.modifiers["Pins"].node_group.interface.items_tree.keys())
+    assert {"Colour by Force", "Top Colour at (N)"} <= names
+
+
 def test_the_take_replays_to_the_stored_heights() -> None:
     found = bed("Session")
     first, second = takes.list_takes(found)
@@ -88,9 +97,9 @@ def test_settings_of_the_user_s_own_are_those_of_the_scene_file() -> None:
     found = bed("Settings")
     assert properties.scene_of(found) == load(SAMPLES / "settings.toml")
     display = found.digiclay_display
-    assert (display.colour, display.arrows) == ("force", True)
+    assert (display.color, display.arrows) == ("force", True)
     assert tuple(display.picked) == (40, 41, -1, -1, -1, -1)
-    assert view.colour_source(found) == "force"
+    assert view.color_source(found) == "force"
 
 
 def test_features_are_measured_from_the_surface_that_was_kept() -> None:

@@ -93,17 +93,17 @@ def test_a_blister_is_shown_where_the_method_forms_one(method: str, bed: Any) ->
 
 
 @pytest.mark.parametrize(
-    ("switch", "greyed"),
+    ("switch", "grayed"),
     [
         ("fingertip", {"fingertip", "contact", "relaxation"}),
         ("control", {"control", "blister"}),
         ("delay", {"delay"}),
     ],
 )
-def test_what_is_left_out_is_greyed_with_all_that_belongs_to_it(
-    switch: str, greyed: set[str], bed: Any
+def test_what_is_left_out_is_grayed_with_all_that_belongs_to_it(
+    switch: str, grayed: set[str], bed: Any
 ) -> None:
     settings = bed.digiclay
     used = {name for name in SECTIONS if in_use(settings, name)}
     setattr(settings, f"use_{switch}", False)
-    assert used - {name for name in SECTIONS if in_use(settings, name)} == greyed
+    assert used - {name for name in SECTIONS if in_use(settings, name)} == grayed

@@ -91,11 +91,11 @@ def test_the_state_of_other_pins_is_forgotten(bed: Any) -> None:
     assert bed_state.read_snapshot(bed) is None
 
 
-def test_how_a_bed_is_coloured_outlives_its_pins(bed: Any) -> None:
-    view.colour_by(bed, "force")
+def test_how_a_bed_is_colored_outlives_its_pins(bed: Any) -> None:
+    view.color_by(bed, "force")
     bed.digiclay.layout.rows = 7
     bpy.ops.digiclay.rebuild()
-    assert view.colour_source(bed) == "force"
+    assert view.color_source(bed) == "force"
 
 
 def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed: Any) -> None:

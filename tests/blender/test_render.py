@@ -12,7 +12,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError, OutputError
-from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.model.layout import Layout
 from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
@@ -31,9 +31,9 @@ def picture(path: Path) -> np.ndarray:
     return pixels[:, :, :3]
 
 
-def of_the_hue(pixels: np.ndarray, colour: tuple[float, float, float]) -> int:
-    """Count the pixels that look like a colour in light or shadow: its hue, coloured, not near black."""
-    hue = colorsys.rgb_to_hsv(*colour)[0]
+def of_the_hue(pixels: np.ndarray, color: tuple[float, float, float]) -> int:
+    """Count the pixels that look like a color in light or shadow: its hue, colored, not near black."""
+    hue = colorsys.rgb_to_hsv(*color)[0]
     found = [colorsys.rgb_to_hsv(*pixel) for pixel in pixels.reshape(-1, 3)]
     # The palette's hues are at least 0.07 apart, of 1 all round.
     return sum(abs(h - hue) < 0.03 and s > 0.5 and v > 0.2 for h, s, v in found)
@@ -58,7 +58,7 @@ def inventory() -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.FROZEN])
-def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_colour_of_their_mode(
+def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_color_of_their_mode(
     mode: Mode, tmp_path: Path
 ) -> None:
     out = still.render_still(bed_in(mode), tmp_path / "pins.png", width=WIDTH, height=HEIGHT, samples=2)
@@ -68,17 +68,17 @@ def test_a_still_has_the_size_asked_for_and_shows_the_pins_in_the_colour_of_thei
     # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more than this.
     pins = pixels[:, int(stage.MARGINS[0] * WIDTH) :]
     other = Mode.FROZEN if mode is Mode.HOLD else Mode.HOLD
-    assert of_the_hue(pins, COLOURS[mode]) > 500
-    assert of_the_hue(pins, COLOURS[other]) < 20
+    assert of_the_hue(pins, COLORS[mode]) > 500
+    assert of_the_hue(pins, COLORS[other]) < 20
 
 
-def test_the_legend_names_the_modes_present_in_their_colours(tmp_path: Path) -> None:
+def test_the_legend_names_the_modes_present_in_their_colors(tmp_path: Path) -> None:
     width = 2 * WIDTH
     out = still.render_still(
         bed_in(Mode.HOLD), tmp_path / "pins.png", width=width, height=2 * HEIGHT, samples=2
     )
     legend = picture(out)[:, : width // 5]
-    assert of_the_hue(legend, COLOURS[Mode.HOLD]) > 20
+    assert of_the_hue(legend, COLORS[Mode.HOLD]) > 20
 
 
 def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_the_legend_has_the_palette_that_the_open_file_wears(tmp_path: Path) -> 
     )
     legend = picture(out)[:, : width // 5]
     assert of_the_hue(legend, palettes.PALETTES["tol_muted"][Mode.HOLD]) > 20
-    assert of_the_hue(legend, COLOURS[Mode.HOLD]) < 20
+    assert of_the_hue(legend, COLORS[Mode.HOLD]) < 20
 
 
 def test_a_still_leaves_the_users_file_as_it_was(tmp_path: Path, formed: Instant) -> None:
@@ -135,7 +135,7 @@ def test_every_bed_falls_inside_the_frame_and_touches_its_margins(
     left, right, below, above = stage.MARGINS
     gaps = np.array([placed[:, 0].min() - left, 1 - right - placed[:, 0].max(),
                      placed[:, 1].min() - below, 1 - above - placed[:, 1].max()])  # fmt: skip
-    # Camera matrices are float32. One direction fills its share of the frame, the other is centred.
+    # Camera matrices are float32. One direction fills its share of the frame, the other is centered.
     assert gaps.min() == pytest.approx(0.0, abs=1e-4)
     assert gaps.min() > -1e-4
 

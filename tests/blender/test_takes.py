@@ -116,7 +116,7 @@ def test_every_frame_shows_the_heights_of_its_moment(bed: Any) -> None:
     take, heights = taken()
     baked(bed, take, first=10)
     for frame in (0, 7, 20):
-        # Pins are drawn in float32 at ten units a metre: 3e-8 of 0.4.
+        # Pins are drawn in float32 at ten units a meter: 3e-8 of 0.4.
         assert np.abs(shown(bed, 10 + frame) - heights[5 * frame]).max() < 1e-7
 
 

@@ -33,7 +33,7 @@ def test_a_bed_of_an_older_file_stays_as_it_is_and_is_one_all_the_same(tmp_path:
     copy = bpy.context.object
     assert len(bpy.context.scene.objects) == 7
     assert housings() == 2
-    assert view.colour_source(copy) == "mode"
+    assert view.color_source(copy) == "mode"
     select(bed)
     bpy.ops.object.delete()
     done("Delete")

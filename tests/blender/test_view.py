@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout
@@ -51,17 +51,17 @@ def test_every_pin_drawn_wears_the_material_of_its_mode(bed: Any, formed: Instan
     assert materials == [Mode(int(code)).name.lower() for code in formed.mode]
 
 
-def test_the_modes_have_as_many_materials_each_in_its_colour(bed: Any) -> None:
+def test_the_modes_have_as_many_materials_each_in_its_color(bed: Any) -> None:
     for mode in Mode:
         (material,) = (m for m in bpy.data.materials if m.get(view.ROLE) == mode.name.lower())
-        wanted = bridge.linear(COLOURS[mode])
+        wanted = bridge.linear(COLORS[mode])
         shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         # Both are stored as float32 numbers up to 1.
         np.testing.assert_allclose(material.diffuse_color, wanted, rtol=0, atol=1e-6)
         np.testing.assert_allclose(shader.inputs["Base Color"].default_value, wanted, rtol=0, atol=1e-6)
 
 
-def test_showing_another_instant_moves_and_recolours_the_pins(bed: Any, formed: Instant) -> None:
+def test_showing_another_instant_moves_and_recolors_the_pins(bed: Any, formed: Instant) -> None:
     drawn_pins(bed)
     later = Instant(
         position=formed.position,
@@ -191,13 +191,13 @@ def test_a_bed_sheared_by_its_parent_is_refused(bed: Any) -> None:
         bridge.uniform(bed)
 
 
-def test_every_pin_wears_the_colour_of_its_level_of_force(bed: Any, formed: Instant) -> None:
-    view.colour_by(bed, "force")
+def test_every_pin_wears_the_color_of_its_level_of_force(bed: Any, formed: Instant) -> None:
+    view.color_by(bed, "force")
     assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force)]
     assert len(set(heat.level(formed.force))) == 13
-    view.scale_colours(bed, 2.0)
+    view.scale_colors(bed, 2.0)
     assert of_the_pins(bed) == [f"force_{level:02d}" for level in heat.level(formed.force, 2.0)]
-    view.colour_by(bed, "mode")
+    view.color_by(bed, "mode")
     assert of_the_pins(bed) == [Mode(int(code)).name.lower() for code in formed.mode]
 
 
@@ -237,13 +237,13 @@ def test_one_sees_through_the_fingertip_while_arrows_are_on(bed: Any) -> None:
         assert ball.material_slots[0].material[view.ROLE] == name
 
 
-def test_a_copy_of_a_bed_keeps_its_own_colours_and_arrows(bed: Any) -> None:
+def test_a_copy_of_a_bed_keeps_its_own_colors_and_arrows(bed: Any) -> None:
     other = bed.copy()
     bpy.context.collection.objects.link(other)
-    view.colour_by(other, "force")
+    view.color_by(other, "force")
     view.show_arrows(other, True)
-    assert (view.colour_source(bed), view.shows_arrows(bed)) == ("mode", False)
-    assert (view.colour_source(other), view.shows_arrows(other)) == ("force", True)
+    assert (view.color_source(bed), view.shows_arrows(bed)) == ("mode", False)
+    assert (view.color_source(other), view.shows_arrows(other)) == ("force", True)
 
 
 def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> None:
@@ -254,7 +254,7 @@ def test_forces_are_written_only_while_something_drawn_tells_them(bed: Any) -> N
     before = bridge.read_cells(bed.data)["force"]
     view.show_state(bed, system, state)
     np.testing.assert_array_equal(bridge.read_cells(bed.data)["force"], before)
-    for switch_on in (lambda: view.show_arrows(bed, True), lambda: view.colour_by(bed, "force")):
+    for switch_on in (lambda: view.show_arrows(bed, True), lambda: view.color_by(bed, "force")):
         view.show_arrows(bed, False)
         switch_on()
         state.rows[system.rows.force] += 0.1
@@ -278,19 +278,19 @@ def test_a_scale_of_the_display_that_draws_nothing_is_refused(bed: Any, value: f
     with pytest.raises(DigiclayError, match="must be above 0"):
         view.scale_arrows(bed, value)
     with pytest.raises(DigiclayError, match="must be above 0"):
-        view.scale_colours(bed, value)
+        view.scale_colors(bed, value)
 
 
-def test_another_colouring_is_refused_with_the_known_ones(bed: Any) -> None:
+def test_another_coloring_is_refused_with_the_known_ones(bed: Any) -> None:
     with pytest.raises(DigiclayError, match="mode, force"):
-        view.colour_by(bed, "height")
+        view.color_by(bed, "height")
 
 
 def test_a_bed_whose_nodes_were_removed_is_refused_by_name_and_shows_no_forces(bed: Any) -> None:
     bed.modifiers.clear()
     assert not view.wants_force(bed)
     with pytest.raises(DigiclayError, match="Digital Clay must have the geometry nodes modifier"):
-        view.colour_by(bed, "force")
+        view.color_by(bed, "force")
 
 
 def test_an_instant_shown_keeps_its_forces_though_nothing_drawn_tells_them(formed: Instant) -> None:

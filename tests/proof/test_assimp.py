@@ -35,7 +35,7 @@ def test_the_size_is_the_beds(meshes: Path, ending: str) -> None:
         for name in ("Minimum point", "Maximum point")
     )
     size = sorted(b - a for a, b in zip(low, high, strict=True))
-    # 25 pins 3 mm apart; from 3 mm under the valley to the mound's top. GLB is in metres.
+    # 25 pins 3 mm apart; from 3 mm under the valley to the mound's top. GLB is in meters.
     factor = 1e3 if ending == "glb" else 1.0
     assert [one * factor for one in size] == pytest.approx([37.66, 72.0, 72.0], abs=0.01)
 

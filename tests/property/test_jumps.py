@@ -27,7 +27,7 @@ from tests.assemble import Record, make_system, one_cell, path, record, sample, 
 Floats = NDArray[np.float64]
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
-#: Millimetres from where the finger stood: a little, the width of the bed, far beyond it.
+#: Millimeters from where the finger stood: a little, the width of the bed, far beyond it.
 far = st.one_of(st.integers(-5, 5), st.integers(-100, 100), st.sampled_from([-1000, 0, 1000])).map(float)
 deep = st.one_of(st.integers(-8, 4), st.integers(-100, 100), st.sampled_from([-1000, 1000])).map(float)
 #: Milliseconds until the next place, and the place.

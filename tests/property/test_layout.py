@@ -62,7 +62,7 @@ def test_no_two_cells_are_closer_than_a_pitch(layout: Layout) -> None:
     bed = grid(layout)
     gaps = np.hypot(bed.x - bed.x[:, None], bed.y - bed.y[:, None])
     np.fill_diagonal(gaps, 1.0)
-    # A staggered bed has neighbours sqrt(5/4) pitches apart, a hexagonal one exactly one; rounding.
+    # A staggered bed has neighbors sqrt(5/4) pitches apart, a hexagonal one exactly one; rounding.
     assert gaps.min() >= layout.pitch * (1 - 1e-12)
 
 

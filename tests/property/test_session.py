@@ -20,7 +20,7 @@ from tests.assemble import Record, make_system, one_cell, record, scripted, unde
 COUNT = 80
 CELLS = Layout(7, 7, arrangement="staggered")
 
-#: Millimetres, to the tenth.
+#: Millimeters, to the tenth.
 xy = st.integers(-140, 140).map(lambda tenths: tenths / 10)
 #: Down to 8 mm below the tops, and far above; at up to 0.2 m/s.
 points = st.lists(

@@ -18,7 +18,7 @@ from tests.assemble import make_system, path, record, scripted
 COUNT = 160
 BED = make_system(Layout(9, 9), control=VirtualMaster())
 
-#: Millimetres, to the tenth.
+#: Millimeters, to the tenth.
 xy = st.integers(-120, 120).map(lambda tenths: tenths / 10)
 points = st.lists(
     st.tuples(xy, xy, st.integers(330, 550).map(lambda tenths: tenths / 10)), min_size=4, max_size=7
@@ -67,7 +67,7 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
     fewer = record(BED, trajectory, COUNT)
     all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, COUNT)
     assert all_cells.last.active.cells.size == BED.grid.count
-    # Rounding: sums in another order. A force grows e-fold in half a millimetre.
+    # Rounding: sums in another order. A force grows e-fold in half a millimeter.
     assert np.abs(fewer.height - all_cells.height).max() < 1e-12
     assert np.abs(fewer.force - all_cells.force).max() < 1e-9
 

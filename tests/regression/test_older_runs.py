@@ -25,7 +25,7 @@ RUNS = Path(__file__).parents[1] / "samples" / "runs"
 RECORDED = ("virtual_master", "cell_states_every_7")
 ALL = (*RECORDED, "without_recorder")
 #: Largest differences of what a run of the same scene records: N, m, and of a command, which a gain of 500
-#: per metre makes of a height.
+#: per meter makes of a height.
 TOLERANCES = {"force": 1e-11, "total_force": 1e-10, "height": 1e-13, "command": 1e-9}
 #: What says when, where and how quickly a run was made.
 CIRCUMSTANCES = ("run_time", "real_time_factor", "versions")

@@ -64,7 +64,7 @@ def test_the_ridge_is_level(session: Run) -> None:
     assert np.ptp(ridge) < 1e-3
 
 
-def test_the_mound_stands_ten_millimetres_above_the_ridge(session: Run) -> None:
+def test_the_mound_stands_ten_millimeters_above_the_ridge(session: Run) -> None:
     heights = session[1].height[-1].reshape(25, 25)
     assert heights[5, 19] - heights[5, 12] == pytest.approx(10e-3, abs=2e-3)
 

@@ -18,7 +18,7 @@ from digiclay.core.session.run_scene import Result, run
 
 from tests.assemble import STACKABLE, sample
 
-#: Sums in another order: a last bit here and there. Heights are centimetres, forces tenths of a newton.
+#: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a newton.
 HEIGHT, FORCE = 1e-12, 1e-10
 
 
@@ -124,7 +124,7 @@ def test_the_other_methods_hold_on_devices_of_their_own(method: str, key: str, v
         ("plastic_press", "control.damping", ("5", "8")),
     ],
 )
-def test_behaviours_with_parameters_of_their_own_do_what_they_do_alone(
+def test_behaviors_with_parameters_of_their_own_do_what_they_do_alone(
     name: str, key: str, values: Sequence[str]
 ) -> None:
     scenes = [sample(name, f"{key}={value}", "simulation.duration=1.0") for value in values]

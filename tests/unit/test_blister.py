@@ -28,7 +28,7 @@ def test_the_bell_is_a_gaussian() -> None:
 
 
 @pytest.mark.parametrize("blister", [CONE, BELL], ids=["cone", "gaussian"])
-def test_the_centre_is_at_the_master(blister: Blister) -> None:
+def test_the_center_is_at_the_master(blister: Blister) -> None:
     assert blister.interpolate(np.zeros(1), 40e-3, 55e-3) == pytest.approx(55e-3, abs=1e-17)
 
 

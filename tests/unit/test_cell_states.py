@@ -60,7 +60,7 @@ def test_a_spring_cell_gives_way_by_force_over_stiffness() -> None:
     assert ordered(seen({MIDDLE: 0.02}))[1].command[MIDDLE] == pytest.approx(-0.5, rel=1e-12)
 
 
-def test_the_neighbours_of_a_following_cell_become_its_blister() -> None:
+def test_the_neighbors_of_a_following_cell_become_its_blister() -> None:
     mode = ordered(seen({MIDDLE: 0.1}))[1].mode
     inside = [c for c in range(BED.count) if 0.0 < distance(c) < BLISTER.radius * (1 - 1e-6)]
     assert {Mode(int(m)) for m in mode[inside]} == {Mode.BLISTER}
@@ -129,7 +129,7 @@ def test_the_blister_falls_off_to_the_edge() -> None:
     assert target[MIDDLE + 3] == pytest.approx(REST + 1e-3 / 3.0, abs=1e-9)
 
 
-def test_a_cell_behind_a_travelling_finger_is_frozen_at_its_command() -> None:
+def test_a_cell_behind_a_traveling_finger_is_frozen_at_its_command() -> None:
     modes = {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 3: Mode.BLISTER}
     measured = seen({MIDDLE: 0.04}, modes)
     measured.target[MIDDLE - 3] = 47e-3

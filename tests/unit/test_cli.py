@@ -159,7 +159,7 @@ def highest(path: Path) -> float:
     return max(float(line.split()[3]) for line in path.read_text().splitlines() if line.startswith("v "))
 
 
-def test_export_can_be_in_metres_and_of_any_instant(here: Path) -> None:
+def test_export_can_be_in_meters_and_of_any_instant(here: Path) -> None:
     main(["run", "my.toml", "--quiet"])
     main(["export", "my", "--format", "obj", "--unit", "m", "--time", "0", "--out", "meshes", "--quiet"])
     # At rest all pins are 40 mm high; OBJ files are written to 1e-8.

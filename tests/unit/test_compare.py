@@ -41,7 +41,7 @@ def test_the_columns_of_the_table_are_aligned() -> None:
     assert len({len(line) for line in table(found)}) == 1
 
 
-def test_lengths_are_printed_in_millimetres() -> None:
+def test_lengths_are_printed_in_millimeters() -> None:
     found = {"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}}
     row = next(line for line in table(found) if "lag_max" in line)
     assert row.split() == ["lag_max", "mm", "2.5"]

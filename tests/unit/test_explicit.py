@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Thrower(Explicit):
-    """Throws the first cell off in the first step, and raises the other by a millimetre in each."""
+    """Throws the first cell off in the first step, and raises the other by a millimeter in each."""
 
     name = "thrower"
     order = 1
@@ -73,7 +73,7 @@ def test_a_pin_pushed_as_far_as_the_finger_comes_is_kept() -> None:
 
 
 def test_a_pin_thrown_further_than_the_finger_comes_is_given_up() -> None:
-    # A hundredth of the stroke is allowed; an open valve lowers it by less than a millimetre in 5 ms.
+    # A hundredth of the stroke is allowed; an open valve lowers it by less than a millimeter in 5 ms.
     assert put(15e-3, under=20e-3) == np.inf
 
 

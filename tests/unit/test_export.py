@@ -49,14 +49,14 @@ def corners(body: Body) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", PLAIN)
-def test_meshio_reads_back_the_triangles_in_millimetres(solid, tmp_path, kind):
+def test_meshio_reads_back_the_triangles_in_millimeters(solid, tmp_path, kind):
     read = meshio.read(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind))
     found = read.points[read.cells_dict["triangle"]]
     np.testing.assert_allclose(found, corners(solid[0]) * 1e3, rtol=0.0, atol=WRITTEN)
 
 
 @pytest.mark.parametrize("kind", PLAIN)
-def test_trimesh_reads_back_a_watertight_solid_in_millimetres(solid, tmp_path, kind):
+def test_trimesh_reads_back_a_watertight_solid_in_millimeters(solid, tmp_path, kind):
     read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind))
     assert read.is_watertight
     assert read.is_winding_consistent
@@ -65,13 +65,13 @@ def test_trimesh_reads_back_a_watertight_solid_in_millimetres(solid, tmp_path, k
 
 
 @pytest.mark.parametrize("kind", PLAIN)
-def test_metres_are_written_when_asked_for(solid, tmp_path, kind):
+def test_meters_are_written_when_asked_for(solid, tmp_path, kind):
     read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), unit="m", kind=kind))
     np.testing.assert_allclose(read.bounds[1], solid[0].vertices.max(axis=0), rtol=0.0, atol=5e-9)  # float32
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
-def test_a_glb_is_in_metres_and_y_up_whatever_the_unit(solid, tmp_path, unit):
+def test_a_glb_is_in_meters_and_y_up_whatever_the_unit(solid, tmp_path, unit):
     content = mesh_writer.write(solid, tmp_path / "surface.glb", unit=unit).read_bytes()
     assert content[:4] == b"glTF"
     description = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])

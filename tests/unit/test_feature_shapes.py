@@ -223,7 +223,7 @@ def draw(name: str, arrangement: str, pitch: float, bed: Formed, found: list[Fea
     with empty(4.0, 4.4) as figure:
         axes = figure.add_axes((0.0, 0.0, 1.0, 0.9))
         x, y = bed.position.T * 1e3
-        axes.tricontourf(x, y, bed.raised * 1e3, levels=20, cmap="Greys_r")
+        axes.tricontourf(x, y, bed.raised * 1e3, levels=20, cmap="Grays_r")
         for number, one in enumerate(found):
             axes.plot(*(bed.position[one.pins].T * 1e3), ".", color=f"C{number}", markersize=2)
             for crest in one.crests:

@@ -159,7 +159,7 @@ def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
     np.testing.assert_array_equal(boss.pins, [12])
 
 
-def test_neighbours_exactly_at_the_threshold_leave_no_triangle_without_area():
+def test_neighbors_exactly_at_the_threshold_leave_no_triangle_without_area():
     place = grid(Layout(rows=5, columns=5)).positions
     height = np.zeros(25)
     height[[6, 7, 8, 9, 11, 14, 16, 17, 18, 19]] = 0.5
@@ -172,7 +172,7 @@ def test_neighbours_exactly_at_the_threshold_leave_no_triangle_without_area():
     assert len(np.unique(boss.region.place, axis=0)) == len(boss.region.place)
 
 
-def test_the_table_is_in_millimetres():
+def test_the_table_is_in_millimeters():
     head, row = table(features(formed(lambda x, y: ridge(x, y))))
     assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     assert row[:2] == ("boss_1", "ridge")

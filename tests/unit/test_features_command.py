@@ -66,7 +66,7 @@ def test_features_can_be_measured_from_a_later_surface(run: Path, capsys: pytest
     assert listed(capsys, "--former", "rest")[0]["depth"] == pytest.approx(whole["depth"], rel=1e-9)
 
 
-def test_a_threshold_is_in_millimetres_or_with_a_unit(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_threshold_is_in_millimeters_or_with_a_unit(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert listed(capsys, "--threshold", "1") == listed(capsys, "--threshold", "1000 um")
     assert listed(capsys, "--threshold", "1") != listed(capsys)
     assert listed(capsys, "--smallest", "81") == []
@@ -98,7 +98,7 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
 
 
 @pytest.mark.parametrize("said", ["0.8", "0.8 mm", "0.8mm", "800um"])
-def test_a_length_is_in_millimetres_or_has_a_unit_behind_it(
+def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(
     said: str, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--quiet"]) == 0

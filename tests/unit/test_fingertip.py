@@ -24,7 +24,7 @@ def random_poses(count: int) -> np.ndarray:
 
 
 def form(pose: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return centre and matrix A of the ellipsoid (p - c)ᵀ A (p - c) = 1; SciPy turns it."""
+    """Return center and matrix A of the ellipsoid (p - c)ᵀ A (p - c) = 1; SciPy turns it."""
     turn = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_matrix()
     squared = turn @ np.diag(axes**2) @ turn.T
     return pose[:3] + squared[:, 2] / np.sqrt(squared[2, 2]), np.linalg.inv(squared)
@@ -32,14 +32,14 @@ def form(pose: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def cut(pose: np.ndarray, axes: np.ndarray, x: float, y: float) -> float:
     """Return the lower of the heights at which the vertical through (x, y) cuts the ellipsoid."""
-    centre, a = form(pose, axes)
-    dx, dy = x - centre[0], y - centre[1]
+    center, a = form(pose, axes)
+    dx, dy = x - center[0], y - center[1]
     roots = np.roots(
         [a[2, 2], 2.0 * (a[0, 2] * dx + a[1, 2] * dy),
          a[0, 0] * dx * dx + 2.0 * a[0, 1] * dx * dy + a[1, 1] * dy * dy - 1.0]
     )  # fmt: skip
     assert np.isreal(roots).all()
-    return centre[2] + roots.real.min()
+    return center[2] + roots.real.min()
 
 
 def within(outline: np.ndarray, square: float, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,7 +78,7 @@ def test_the_underside_passes_through_the_position() -> None:
     assert at == pytest.approx(poses[:, 2], abs=1e-15)  # rounding
 
 
-def test_the_centre_of_a_level_finger_is_its_height_above_the_position() -> None:
+def test_the_center_of_a_level_finger_is_its_height_above_the_position() -> None:
     outline = Fingertip().outline(np.array([[1e-3, 2e-3, 50e-3, *LEVEL]]))[0]
     assert outline[:3] == pytest.approx([1e-3, 2e-3, 58e-3], abs=1e-17)
 

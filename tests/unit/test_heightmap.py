@@ -103,12 +103,12 @@ def test_a_picture_is_read_as_it_was_written(tmp_path: Path, bits: int, kind: ty
     assert np.array_equal(pixels(path), np.flipud(values))
 
 
-def test_a_coloured_picture_is_read_by_its_brightness(tmp_path: Path) -> None:
-    colours = np.zeros((2, 3, 3), np.uint8)
-    colours[0] = 255, 255, 255
-    colours[1, 1] = 255, 0, 0
-    Image.fromarray(colours).save(tmp_path / "colours.png")
-    read = pixels(tmp_path / "colours.png")
+def test_a_colored_picture_is_read_by_its_brightness(tmp_path: Path) -> None:
+    colors = np.zeros((2, 3, 3), np.uint8)
+    colors[0] = 255, 255, 255
+    colors[1, 1] = 255, 0, 0
+    Image.fromarray(colors).save(tmp_path / "colors.png")
+    read = pixels(tmp_path / "colors.png")
     assert read.shape == (2, 3)
     # 0.299 of 255: the weight of red in the brightness of the television standard Pillow follows.
     assert read.tolist() == [[0, 76, 0], [255, 255, 255]]

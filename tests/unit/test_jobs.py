@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.base.errors import SceneError
+from digiclay.core.base.errors import ParameterError, SceneError
 from digiclay.core.model.layout import grid
 from digiclay.core.scene.scene_source import SAMPLES, load
 from digiclay.core.scene.toml_table import format_scene
@@ -43,6 +43,12 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
     assert [(job.scene.method, job.scene.control.force_setpoint) for job in made.jobs[:4] if job.scene] == [
         ("virtual_master", 0.3), ("virtual_master", 0.6), ("cell_states", 0.3), ("cell_states", 0.6),
     ]  # fmt: skip
+
+
+def test_a_picture_of_an_older_file_has_its_color_under_the_former_key() -> None:
+    assert make_outputs({"still": {"colour": "force"}}).still == Still(color="force")
+    with pytest.raises(ParameterError, match="colour"):
+        make_outputs({"still": {"colour": "force", "color": "mode"}})
 
 
 def test_a_file_that_names_only_scenes_runs_each_as_it_is(tmp_path: Path) -> None:

@@ -45,12 +45,12 @@ def test_odd_rows_are_shifted(arrangement: str, shift: float) -> None:
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (5, 4), (6, 7)])
-def test_the_bed_is_centred_on_the_origin(arrangement: str, shape: tuple[int, int]) -> None:
+def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, int]) -> None:
     positions = grid(Layout(*shape, 3e-3, arrangement)).positions
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
 
 
-def test_inner_cells_of_a_hexagonal_bed_have_six_neighbours_a_pitch_away() -> None:
+def test_inner_cells_of_a_hexagonal_bed_have_six_neighbors_a_pitch_away() -> None:
     positions = table("hexagonal", 5, 5).reshape(-1, 2)
     away = np.linalg.norm(positions - positions[12], axis=1)
     assert np.isclose(away, 3e-3, rtol=1e-12).sum() == 6

@@ -186,7 +186,7 @@ def test_volumes_above_and_below_the_initial_surface_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    ("layout", "square_millimetres"),
+    ("layout", "square_millimeters"),
     [
         (Layout(rows=4, columns=3), 9.0),
         (Layout(rows=4, columns=3, arrangement="staggered"), 9.0),
@@ -195,8 +195,8 @@ def test_volumes_above_and_below_the_initial_surface_are_told_apart():
         (Layout(rows=3, columns=1), 9.0),
     ],
 )
-def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimetres):
-    assert cell_area(grid(layout).positions) == pytest.approx(square_millimetres * 1e-6, rel=1e-9)
+def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimeters):
+    assert cell_area(grid(layout).positions) == pytest.approx(square_millimeters * 1e-6, rel=1e-9)
 
 
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():

@@ -1,11 +1,11 @@
-"""The table of control modes: stored codes, meanings, colours."""
+"""The table of control modes: stored codes, meanings, colors."""
 
 from __future__ import annotations
 
 import itertools
 
 import numpy as np
-from digiclay.core.base.modes import COLOURS, MEANINGS, Mode
+from digiclay.core.base.modes import COLORS, MEANINGS, Mode
 
 
 def test_the_stored_codes_never_change() -> None:
@@ -20,19 +20,19 @@ def test_every_mode_has_a_meaning() -> None:
     assert MEANINGS.keys() == set(Mode)
 
 
-def test_every_mode_has_a_colour() -> None:
-    assert COLOURS.keys() == set(Mode)
+def test_every_mode_has_a_color() -> None:
+    assert COLORS.keys() == set(Mode)
 
 
-def test_colours_are_srgb() -> None:
-    values = np.array(list(COLOURS.values()))
+def test_colors_are_srgb() -> None:
+    values = np.array(list(COLORS.values()))
     assert values.min() >= 0.0
     assert values.max() <= 1.0
 
 
 def test_no_two_modes_look_alike() -> None:
     # 0.15 apart in the unit cube: the two nearest, the blues, are 0.4 apart.
-    pairs = itertools.combinations(np.array(list(COLOURS.values())), 2)
+    pairs = itertools.combinations(np.array(list(COLORS.values())), 2)
     assert min(np.linalg.norm(a - b) for a, b in pairs) > 0.15
 
 

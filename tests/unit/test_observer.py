@@ -162,14 +162,14 @@ def test_at_an_end_stop_the_last_estimate_is_held() -> None:
     high = {"actuator": {"rest_height": 99e-3}}
     away = [{"time": 0.0, "position": [0, 0, 0.15]}, {"time": 0.6, "position": [0, 0, 0.15]}]
     _, read = watched(scene(away, **high), lambda period: 0.8)
-    # It rises the millimetre in 15 periods. An open valve and no motion would otherwise mean that
+    # It rises the millimeter in 15 periods. An open valve and no motion would otherwise mean that
     # the finger holds the high reservoir, 157 mN.
     assert read.max() < 1e-3
 
 
 def test_the_first_period_already_tells_the_force() -> None:
     true, read = watched(scene(), lambda period: 0.5, 1)
-    # The pin gives way by a tenth of a millimetre in it, and the force with that.
+    # The pin gives way by a tenth of a millimeter in it, and the force with that.
     assert true[1] > 0.02
     assert abs(read[1] - true[1]) < 0.2 * true[1]
 
@@ -193,7 +193,7 @@ def test_noise_of_the_heights_is_noise_of_two_readings() -> None:
     cell = assemble(scene()).cell
     conductance = float(cell.flow.laminar_conductance(np.array([0.4]))[0])
     expected = math.sqrt(2.0) * cell.actuator.area**2 * noise / (PERIOD * conductance)
-    # Some hundred readings: their standard deviation is known to 7 %, and neighbours share a height.
+    # Some hundred readings: their standard deviation is known to 7 %, and neighbors share a height.
     assert abs(np.std((noisy - exact)[10:]) / expected - 1.0) < 0.3
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.base.modes import COLOURS, Mode
+from digiclay.core.base.modes import COLORS, Mode
 from digiclay.device import heat
-from digiclay.overlay.look import LETTERS, LINES, choose_colours, contrast
+from digiclay.overlay.look import LETTERS, LINES, choose_colors, contrast
 from digiclay.overlay.picture import Box, Picture, round_axis, scale_curve
 from digiclay.overlay.placement import find_room, lay_out
 from digiclay.overlay.sections import Readings
@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 DARK, LIGHT = (0.09, 0.09, 0.09), (0.93, 0.93, 0.93)
 CHANNEL = st.floats(0.0, 1.0)
-COLOUR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
+COLOR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
 ROOM = (0.0, 0.0, 900.0, 700.0)
 
 
@@ -36,7 +36,7 @@ def session(**changes: object) -> Readings:
         pins=(312, 40),
         heights=np.column_stack([0.04 + 0.001 * np.sin(time), np.full(1001, 0.035)]),
         modes=np.array([600, 10, 0, 15, 0, 0, 0, 0]),
-        colours=tuple(COLOURS[mode] for mode in Mode),
+        colors=tuple(COLORS[mode] for mode in Mode),
         seconds=5.0,
     )
     return replace(told, **changes)
@@ -49,19 +49,17 @@ def said(picture: Picture) -> str:
 
 @pytest.mark.parametrize("back", [DARK, LIGHT, (0.5, 0.5, 0.5)])
 def test_letters_and_curves_stand_out_from_any_theme(back: tuple[float, float, float]) -> None:
-    chosen = choose_colours(
-        back, back
-    )  # a theme with letters of the colour of the ground: the worst there is
+    chosen = choose_colors(back, back)  # a theme with letters of the color of the ground: the worst there is
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
     assert min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force)) >= LINES
 
 
-@given(COLOUR, COLOUR)
+@given(COLOR, COLOR)
 def test_every_theme_gets_letters_that_can_be_read(
     back: tuple[float, float, float], ink: tuple[float, float, float]
 ) -> None:
-    assert contrast(choose_colours(back, ink).ink, back) >= LETTERS
+    assert contrast(choose_colors(back, ink).ink, back) >= LETTERS
 
 
 def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
@@ -69,7 +67,7 @@ def test_the_contrast_of_black_and_white_is_that_of_the_guidelines() -> None:
 
 
 def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None:
-    words = said(lay_out(session(), choose_colours(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0))
     for part in (
         "Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
         "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister",
@@ -80,19 +78,19 @@ def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None
 def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:
     force = np.full(1001, 0.4)
     force[900] = 180.0
-    assert "2 N" in said(lay_out(session(force=force), choose_colours(DARK, LIGHT), ROOM, 1.0)).split(" | ")
+    assert "2 N" in said(lay_out(session(force=force), choose_colors(DARK, LIGHT), ROOM, 1.0)).split(" | ")
 
 
 def test_errors_too_small_to_matter_are_not_spelled_out() -> None:
-    words = said(lay_out(session(errors=(9e-12, 0.0)), choose_colours(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(session(errors=(9e-12, 0.0)), choose_colors(DARK, LIGHT), ROOM, 1.0))
     assert "Solver error: about 0.01 µm or less, 0.01 mN or less" in words
 
 
-def test_the_colours_of_the_force_are_explained_while_pins_wear_them() -> None:
-    plain = lay_out(session(), choose_colours(DARK, LIGHT), ROOM, 1.0)
-    hot = lay_out(session(top=0.2), choose_colours(DARK, LIGHT), ROOM, 1.0)
+def test_the_colors_of_the_force_are_explained_while_pins_wear_them() -> None:
+    plain = lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0)
+    hot = lay_out(session(top=0.2), choose_colors(DARK, LIGHT), ROOM, 1.0)
     assert len(plain.boxes) == 1
-    assert [box.colour for box in hot.boxes[1:]] == list(heat.COLOURS)
+    assert [box.color for box in hot.boxes[1:]] == list(heat.COLORS)
     assert "Force on a pin | 0 N | 0.2 N" in said(hot)
 
 
@@ -101,7 +99,7 @@ def test_it_says_what_is_not_known_yet() -> None:
     told = session(
         factor=None, errors=None, set_point=None, time=empty, force=empty, heights=np.empty((0, 2)), method=""
     )
-    words = said(lay_out(told, choose_colours(DARK, LIGHT), ROOM, 1.0))
+    words = said(lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0))
     assert "Solver error: not estimated yet" in words
     assert "Method: none" in words
     assert "real time" not in words
@@ -110,7 +108,7 @@ def test_it_says_what_is_not_known_yet() -> None:
 
 def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
     told = session(heights=np.full((1001, 2), np.nan))
-    picture = lay_out(told, choose_colours(DARK, LIGHT), ROOM, 1.0)
+    picture = lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
     assert "312: | 40:" in said(picture)
     for line in picture.lines:
         assert np.isfinite(line.points).all()
@@ -118,7 +116,7 @@ def test_pins_picked_just_now_have_no_past_and_are_drawn_all_the_same() -> None:
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
 def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) -> None:
-    picture = lay_out(session(), choose_colours(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
+    picture = lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
     (box,) = picture.boxes
     assert box.width == 290.0 * scale
     points = [line.points for line in picture.lines]
@@ -132,24 +130,24 @@ def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) ->
 
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
-    colours = choose_colours(DARK, LIGHT)
-    full = lay_out(session(), colours, ROOM, 1.0)
-    low = lay_out(session(), colours, (0.0, 0.0, 900.0, 240.0), 1.0)
-    middling = lay_out(session(), colours, (0.0, 0.0, 900.0, 320.0), 1.0)
+    colors = choose_colors(DARK, LIGHT)
+    full = lay_out(session(), colors, ROOM, 1.0)
+    low = lay_out(session(), colors, (0.0, 0.0, 900.0, 240.0), 1.0)
+    middling = lay_out(session(), colors, (0.0, 0.0, 900.0, 320.0), 1.0)
     assert ("Heights" in said(middling), "Pins by mode" in said(middling)) == (False, True)
     assert "Pins by mode" in said(full)
     assert "Total force" in said(low)
     assert "Pins by mode" not in said(low)
     assert low.boxes[0].height <= 240.0
-    assert lay_out(session(), colours, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
-    assert lay_out(session(), colours, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
+    assert lay_out(session(), colors, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
+    assert lay_out(session(), colors, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
 
 
 def test_panels_over_the_view_are_kept_clear_of() -> None:
     assert find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)]) == (
         50.0, 0.0, 700.0, 648.0,
     )  # fmt: skip
-    right = lay_out(session(), choose_colours(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
+    right = lay_out(session(), choose_colors(DARK, LIGHT), (50.0, 0.0, 700.0, 648.0), 1.0).boxes[0]
     assert right.x + right.width <= 700.0
 
 
@@ -172,7 +170,7 @@ def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> 
 
 
 def test_the_set_point_is_the_dashed_line_at_its_height() -> None:
-    picture = lay_out(session(set_point=0.25), choose_colours(DARK, LIGHT), ROOM, 1.0)
+    picture = lay_out(session(set_point=0.25), choose_colors(DARK, LIGHT), ROOM, 1.0)
     (dashed,) = (line for line in picture.lines if line.dashed)
     low, high = (line.points[0, 1] for line in picture.lines[:2])
     share = (dashed.points[0, 1] - low) / (high - low)

@@ -66,7 +66,7 @@ def test_the_extension_never_imports_what_stands_beside_it() -> None:
 
 
 @pytest.mark.parametrize("package", BESIDE.values(), ids=BESIDE)
-def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbour(package: Path) -> None:
+def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbor(package: Path) -> None:
     others = {name for name, path in BESIDE.items() if path != package}
     wrong = [
         f"{path.relative_to(ROOT)}:{line}: {target}"

@@ -222,7 +222,7 @@ def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_
     np.testing.assert_array_equal(shown.get_xdata(), time[within])
     np.testing.assert_array_equal(shown.get_ydata(), 1e3 * height[within, 84])
     assert np.diff(shown.get_xdata()).max() == pytest.approx(5e-3, rel=1e-9)
-    # The lift's own course, of millimetres, is left out: what remains is in micrometres.
+    # The lift's own course, of millimeters, is left out: what remains is in micrometers.
     rising = (time >= 2.4 - 1e-9) & (time <= 3.4 + 1e-9)
     assert np.ptp(height[rising, 84]) > 2e-3
     assert np.abs(lift.get_lines()[0].get_ydata()).max() < 100.0

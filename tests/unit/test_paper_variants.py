@@ -90,7 +90,7 @@ def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(
 def test_without_noise_the_finger_is_located_where_it_is_held() -> None:
     one = located(0.0, None, thresholds=True)
     assert (one.radius, one.losses) == (8e-3, 0)
-    assert one.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimetres, and far below one
+    assert one.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters, and far below one
 
 
 def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well() -> None:

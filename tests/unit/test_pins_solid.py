@@ -1,4 +1,4 @@
-"""The stepped bed as one body, beside trimesh's judgement and volumes worked out by hand."""
+"""The stepped bed as one body, beside trimesh's judgment and volumes worked out by hand."""
 
 from __future__ import annotations
 

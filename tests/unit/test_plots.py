@@ -82,7 +82,7 @@ def test_a_method_without_a_set_point_has_neither_it_nor_a_deviation_in_the_pict
     assert "RFD" not in words
 
 
-def test_the_session_shows_the_chosen_cells_in_millimetres():
+def test_the_session_shows_the_chosen_cells_in_millimeters():
     case = drag()
     lines = axes(plots.session_figure(case, SetPoint(0.4)), "heights").get_lines()
     cells = plots.session_cells(case)
@@ -123,7 +123,7 @@ def test_each_of_two_strokes_shows_its_start_middle_and_end():
     case["total_force"] = np.where((case["time"] > 3.0) & (case["time"] < 7.0), 0.0, case["total_force"])
     x = case["position"][plots.session_cells(case), 0]
     expected = np.interp([1, 2, 3, 7, 8, 9], case["time"], case["fingertip"][:, 0])
-    # To the nearest pin, half a pitch, from the nearest row, half a millimetre.
+    # To the nearest pin, half a pitch, from the nearest row, half a millimeter.
     np.testing.assert_allclose(x, expected, rtol=0.0, atol=2e-3)
 
 
@@ -135,7 +135,7 @@ def test_without_contact_the_cells_that_moved_most_are_shown():
     assert 30 in plots.session_cells(case)
 
 
-def test_the_surface_has_millimetres_on_every_axis_and_a_colour_bar():
+def test_the_surface_has_millimeters_on_every_axis_and_a_color_bar():
     figure = plots.surface_figure(drag())
     relief, plan = axes(figure, "relief"), axes(figure, "map")
     assert (relief.get_xlabel(), relief.get_ylabel(), relief.get_zlabel()) == (
@@ -174,7 +174,7 @@ def test_no_text_on_the_relief_hides_another(rows, columns, share):
     )
 
 
-def test_the_colour_bar_spans_the_final_heights():
+def test_the_color_bar_spans_the_final_heights():
     case = drag()
     low, high = axes(plots.surface_figure(case), "scale").get_ylim()
     final = case["height"][-1] * 1e3

@@ -99,7 +99,7 @@ def test_what_was_taken_back_within_one_press_does_not_count_again_before_the_fi
     # Put there by 32 bits, the finger is read a little beside; and stands on the pins as it stood.
     back = hand.move(back, [(1e3 * off, 38.0)] * 3)
     assert len(back.gestures) == 1
-    # Under a finger at rest pins still settle by hundredths of a millimetre, of 2 mm pressed.
+    # Under a finger at rest pins still settle by hundredths of a millimeter, of 2 mm pressed.
     np.testing.assert_allclose(heights(back), first, rtol=0, atol=5e-5)
     again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
     assert len(again.gestures) == 2

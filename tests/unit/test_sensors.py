@@ -1,4 +1,4 @@
-"""Sensor models: noise, quantisation and delay, and what a session makes of them."""
+"""Sensor models: noise, quantization and delay, and what a session makes of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from digiclay.core.base.errors import ParameterError, SceneError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
-from digiclay.core.model.sensors import Delayed, Noisy, Quantised, Sensing, draw_normals
+from digiclay.core.model.sensors import Delayed, Noisy, Quantized, Sensing, draw_normals
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -110,7 +110,7 @@ def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
 
 
 def test_readings_are_the_nearest_whole_steps() -> None:
-    sensors, seen = Quantised(PerfectSensors(), 0.25, 0.125), truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
+    sensors, seen = Quantized(PerfectSensors(), 0.25, 0.125), truth(0, [0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
     force, height = sensors.measure(np.empty((0, 3)), seen)
     # Steps that are powers of two: not even a rounding error is allowed.
     assert force.tolist() == [0.25, 0.5, 0.0]
@@ -119,10 +119,10 @@ def test_readings_are_the_nearest_whole_steps() -> None:
 
 def test_a_step_of_zero_rounds_nothing() -> None:
     seen = truth(0, [0.3], [0.31])
-    assert Quantised(PerfectSensors(), 0.0, 0.125).measure(np.empty((0, 1)), seen)[0] is seen.force
+    assert Quantized(PerfectSensors(), 0.0, 0.125).measure(np.empty((0, 1)), seen)[0] is seen.force
 
 
-def test_noise_is_quantised_too() -> None:
+def test_noise_is_quantized_too() -> None:
     system = assemble(scene("sensors.force_noise=5 mN", "sensors.force_step=1 mN"))
     force, _ = system.sensors.measure(np.empty((0, 9)), truth(1, [0.02] * 9, [0.04] * 9))
     np.testing.assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
@@ -141,7 +141,7 @@ def test_the_floor_is_five_standard_deviations_and_half_a_step(
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0, 7.5])
 def test_no_force_reads_below_the_floor(step: float) -> None:
     known = Sensing(force_noise=1.0, force_step=step)
-    sensors = Quantised(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
+    sensors = Quantized(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
     nothing = (truth(period, [0.0] * CELLS, [0.04] * CELLS) for period in range(PERIODS))
     read = max(float(sensors.measure(np.empty((0, CELLS)), seen)[0].max()) for seen in nothing)
     # 200 000 readings: one in 3.5 million would be above.

@@ -35,7 +35,7 @@ def laid(what: Any, bed: Any = BED, **known: Any) -> Fitted:
 def box(wide: float, deep: float, high: float) -> Any:
     """Return a box standing on z = 0, mm."""
     solid = trimesh.creation.box((wide, deep, high))
-    solid.apply_translation((70.0, -30.0, high / 2))  # wherever it stands, it is centred
+    solid.apply_translation((70.0, -30.0, high / 2))  # wherever it stands, it is centered
     return mesh(solid)
 
 
@@ -72,7 +72,7 @@ def test_in_its_own_size_a_shape_is_as_large_as_its_file_says() -> None:
 def test_scale_and_shift_move_the_plan() -> None:
     raised = table(laid(box(10, 10, 5), fit="actual", scale=0.5, x=9e-3, y=-6e-3)) > 0
     row, column = np.nonzero(raised)
-    # 5 mm wide about (9, -6) mm: one pin, and none of its neighbours 3 mm away.
+    # 5 mm wide about (9, -6) mm: one pin, and none of its neighbors 3 mm away.
     assert (row.tolist(), column.tolist()) == ([4], [15])
 
 
@@ -97,7 +97,7 @@ def test_a_true_relief_is_as_high_as_the_plan_makes_it() -> None:
     assert table(laid(box(10, 10, 5), relief="true")).max() == 19.5
 
 
-def test_a_map_of_heights_is_true_in_metres_whatever_its_plan() -> None:
+def test_a_map_of_heights_is_true_in_meters_whatever_its_plan() -> None:
     values = np.linspace(0.0, 7e-3, 12).reshape(3, 4)
     cells = laid(height_map("x.npy", values, 1.0), relief="true", fit="stretch")
     assert np.ptp(cells.heights) == pytest.approx(7e-3, abs=ROUNDING)
@@ -139,7 +139,7 @@ def test_overhangs_are_told() -> None:
 
 
 def test_a_level_picture_makes_a_level_bed() -> None:
-    assert np.all(laid(height_map("grey.png", np.full((4, 4), 99))).heights == REST)
+    assert np.all(laid(height_map("gray.png", np.full((4, 4), 99))).heights == REST)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])

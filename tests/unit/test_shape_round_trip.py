@@ -60,7 +60,7 @@ def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None
 
 
 @pytest.mark.parametrize("format", [kind for kind in FORMATS if kind != "glb"])
-def test_a_file_in_metres_comes_back_too(tmp_path: Path, format: str) -> None:
+def test_a_file_in_meters_comes_back_too(tmp_path: Path, format: str) -> None:
     cells, formed = bed(2.3, "staggered")
     path = tmp_path / f"formed{suffix(format)}"
     back = read_back(cells, formed, Model(), path, format, unit="m")

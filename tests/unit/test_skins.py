@@ -34,7 +34,7 @@ def covered(formed: Formed, skin: str, parts: int) -> Sheet:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("skin", SKINS)
 @pytest.mark.parametrize("parts", [1, 2, 5])
-def test_a_skin_passes_through_every_pin_top_to_a_micrometre(skin, arrangement, parts):
+def test_a_skin_passes_through_every_pin_top_to_a_micrometer(skin, arrangement, parts):
     formed = bed(arrangement)
     sheet = covered(formed, skin, parts)
     assert len(sheet.place) == (6 * parts + 1) * (8 * parts + 1)
@@ -128,7 +128,7 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
 def test_a_skin_is_nowhere_above_or_below_the_pins_about_it(skin, arrangement):
     formed = bed(arrangement, rows=6, columns=6, seed=4)
     sheet = covered(formed, skin, 4)
-    # The pins of the own cell and the cells beside it: a line between two shifted rows has its neighbours
+    # The pins of the own cell and the cells beside it: a line between two shifted rows has its neighbors
     # in either of them.
     away = np.linalg.norm(sheet.place[:, None] - formed.position, axis=2)
     near = away <= 1.6 * formed.pitch

@@ -82,7 +82,7 @@ def test_a_state_taken_up_may_be_used_up() -> None:
 
 def test_the_bytes_of_a_default_bed_are_few() -> None:
     system = assemble(resolve({}))
-    # 10 rows of float64, the time of ageing and a mode for each of 625 cells, and a header.
+    # 10 rows of float64, the time of aging and a mode for each of 625 cells, and a header.
     assert len(snapshot.dump(system, begin(system))) < 625 * (8 * system.rows.count + 9) + 1000
 
 

@@ -13,7 +13,7 @@ from digiclay.core.session.snapshot_memory import flatten, rebuild
 from numpy.typing import NDArray
 
 
-class Colour(IntEnum):
+class Color(IntEnum):
     """Something a controller might remember."""
 
     RED = 1
@@ -30,21 +30,21 @@ class Inner(NamedTuple):
 class Outer(NamedTuple):
     """A memory with everything in it."""
 
-    colour: Colour
+    color: Color
     inner: Inner
     table: NDArray[np.float64]
     count: int = 0
 
 
 def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
-    memory = Outer(Colour.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
+    memory = Outer(Color.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
     arrays: list[NDArray[Any]] = []
     text = flatten(memory, arrays)
-    back = rebuild(Outer(Colour.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
+    back = rebuild(Outer(Color.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
     assert back.table.tolist() == [[0.1, 2.0]]
-    assert [*back[:2], back.count] == [Colour.BLUE, Inner(-math.inf, True), 7]
-    assert [type(item) for item in (back.colour, back.inner.edge, back.inner.felt, back.count)] == [
-        Colour, float, bool, int,
+    assert [*back[:2], back.count] == [Color.BLUE, Inner(-math.inf, True), 7]
+    assert [type(item) for item in (back.color, back.inner.edge, back.inner.felt, back.count)] == [
+        Color, float, bool, int,
     ]  # fmt: skip
 
 
@@ -62,7 +62,7 @@ def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
 @pytest.mark.parametrize("count", [-1, 2**53 + 1, 1e30, -math.inf, 10**400])
 def test_a_memory_with_a_count_that_is_none_is_refused(count: Any) -> None:
     arrays = [np.zeros((0, 2))]
-    template = Outer(Colour.RED, Inner(), arrays[0])
+    template = Outer(Color.RED, Inner(), arrays[0])
     assert rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
     with pytest.raises(StateError, match="memory of the controller must be a Outer"):
         rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)

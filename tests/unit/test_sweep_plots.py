@@ -24,7 +24,7 @@ TWO = Column("layout.pitch", "m", (2.5e-3, 3e-3), False)
 WORDS = Column("blister.profile", "", ("cone", "gaussian", "flat"), False)
 
 
-def test_one_axis_is_a_line_with_markers_labelled_with_units() -> None:
+def test_one_axis_is_a_line_with_markers_labeled_with_units() -> None:
     picture = sweep_figure([ONE], "lag_mean", np.array([1e-3, 2e-3, 3e-3]))
     (axes,) = picture.axes
     (line,) = axes.get_lines()
@@ -44,7 +44,7 @@ def test_words_are_not_joined_by_a_line() -> None:
     assert picture.axes[0].get_lines()[0].get_linestyle() == "None"
 
 
-def test_two_axes_are_a_heat_map_labelled_with_units() -> None:
+def test_two_axes_are_a_heat_map_labeled_with_units() -> None:
     values = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, np.nan]])
     axes, scale = sweep_figure([ONE, TWO], "rfd", values).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")

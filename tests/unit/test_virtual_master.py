@@ -143,11 +143,11 @@ def moved(memory: Master, *path_x: float) -> Master:
     return memory
 
 
-def test_a_slow_finger_gets_its_direction_once_it_has_travelled_far_enough() -> None:
+def test_a_slow_finger_gets_its_direction_once_it_has_traveled_far_enough() -> None:
     assert moved(master(), *np.linspace(0, 1.6, 500)).heading[2:] == (1.0, 0.0)
 
 
-def test_a_finger_that_has_not_travelled_has_no_direction() -> None:
+def test_a_finger_that_has_not_traveled_has_no_direction() -> None:
     assert moved(master(), *np.linspace(0, 1.4, 500)).heading[2:] == (0.0, 0.0)
 
 

@@ -118,7 +118,7 @@ def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
 EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
 
 
-def test_cells_behind_a_travelling_finger_keep_their_command() -> None:
+def test_cells_behind_a_traveling_finger_keep_their_command() -> None:
     _, orders = created(master(*EAST), ridge())
     assert (orders.mode[at(-12, 0)], orders.target[at(-12, 0)]) == (Mode.FROZEN, 44e-3)
 

@@ -230,14 +230,14 @@ def look(name: str) -> None:
 
 
 def shot(name: str) -> None:
-    """Leave a picture of the screen, and note how many colours it has."""
+    """Leave a picture of the screen, and note how many colors it has."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
     command = ["import", "-window", "root", str(file)]
     subprocess.run(command, check=True, timeout=120, capture_output=True)
     image = bpy.data.images.load(str(file))
-    SEEN.setdefault("colours", {})[name] = len(
+    SEEN.setdefault("colors", {})[name] = len(
         np.unique(np.array(image.pixels[:], np.float32).reshape(-1, image.channels), axis=0)
     )
     bpy.data.images.remove(image)

@@ -153,7 +153,7 @@ def disabled(blender: Any) -> Iterator[float | None]:
 
 
 def shown(blender: Any) -> Iterator[float | None]:
-    """Pick pins, colour by force, show arrows, in the light theme and at another scale."""
+    """Pick pins, color by force, show arrows, in the light theme and at another scale."""
     bed = blender.beds()[0]
     window = bpy.context.window_manager.windows[0]
     window.view_layer.objects.active = bed
@@ -169,7 +169,7 @@ def shown(blender: Any) -> Iterator[float | None]:
     note(blender, "picked")
     yield from drag(blender, [(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
     display = blender.beds()[0].digiclay_display
-    display.colour, display.arrows = "force", True
+    display.color, display.arrows = "force", True
     yield 1.0
     note(blender, "forces shown")
     blender.shot("press_forces")
@@ -179,7 +179,7 @@ def shown(blender: Any) -> Iterator[float | None]:
     bpy.ops.script.execute_preset(
         filepath=f"{theme}/Blender_Light.xml", menu_idname="USERPREF_MT_interface_theme_presets"
     )
-    display.colour, display.arrows = "mode", False
+    display.color, display.arrows = "mode", False
     yield 1.5
     blender.shot("press_light")
     preferences.view.ui_scale = 1.5

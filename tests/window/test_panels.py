@@ -17,16 +17,16 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_every_panel_is_drawn_unfolded_without_a_complaint(seen: dict[str, Any]) -> None:
     pictures = "start all device device_rest finger control control_rest stale"
-    assert set(seen["colours"]) == {f"panels_{name}" for name in pictures.split()}
+    assert set(seen["colors"]) == {f"panels_{name}" for name in pictures.split()}
     # What Blender prints when a panel's draw fails, or asks for a property there is not.
     complaints = ("rna_uiItemR", "property not found", "AttributeError", "unknown operator")
     assert [word for word in complaints if word in seen["output"]] == []
 
 
 def test_the_panels_differ_from_picture_to_picture(seen: dict[str, Any]) -> None:
-    # Shaded pins have thousands of colours; the empty scene of the start has far fewer than a bed.
-    assert seen["colours"]["panels_start"] < seen["colours"]["panels_all"]
-    assert min(seen["colours"].values()) > 500
+    # Shaded pins have thousands of colors; the empty scene of the start has far fewer than a bed.
+    assert seen["colors"]["panels_start"] < seen["colors"]["panels_all"]
+    assert min(seen["colors"].values()) > 500
 
 
 def test_rebuild_tells_what_does_not_go_together_and_then_rebuilds(seen: dict[str, Any]) -> None:

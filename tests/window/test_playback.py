@@ -80,6 +80,6 @@ def test_the_overlay_writes_into_one_quarter_of_a_quad_view_and_marks_picked_pin
 
 
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
-    # Shaded pins and a shaded fingertip have thousands of colours, a blank screen has one.
-    assert len(seen["colours"]) == 4
-    assert min(seen["colours"].values()) > 1000
+    # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
+    assert len(seen["colors"]) == 4
+    assert min(seen["colors"].values()) > 1000

@@ -12,7 +12,7 @@ from tests.window.blender_window import played
 #: Pins the valley is drawn over, 6 mm off the middle row of 25, and their columns.
 ROW, COLUMNS = 14, slice(8, 17)
 REST = 40.0
-#: Pins settle by tenths of a millimetre while the finger leaves and after; the valley is 3.5 mm deep.
+#: Pins settle by tenths of a millimeter while the finger leaves and after; the valley is 3.5 mm deep.
 SETTLING = 0.5
 
 
@@ -102,6 +102,6 @@ def test_disabled_with_the_tool_in_hand_the_extension_leaves_the_first_one_there
 
 
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
-    # Shaded pins and a shaded fingertip have thousands of colours, a blank screen has one.
-    assert len(seen["colours"]) == 5
-    assert min(seen["colours"].values()) > 500
+    # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
+    assert len(seen["colors"]) == 5
+    assert min(seen["colors"].values()) > 500

@@ -9,7 +9,7 @@ import pytest
 
 from tests.window.blender_window import played
 
-#: Pins come to rest by hundredths of a millimetre for some time after the finger has left them.
+#: Pins come to rest by hundredths of a millimeter for some time after the finger has left them.
 SETTLING = 0.1e-3
 
 
@@ -114,8 +114,8 @@ def test_esc_stops_the_session_and_the_bed_keeps_what_was_formed(seen: dict[str,
 
 @pytest.mark.parametrize("name", ["ridge", "lifted", "undone", "paused", "loaded", "stopped"])
 def test_every_screenshot_shows_more_than_an_empty_window(seen: dict[str, Any], name: str) -> None:
-    # Shaded pins and a shaded fingertip have thousands of colours, a blank screen has one.
-    assert seen["colours"][f"session_{name}"] > 1000
+    # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
+    assert seen["colors"][f"session_{name}"] > 1000
 
 
 @pytest.fixture(scope="module")
@@ -202,4 +202,4 @@ def test_after_random_events_a_bed_can_be_formed(tried: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("name", ["random", "after_random"])
 def test_the_screenshots_of_random_events_are_pictures(tried: dict[str, Any], name: str) -> None:
-    assert tried["colours"][f"session_{name}"] > 500
+    assert tried["colors"][f"session_{name}"] > 500

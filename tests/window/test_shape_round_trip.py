@@ -48,5 +48,5 @@ def test_a_sample_is_added_and_taken_back_as_one_step(seen: dict[str, Any]) -> N
 
 
 def test_the_pictures_show_more_than_an_empty_window(seen: dict[str, Any]) -> None:
-    # Shaded pins have hundreds of colours, a blank screen has one.
-    assert min(seen["colours"].values()) > 200
+    # Shaded pins have hundreds of colors, a blank screen has one.
+    assert min(seen["colors"].values()) > 200

@@ -10,7 +10,7 @@ import pytest
 from tests.window.blender_window import played
 
 REST = 40.0
-#: Pins come to rest by hundredths of a millimetre for some time after the finger has left them; mm.
+#: Pins come to rest by hundredths of a millimeter for some time after the finger has left them; mm.
 SETTLING = 0.1
 
 
@@ -79,7 +79,7 @@ def test_esc_in_a_bake_changes_nothing_and_gives_the_frame_back(seen: dict[str, 
 def test_a_baked_take_plays_and_no_session_starts_on_it(seen: dict[str, Any]) -> None:
     assert seen["baked"]["is baked"]
     assert not seen["session on a bake"]
-    assert np.ptp(seen["played"]) > 10e-3  # the fingertip goes down by a centimetre of the device: 0.1
+    assert np.ptp(seen["played"]) > 10e-3  # the fingertip goes down by a centimeter of the device: 0.1
 
 
 def test_freeing_the_bake_brings_back_the_beds_own_state(seen: dict[str, Any]) -> None:
@@ -88,11 +88,11 @@ def test_freeing_the_bake_brings_back_the_beds_own_state(seen: dict[str, Any]) -
 
 
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
-    # Shaded pins and a shaded fingertip have thousands of colours, a blank screen has one.
-    assert set(seen["colours"]) == {
+    # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
+    assert set(seen["colors"]) == {
         "guide_ridge", *(f"takes_{name}" for name in ("recording", "replaying", "baking", "played"))
     }  # fmt: skip
-    assert min(seen["colours"].values()) > 1000
+    assert min(seen["colors"].values()) > 1000
 
 
 @pytest.fixture(scope="module")

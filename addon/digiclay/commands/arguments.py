@@ -15,7 +15,7 @@ from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 
 __all__ = [
-    "Help", "add_command", "add_run", "add_scene", "length", "millimetres", "scene_of", "seconds",
+    "Help", "add_command", "add_run", "add_scene", "length", "millimeters", "scene_of", "seconds",
     "settings_of", "size", "told_as_options",
 ]  # fmt: skip
 
@@ -152,12 +152,12 @@ def seconds(text: str) -> float:
 
 
 def length(text: str) -> float:
-    """Read a length: a number of metres, or a quantity such as ``"20 um"``; in m."""
+    """Read a length: a number of meters, or a quantity such as ``"20 um"``; in m."""
     return _measured(text, "m", "m")
 
 
-def millimetres(text: str) -> float:
-    """Read a length: a number of millimetres, or a quantity such as ``"500 um"``; in m."""
+def millimeters(text: str) -> float:
+    """Read a length: a number of millimeters, or a quantity such as ``"500 um"``; in m."""
     return _measured(text, "mm", "m")
 
 

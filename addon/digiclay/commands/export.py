@@ -18,7 +18,7 @@ from ..core.session.finished_run import read_run
 from ..core.surface.body import Body
 from ..core.surface.features import Finding
 from ..core.surface.formed import of_history
-from .arguments import add_run, millimetres, seconds
+from .arguments import add_run, millimeters, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
@@ -46,7 +46,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--kind", choices=tuple(KINDS), default="solid", help=f"{shown}; default solid")
     add_surface(parser)
     parser.add_argument(
-        "--base-thickness", metavar="L", type=millimetres,
+        "--base-thickness", metavar="L", type=millimeters,
         help="base under the lowest point, mm, or with a unit; default: 3 mm",
     )  # fmt: skip
     parser.add_argument("--separate", action="store_true", help="one file a feature")

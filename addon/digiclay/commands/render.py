@@ -15,7 +15,7 @@ from ..core.base.run_folder import claim_files
 from ..core.metrics.summary import compute_metrics
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_last_touch, find_row, read_run
-from ..core.session.render_settings import COLOURS, ENGINES, Film, Still, Turntable
+from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from .arguments import add_run, seconds, size, told_as_options
 from .exit_codes import STOPPED
 from .progress import Counted
@@ -28,7 +28,7 @@ EXAMPLES = """\
 examples:
   digiclay render ridge_mound_valley
   digiclay render ridge_mound_valley --time 10 --size 800x500 --out ridge.png
-  digiclay render ridge_mound_valley --film --speed 2 --colour force
+  digiclay render ridge_mound_valley --film --speed 2 --color force
   digiclay render ridge_mound_valley --turntable --frames 48 --engine cycles
 """
 #: What a picture is called unless told otherwise.
@@ -55,8 +55,10 @@ def add(commands: Any) -> None:
     parser.add_argument("--size", metavar="WxH", type=size, help="default 1600x1000; 960x600 for films")
     parser.add_argument("--engine", choices=ENGINES, help="default cycles; workbench for films")
     parser.add_argument(
-        "--colour", choices=COLOURS, help="quantity shown by the colours of the pins; default: mode"
+        "--color", choices=COLORS, help="quantity shown by the colors of the pins; default: mode"
     )
+    # Scripts written for older versions have it so.
+    parser.add_argument("--colour", dest="color", choices=COLORS, help=argparse.SUPPRESS)
     parser.add_argument(
         "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default: in films only"
     )
@@ -123,7 +125,7 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
             raise DigiclayError(f"--{name} must be given with {wanted} only.")
     if arguments.film and arguments.time is not None:
         raise DigiclayError("--time must not be given with --film: give --start and --stop.")
-    names = ("engine", "colour", "arrows", *own)
+    names = ("engine", "color", "arrows", *own)
     given = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
     if kind is Still:
         given = {"engine": "cycles", "width": 1600, "height": 1000, **given}
@@ -183,7 +185,7 @@ def draw_still(
     from ..pictures.still import render_still
 
     instant = Instant.of(history, _row(history, looks.when, row), **sizes(scene))
-    names = ("width", "height", "engine", "samples", "colour", "arrows")
+    names = ("width", "height", "engine", "samples", "color", "arrows")
     return render_still(instant, out, **{name: getattr(looks, name) for name in names})
 
 

@@ -11,7 +11,7 @@ from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, find_row
 from ..core.surface.features import Finding
 from ..core.surface.skins import SKINS
-from .arguments import millimetres, seconds, told_as_options
+from .arguments import millimeters, seconds, told_as_options
 
 __all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]
 
@@ -29,7 +29,7 @@ def add_surface(parser: argparse.ArgumentParser) -> None:
     )
     known = Finding()
     parser.add_argument(
-        "--threshold", metavar="L", type=millimetres, default=known.threshold,
+        "--threshold", metavar="L", type=millimeters, default=known.threshold,
         help="least distance of a feature from the former surface, mm, or with a unit; "
         f"default {known.threshold * 1e3:g} mm",
     )  # fmt: skip

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..core.base.errors import OutputError
 from ..core.base.png import png
 from ..core.base.whole_files import write_whole
-from ..device.heat import COLOURS
+from ..device.heat import COLORS
 
 __all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]
 
@@ -73,7 +73,7 @@ def height_map(height: NDArray[np.float64], wide: int = WIDTH) -> NDArray[np.uin
     every = max(1, -(-max(height.shape) // wide))
     shown = height[::every, ::every][::-1]
     times = max(1, wide // max(shown.shape))
-    level = (shown - shown.min()) / max(float(np.ptp(shown)), 1e-9) * (len(COLOURS) - 1)
-    known = np.arange(len(COLOURS))
-    colours = np.stack([np.interp(level, known, channel) for channel in np.array(COLOURS).T], axis=-1)
-    return (colours * 255.0 + 0.5).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)
+    level = (shown - shown.min()) / max(float(np.ptp(shown)), 1e-9) * (len(COLORS) - 1)
+    known = np.arange(len(COLORS))
+    colors = np.stack([np.interp(level, known, channel) for channel in np.array(COLORS).T], axis=-1)
+    return (colors * 255.0 + 0.5).astype(np.uint8).repeat(times, axis=0).repeat(times, axis=1)

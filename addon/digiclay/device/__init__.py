@@ -1,1 +1,1 @@
-"""Device in Blender: bed, pins, fingertip, colours and arrows."""
+"""Device in Blender: bed, pins, fingertip, colors and arrows."""

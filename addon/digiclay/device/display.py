@@ -1,6 +1,6 @@
-"""Display properties of a bed: colours, arrows, overlay, picked pins.
+"""Display properties of a bed: colors, arrows, overlay, picked pins.
 
-Colours and arrows are settings of the bed's geometry nodes; these properties read and write
+Colors and arrows are settings of the bed's geometry nodes; these properties read and write
 them there, so that there is one place they stand in.
 """
 
@@ -21,9 +21,9 @@ from .node_tree import LENGTH
 
 __all__ = ["Display", "pick_pins", "picked_pins", "register", "unregister"]
 
-COLOURINGS = (
-    ("mode", "Mode", "Colour the pins by what they do"),
-    ("force", "Force", "Colour the pins by the force on them"),
+COLORINGS = (
+    ("mode", "Mode", "Color the pins by what they do"),
+    ("force", "Force", "Color the pins by the force on them"),
 )
 #: Marks a place no pin is picked for.
 NONE = -1
@@ -74,15 +74,15 @@ def _rewrite(bed: Any) -> None:
             return
 
 
-def _colour(display: Any) -> int:
+def _color(display: Any) -> int:
     bed = display.id_data
-    return 1 if view.is_drawn(bed) and view.colour_source(bed) == "force" else 0
+    return 1 if view.is_drawn(bed) and view.color_source(bed) == "force" else 0
 
 
-def _set_colour(display: Any, code: int) -> None:
+def _set_color(display: Any, code: int) -> None:
     bed = display.id_data
     if view.is_drawn(bed):
-        view.colour_by(bed, COLOURINGS[code][0])
+        view.color_by(bed, COLORINGS[code][0])
         _rewrite(bed)
 
 
@@ -100,12 +100,12 @@ def _set_arrows(display: Any, on: bool) -> None:
 
 def _top(display: Any) -> float:
     bed = display.id_data
-    return view.top_colour(bed) if view.is_drawn(bed) else heat.TOP
+    return view.top_color(bed) if view.is_drawn(bed) else heat.TOP
 
 
 def _set_top(display: Any, top: float) -> None:
     if view.is_drawn(display.id_data):
-        view.scale_colours(display.id_data, top)
+        view.scale_colors(display.id_data, top)
 
 
 def _length(display: Any) -> float:
@@ -125,16 +125,16 @@ def _take_overlay(display: Any, context: Any) -> None:
 class Display(bpy.types.PropertyGroup):
     """Display properties of a bed."""
 
-    colour: bpy.props.EnumProperty(
-        name="Colour",
-        description="Quantity shown by the colour of a pin",
-        items=COLOURINGS,
-        get=_colour,
-        set=_set_colour,
+    color: bpy.props.EnumProperty(
+        name="Color",
+        description="Quantity shown by the color of a pin",
+        items=COLORINGS,
+        get=_color,
+        set=_set_color,
     )
     top_force: bpy.props.FloatProperty(
-        name="Top Colour at (N)",
-        description="Force of the last colour, in N",
+        name="Top Color at (N)",
+        description="Force of the last color, in N",
         min=1e-3,
         max=1e3,
         soft_max=2.0,

@@ -1,4 +1,4 @@
-"""Force colours of pins: a dozen levels, distinct for any colour vision.
+"""Force colors of pins: a dozen levels, distinct for any color vision.
 
 Levels rather than a gradient, because a pin wears one of a few materials: that shows in Solid
 view, in Workbench and in Cycles alike. Numpy only, no Blender.
@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COLOURS", "NO_FORCE", "TOP", "level"]
+__all__ = ["COLORS", "NO_FORCE", "TOP", "level"]
 
-#: Force from which on a pin has the last colour, N; a gently pressing finger gives a cell a third of it.
+#: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of it.
 TOP = 0.2
 #: sRGB of a pin that nothing presses.
 NO_FORCE = (0.78, 0.79, 0.80)
 #: sRGB of the levels in the order of the force: viridis in twelve even steps, its darkest end left out.
-COLOURS = (
+COLORS = (
     (0.283, 0.116, 0.436),
     (0.269, 0.219, 0.510),
     (0.232, 0.318, 0.545),
@@ -33,7 +33,7 @@ COLOURS = (
 
 
 def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
-    """Return the level of each force: 0 without force, 1 to 12 for `COLOURS`.
+    """Return the level of each force: 0 without force, 1 to 12 for `COLORS`.
 
     Parameters
     ----------
@@ -42,4 +42,4 @@ def level(force: NDArray[np.float64], top: float = TOP) -> NDArray[np.int64]:
     top : float, optional
         From this force on all have the last level, N, above 0.
     """
-    return np.asarray(np.clip(np.ceil(force / top * len(COLOURS)), 0, len(COLOURS)), np.int64)
+    return np.asarray(np.clip(np.ceil(force / top * len(COLORS)), 0, len(COLORS)), np.int64)

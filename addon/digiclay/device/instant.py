@@ -36,7 +36,7 @@ class Instant:
     Attributes
     ----------
     position : ndarray (n, 2)
-        Axes of the pins, m, the bed's centre at the origin.
+        Axes of the pins, m, the bed's center at the origin.
     height : ndarray (n,)
         Pin tops above the bed's floor, m.
     mode : ndarray of int (n,)
@@ -46,7 +46,7 @@ class Instant:
     fingertip : ndarray (7,)
         Lowest point of the fingertip, m, and its orientation as a quaternion w, x, y, z.
     pitch : float
-        Distance between neighbouring pins, m.
+        Distance between neighboring pins, m.
     actuator : Actuator
         Gives the pins' thickness (bore), stroke and rest height.
     finger : Fingertip
@@ -105,7 +105,7 @@ class Instant:
     def at_rest(
         cls, layout: Layout, actuator: Actuator | None = None, finger: Fingertip | None = None
     ) -> Instant:
-        """Return a bed nobody has touched yet, the fingertip above its centre.
+        """Return a bed nobody has touched yet, the fingertip above its center.
 
         Parameters
         ----------

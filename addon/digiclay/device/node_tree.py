@@ -1,4 +1,4 @@
-"""Geometry nodes of a bed: pins, coloured by mode or by force, arrows on them, and the housing."""
+"""Geometry nodes of a bed: pins, colored by mode or by force, arrows on them, and the housing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .nodes import attribute, node, number, socket, switch
 from .parts import Sources
 
 __all__ = [
-    "ARROWS", "ARROW_LENGTH", "CASE", "COLOUR_BY_FORCE", "LEAST", "LENGTH", "SOURCES", "TOP_FORCE",
+    "ARROWS", "ARROW_LENGTH", "CASE", "COLOR_BY_FORCE", "LEAST", "LENGTH", "SOURCES", "TOP_FORCE",
     "bed_nodes",
 ]  # fmt: skip
 
@@ -20,8 +20,8 @@ CASE, SOURCES = "Housing", "Sources"
 
 #: Pins pushed below the deck keep this much of their length, rather than turning upside down.
 LEAST_STRETCH = 0.02
-#: Names of the settings: colours by force, and arrows.
-COLOUR_BY_FORCE, TOP_FORCE = "Colour by Force", "Top Colour at (N)"
+#: Names of the settings: colors by force, and arrows.
+COLOR_BY_FORCE, TOP_FORCE = "Color by Force", "Top Color at (N)"
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
@@ -43,7 +43,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     length : float
         Length of the pins in the collections, Blender units.
     unit : float
-        Blender units of a millimetre of the device.
+        Blender units of a millimeter of the device.
     """
     tree = bpy.data.node_groups.new("Digital Clay Pins", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -51,7 +51,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     _add_settings(tree)
     settings = node(tree, "NodeGroupInput", -1, 0)
     result = node(tree, "NodeGroupOutput", 9, 0)
-    force_on, top = settings.outputs[COLOUR_BY_FORCE], settings.outputs[TOP_FORCE]
+    force_on, top = settings.outputs[COLOR_BY_FORCE], settings.outputs[TOP_FORCE]
     level = _level_of_force(tree, top, len(Mode), 3)
     choice = node(tree, "GeometryNodeCollectionInfo", 4, 0)
     choice.name, choice.inputs["Collection"].default_value = SOURCES, sources.collection
@@ -76,8 +76,8 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
 
 def _add_settings(tree: Any) -> None:
     """Add what each bed may choose for itself."""
-    socket(tree, COLOUR_BY_FORCE, "NodeSocketBool", False, "Colour the pins by force, not by mode")
-    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last colour, in N")
+    socket(tree, COLOR_BY_FORCE, "NodeSocketBool", False, "Color the pins by force, not by mode")
+    socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last color, in N")
     socket(tree, ARROWS, "NodeSocketBool", False, "Draw the force on each pin as an arrow onto its top")
     socket(tree, ARROW_LENGTH, "NodeSocketFloat", LENGTH, "Length of the arrow of 1 N, in mm of the device")
 
@@ -108,10 +108,10 @@ def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
         Where in the tree they stand.
     """
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
-    per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLOURS)), top)
+    per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLORS)), top)
     levels = number(tree, "CEIL", 2, row + 1, number(tree, "MULTIPLY", 1, row + 1, force, per_newton))
     within = node(tree, "ShaderNodeClamp", 3, row + 1)
-    within.inputs["Max"].default_value = len(heat.COLOURS)
+    within.inputs["Max"].default_value = len(heat.COLORS)
     tree.links.new(levels, within.inputs["Value"])
     return number(tree, "ADD", 3.5, row, within.outputs["Result"], float(first))
 
@@ -129,7 +129,7 @@ def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: flo
     pins : bpy.types.NodeSocket
         The pins, drawn with and without arrows.
     unit : float
-        Blender units of a millimetre of the device.
+        Blender units of a millimeter of the device.
     row : float
         Where in the tree they stand.
 

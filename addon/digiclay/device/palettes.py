@@ -1,39 +1,39 @@
-"""Palettes of the modes: three sets, distinct for any colour vision."""
+"""Palettes of the modes: three sets, distinct for any color vision."""
 
 from __future__ import annotations
 
 from ..bridge import linear, srgb
 from ..compat import bpy, shader_nodes
-from ..core.base.modes import COLOURS, Mode
+from ..core.base.modes import COLORS, Mode
 from .roles import ROLE
 
-__all__ = ["DEFAULT", "PALETTES", "WORDS", "colour_of", "has_palette", "set_palette"]
+__all__ = ["DEFAULT", "PALETTES", "WORDS", "color_of", "has_palette", "set_palette"]
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 
-def _hex(code: str) -> Colour:
-    """Return the sRGB of a colour code."""
+def _hex(code: str) -> Color:
+    """Return the sRGB of a color code."""
     red, green, blue = (int(code[at : at + 2], 16) / 255 for at in (0, 2, 4))
     return red, green, blue
 
 
-def _palette(*codes: str) -> dict[Mode, Colour]:
-    """Return colour codes in the order of the modes."""
+def _palette(*codes: str) -> dict[Mode, Color]:
+    """Return color codes in the order of the modes."""
     return {mode: _hex(code) for mode, code in zip(Mode, codes, strict=True)}
 
 
 DEFAULT = "okabe_ito"
 #: sRGB of each mode.
-PALETTES: dict[str, dict[Mode, Colour]] = {
-    "okabe_ito": COLOURS,
+PALETTES: dict[str, dict[Mode, Color]] = {
+    "okabe_ito": COLORS,
     "tol_muted": _palette("dddddd", "332288", "ddcc77", "88ccee", "cc6677", "882255", "aa4499", "117733"),
     "brightness": _palette("ffffff", "252525", "d7d7d7", "aeaeae", "888888", "000000", "656565", "454545"),
 }
 WORDS = {
-    "okabe_ito": ("Okabe and Ito", "Eight clear colours, told apart with any kind of colour vision"),
-    "tol_muted": ("Tol, muted", "Paul Tol's quieter set, told apart with any kind of colour vision"),
-    "brightness": ("Brightness", "Shades of grey, for vision or print without colours"),
+    "okabe_ito": ("Okabe and Ito", "Eight clear colors, told apart with any kind of color vision"),
+    "tol_muted": ("Tol, muted", "Paul Tol's quieter set, told apart with any kind of color vision"),
+    "brightness": ("Brightness", "Shades of gray, for vision or print without colors"),
 }
 
 
@@ -42,22 +42,22 @@ def has_palette() -> bool:
     return any(_material(mode) is not None for mode in Mode)
 
 
-def colour_of(mode: Mode) -> Colour:
+def color_of(mode: Mode) -> Color:
     """Return the sRGB a mode has in the open file: that of its material, which may be the user's own."""
     material = _material(mode)
-    return COLOURS[mode] if material is None else srgb(material.diffuse_color)
+    return COLORS[mode] if material is None else srgb(material.diffuse_color)
 
 
 def set_palette(name: str) -> None:
-    """Give the materials of the modes in the open file the colours of a palette."""
-    for mode, colour in PALETTES[name].items():
+    """Give the materials of the modes in the open file the colors of a palette."""
+    for mode, color in PALETTES[name].items():
         material = _material(mode)
         if material is None:
             continue
-        material.diffuse_color = linear(colour)
+        material.diffuse_color = linear(color)
         for node in shader_nodes(material).nodes:
             if node.type == "BSDF_PRINCIPLED":
-                node.inputs["Base Color"].default_value = linear(colour)
+                node.inputs["Base Color"].default_value = linear(color)
 
 
 def _material(mode: Mode) -> bpy.types.Material | None:

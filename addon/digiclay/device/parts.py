@@ -9,7 +9,7 @@ import numpy as np
 from .. import bridge
 from ..bridge import SCALE
 from ..compat import bpy, shader_nodes
-from ..core.base.modes import COLOURS, Mode
+from ..core.base.modes import COLORS, Mode
 from . import heat, primitives
 from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
@@ -50,13 +50,13 @@ def marked(data: Any, name: str, role: str, collection: Any, parent: Any | None 
     return made
 
 
-def material(name: str, colour: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
+def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
     """Return the material of a part, as the user may have changed it, or make it.
 
     Parameters
     ----------
     name : str
-    colour : (float, float, float)
+    color : (float, float, float)
         sRGB, 0 to 1.
     roughness, alpha : float
         0 to 1.
@@ -66,10 +66,10 @@ def material(name: str, colour: tuple[float, float, float], roughness: float, al
         return found
     made = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
     made[ROLE] = name
-    made.diffuse_color = bridge.linear(colour, alpha)
+    made.diffuse_color = bridge.linear(color, alpha)
     made.roughness = roughness
     shader = next(node for node in shader_nodes(made).nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = bridge.linear(colour)
+    shader.inputs["Base Color"].default_value = bridge.linear(color)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["Alpha"].default_value = alpha
     return made
@@ -105,14 +105,14 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
     shape = primitives.rod(instant.actuator.bore / 2 * SCALE, length * SCALE, segments)
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
     mesh.materials.append(None)
-    looks = [(mode.name.lower(), COLOURS[mode]) for mode in Mode]
-    looks += [(f"force_{level:02d}", colour) for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS))]
+    looks = [(mode.name.lower(), COLORS[mode]) for mode in Mode]
+    looks += [(f"force_{level:02d}", color) for level, color in enumerate((heat.NO_FORCE, *heat.COLORS))]
     collection = bpy.data.collections.new("Digital Clay Parts")
     # The node that reads the collection sorts it by name: hence the number in front.
-    for code, (look, colour) in enumerate(looks):
+    for code, (look, color) in enumerate(looks):
         pin = marked(mesh, f"{code:02d} {look}", PIN, collection)
         pin.material_slots[0].link = "OBJECT"
-        pin.material_slots[0].material = material(look, colour, roughness=0.45)
+        pin.material_slots[0].material = material(look, color, roughness=0.45)
     arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", PIN, collection)
     case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", PIN, collection)
     return Sources(collection, arrow, case)

@@ -37,7 +37,7 @@ def rebuild(bed: Any) -> Scene:
     old_mesh, old_trees = bed.data, [modifier.node_group for modifier in _nodes(bed)]
     made = view.build(instant, bed.users_collection[0], lowest=0.0)
     bed.data = made.data
-    # The modifier stays, and with it how the bed is coloured; only what it draws is another.
+    # The modifier stays, and with it how the bed is colored; only what it draws is another.
     for kept, new in zip(_nodes(bed), _nodes(made), strict=False):
         kept.node_group = new.node_group
     tip = view.fingertip_of(bed)

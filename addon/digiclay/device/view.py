@@ -23,19 +23,19 @@ from ..core.engine.state import State
 from ..core.engine.system import System
 from . import parts
 from .instant import Instant
-from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOUR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
+from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
 from .parts import is_linked, material
 from .roles import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
 
 __all__ = [
-    "BED", "COLOURINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
-    "bed_of", "build", "colour_by", "colour_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
-    "is_drawn", "material", "scale_arrows", "scale_colours", "show", "show_arrows", "show_state",
-    "shows_arrows", "shows_force", "sources_of", "top_colour", "underside", "wants_force",
+    "BED", "COLORINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
+    "bed_of", "build", "color_by", "color_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
+    "is_drawn", "material", "scale_arrows", "scale_colors", "show", "show_arrows", "show_state",
+    "shows_arrows", "shows_force", "sources_of", "top_color", "underside", "wants_force",
 ]  # fmt: skip
 
-#: What the colour of a pin can tell.
-COLOURINGS = ("mode", "force")
+#: What the color of a pin can tell.
+COLORINGS = ("mode", "force")
 #: Name of the bed's modifier.
 MODIFIER = "Pins"
 
@@ -56,7 +56,7 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     Returns
     -------
     bpy.types.Object
-        The bed; the fingertip is its child. Its origin is the centre of the bed's floor.
+        The bed; the fingertip is its child. Its origin is the center of the bed's floor.
     """
     cells = bridge.points("Digital Clay", len(instant.height))
     bed = parts.marked(cells, cells.name, BED, collection)
@@ -132,8 +132,8 @@ def show_state(bed: Any, system: System, state: State) -> None:
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
 
 
-def colour_by(bed: Any, what: str) -> None:
-    """Colour the pins by what they do ("mode") or by the force on them ("force").
+def color_by(bed: Any, what: str) -> None:
+    """Color the pins by what they do ("mode") or by the force on them ("force").
 
     Parameters
     ----------
@@ -145,28 +145,28 @@ def colour_by(bed: Any, what: str) -> None:
     DigiclayError
         On another word, or when the bed's modifier is gone.
     """
-    if what not in COLOURINGS:
-        raise DigiclayError(f"view.colour_by must be one of {', '.join(COLOURINGS)} (got {what!r}).")
-    set_node_setting(_modifier(bed), COLOUR_BY_FORCE, what == "force")
+    if what not in COLORINGS:
+        raise DigiclayError(f"view.color_by must be one of {', '.join(COLORINGS)} (got {what!r}).")
+    set_node_setting(_modifier(bed), COLOR_BY_FORCE, what == "force")
 
 
-def colour_source(bed: Any) -> str:
-    """Return the quantity shown by the colour of the pins: "mode" or "force"."""
-    return "force" if node_setting(_modifier(bed), COLOUR_BY_FORCE) else "mode"
+def color_source(bed: Any) -> str:
+    """Return the quantity shown by the color of the pins: "mode" or "force"."""
+    return "force" if node_setting(_modifier(bed), COLOR_BY_FORCE) else "mode"
 
 
-def top_colour(bed: Any) -> float:
-    """Return the force from which on a pin has the last colour, N."""
+def top_color(bed: Any) -> float:
+    """Return the force from which on a pin has the last color, N."""
     return float(node_setting(_modifier(bed), TOP_FORCE))
 
 
 def shows_force(bed: Any) -> bool:
-    """Return whether the colours of the pins show the force on them."""
-    return is_drawn(bed) and colour_source(bed) == "force"
+    """Return whether the colors of the pins show the force on them."""
+    return is_drawn(bed) and color_source(bed) == "force"
 
 
-def scale_colours(bed: Any, top: float) -> None:
-    """Set the force from which on a pin has the last colour, N.
+def scale_colors(bed: Any, top: float) -> None:
+    """Set the force from which on a pin has the last color, N.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def scale_colours(bed: Any, top: float) -> None:
     top : float
         N.
     """
-    set_node_setting(_modifier(bed), TOP_FORCE, _positive("top colour", top, "N"))
+    set_node_setting(_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
@@ -278,7 +278,7 @@ def _modifier_of(bed: Any) -> Any | None:
     """Return the modifier that draws the pins, or None when the user has removed or changed it."""
     for modifier in bed.modifiers:
         tree = modifier.node_group if modifier.type == "NODES" else None
-        if tree is not None and COLOUR_BY_FORCE in tree.interface.items_tree:
+        if tree is not None and ARROWS in tree.interface.items_tree:
             return modifier
     return None
 

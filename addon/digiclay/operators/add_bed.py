@@ -57,7 +57,7 @@ class AddBed(Action, bpy.types.Operator):
     )
     pitch: bpy.props.FloatProperty(
         name="Pitch (mm)",
-        description="Distance between neighbouring pins in a row, in mm",
+        description="Distance between neighboring pins in a row, in mm",
         default=DEFAULT.pitch * 1e3,
         min=Actuator().bore * 1e3,
         soft_max=20.0,
@@ -67,11 +67,11 @@ class AddBed(Action, bpy.types.Operator):
     )
     arrangement: bpy.props.EnumProperty(
         name="Arrangement",
-        description="Offset of neighbouring rows",
+        description="Offset of neighboring rows",
         items=[
             ("aligned", "Aligned", "A square grid"),
             ("staggered", "Staggered", "Every other row shifted by half a pitch, rows one pitch apart"),
-            ("hexagonal", "Hexagonal", "Every other row shifted, six neighbours at the same distance"),
+            ("hexagonal", "Hexagonal", "Every other row shifted, six neighbors at the same distance"),
         ],
         default=DEFAULT.arrangement,
     )
@@ -86,7 +86,7 @@ class AddBed(Action, bpy.types.Operator):
     )
     scale: bpy.props.FloatProperty(
         name="Scale (cm/mm)",
-        description="Scale of the device: centimetres in Blender for a millimetre of the device",
+        description="Scale of the device: centimeters in Blender for a millimeter of the device",
         default=1.0,
         min=0.001,
         soft_min=0.1,
@@ -156,9 +156,9 @@ def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
     scene : Scene
     instant : Instant
     """
-    coloured = palettes.has_palette()
+    colored = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
-    if not coloured:
+    if not colored:
         palettes.set_palette(preferences.get(context).palette)
     properties.write_scene(bed, scene)
     return bed

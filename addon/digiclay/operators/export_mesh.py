@@ -45,7 +45,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     )
     unit: bpy.props.EnumProperty(
         name="Unit",
-        description="Length unit of the file; a GLB is always in metres",
+        description="Length unit of the file; a GLB is always in meters",
         items=[(name, name, f"Lengths in {name}") for name in UNITS],
         default="mm",
     )

@@ -103,7 +103,7 @@ class SurfaceOptions(FindingOptions):
         )
 
     def draw_surface(self, layout: Any) -> None:
-        """Draw the properties; those without effect on what is made are greyed out."""
+        """Draw the properties; those without effect on what is made are grayed out."""
         layout.prop(self, "kind")
         column = layout.column()
         column.active = self.kind != "pins"

@@ -31,7 +31,7 @@ RELIEFS = (
 )
 
 
-def millimetres(name: str, default: float, words: str) -> Any:
+def millimeters(name: str, default: float, words: str) -> Any:
     """Make a property of a length.
 
     Parameters
@@ -59,13 +59,13 @@ class Shaped(Action):
     scale: bpy.props.FloatProperty(
         name="Times", description="Scale of the plan", default=1.0, min=1e-3, max=1e3
     )
-    x: millimetres("Right", DEFAULT.x, "Shift of its middle from the bed's along x")
-    y: millimetres("Back", DEFAULT.y, "Shift of its middle from the bed's along y")
+    x: millimeters("Right", DEFAULT.x, "Shift of its middle from the bed's along x")
+    y: millimeters("Back", DEFAULT.y, "Shift of its middle from the bed's along y")
     relief: bpy.props.EnumProperty(
         name="Height", description="Height of the shape", items=RELIEFS, default=DEFAULT.relief
     )
-    rise: millimetres("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")
-    foot: millimetres("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")
+    rise: millimeters("Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over")
+    foot: millimeters("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest")
 
     @classmethod
     def poll_message(cls, context: Any) -> str:
@@ -167,7 +167,7 @@ class ShapeFromFile(Shaped, FileAction, bpy.types.Operator):
     )
     unit: bpy.props.EnumProperty(
         name="Unit",
-        description="Unit of length of a mesh; automatic: metres in a glTF file, else millimetres",
+        description="Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
     )
 

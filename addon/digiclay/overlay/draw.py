@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from .look import Colour
+from .look import Color
 from .picture import Box, Dot, Floats, Line, Picture, Words
 
 __all__ = ["cursor", "draw"]
@@ -35,7 +35,7 @@ def draw(picture: Picture, width: float, height: float) -> None:
     gpu.state.blend_set("ALPHA")
     try:
         for box in picture.boxes:
-            _fill(_corners(box), [(0, 1, 2), (0, 2, 3)], box.colour, box.alpha)
+            _fill(_corners(box), [(0, 1, 2), (0, 2, 3)], box.color, box.alpha)
         for line in picture.lines:
             _stroke(line, (width, height))
         for dot in picture.dots:
@@ -75,7 +75,7 @@ def _stroke(line: Line, size: tuple[float, float]) -> None:
     shader.bind()
     shader.uniform_float("viewportSize", size)
     shader.uniform_float("lineWidth", line.width)
-    shader.uniform_float("color", (*line.colour, 1.0))
+    shader.uniform_float("color", (*line.color, 1.0))
     batch.draw(shader)
 
 
@@ -97,22 +97,22 @@ def _dot(dot: Dot) -> None:
     """Draw a filled circle."""
     turn = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     rim = np.column_stack([dot.x + dot.radius * np.cos(turn), dot.y + dot.radius * np.sin(turn)])
-    _fill(rim, [(0, i, i + 1) for i in range(1, CORNERS - 1)], dot.colour, 1.0)
+    _fill(rim, [(0, i, i + 1) for i in range(1, CORNERS - 1)], dot.color, 1.0)
 
 
-def _fill(points: Floats, triangles: list[tuple[int, int, int]], colour: Colour, alpha: float) -> None:
+def _fill(points: Floats, triangles: list[tuple[int, int, int]], color: Color, alpha: float) -> None:
     """Fill a convex shape."""
     shader: Any = gpu.shader.from_builtin("UNIFORM_COLOR")
     batch = batch_for_shader(shader, "TRIS", {"pos": points.astype(np.float32)}, indices=triangles)
     shader.bind()
-    shader.uniform_float("color", (*colour, alpha))
+    shader.uniform_float("color", (*color, alpha))
     batch.draw(shader)
 
 
 def _write(words: Words) -> None:
     """Write a line of text."""
     blf.size(FONT, words.size)
-    blf.color(FONT, *words.colour, 1.0)
+    blf.color(FONT, *words.color, 1.0)
     x = words.x - blf.dimensions(FONT, words.text)[0] if words.to_the_right_end else words.x
     blf.position(FONT, round(x), round(words.y), 0.0)
     blf.draw(FONT, words.text)

@@ -1,4 +1,4 @@
-"""Colours of the overlay, with contrast in any theme.
+"""Colors of the overlay, with contrast in any theme.
 
 Numpy only, no Blender.
 """
@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Colour", "Look", "choose_colours", "contrast"]
+__all__ = ["Color", "Look", "choose_colors", "contrast"]
 
 #: sRGB.
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 #: Curves of picked pins: Okabe and Ito's palette, in the order in which they are told apart best.
-CURVES: tuple[Colour, ...] = (
+CURVES: tuple[Color, ...] = (
     (0.34, 0.71, 0.91),
     (0.90, 0.62, 0.00),
     (0.00, 0.62, 0.45),
@@ -30,25 +30,25 @@ BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class Look:
-    """Colours of the overlay: background, text, faint text, frames, force, set point, pins."""
+    """Colors of the overlay: background, text, faint text, frames, force, set point, pins."""
 
-    back: Colour
-    ink: Colour
-    faint: Colour
-    frame: Colour
-    force: Colour
-    set_point: Colour
-    pins: tuple[Colour, ...]
+    back: Color
+    ink: Color
+    faint: Color
+    frame: Color
+    force: Color
+    set_point: Color
+    pins: tuple[Color, ...]
 
 
-def choose_colours(back: Colour, ink: Colour) -> Look:
-    """Choose all colours to go with those of the theme.
+def choose_colors(back: Color, ink: Color) -> Look:
+    """Choose all colors to go with those of the theme.
 
     Parameters
     ----------
-    back : Colour
-        The theme's colour behind letters.
-    ink : Colour
+    back : Color
+        The theme's color behind letters.
+    ink : Color
         The theme's letters; replaced by black or white where they could not be read.
     """
     ink = make_legible(ink, back, INK)
@@ -59,47 +59,47 @@ def choose_colours(back: Colour, ink: Colour) -> Look:
         frame=_mix(ink, back, 0.75),
         force=ink,
         set_point=make_legible(CURVES[4], back, LINES),
-        pins=tuple(make_legible(colour, back, LINES) for colour in CURVES),
+        pins=tuple(make_legible(color, back, LINES) for color in CURVES),
     )
 
 
-def contrast(one: Colour, other: Colour) -> float:
-    """Return the contrast of two colours as the guidelines define it, 1 to 21.
+def contrast(one: Color, other: Color) -> float:
+    """Return the contrast of two colors as the guidelines define it, 1 to 21.
 
     Parameters
     ----------
     one, other : (float, float, float)
-        Colours.
+        Colors.
     """
     low, high = sorted((_luminance(one), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
 
-def make_legible(colour: Colour, back: Colour, least: float) -> Colour:
-    """Return a colour, mixed with as much black or white as it needs for a contrast to what is behind it.
+def make_legible(color: Color, back: Color, least: float) -> Color:
+    """Return a color, mixed with as much black or white as it needs for a contrast to what is behind it.
 
     Parameters
     ----------
-    colour, back : (float, float, float)
-        The colour, and what is behind it.
+    color, back : (float, float, float)
+        The color, and what is behind it.
     least : float
         Contrast, 1 to 21.
     """
     end = WHITE if contrast(WHITE, back) >= contrast(BLACK, back) else BLACK
     for share in np.linspace(0.0, 1.0, 41):
-        mixed = _mix(colour, end, float(share))
+        mixed = _mix(color, end, float(share))
         if contrast(mixed, back) >= least:
             return mixed
     return end
 
 
-def _mix(one: Colour, other: Colour, share: float) -> Colour:
-    """Return a colour with a share of another."""
+def _mix(one: Color, other: Color, share: float) -> Color:
+    """Return a color with a share of another."""
     r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
     return r, g, b
 
 
-def _luminance(colour: Colour) -> float:
-    """Return the relative luminance of an sRGB colour."""
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+def _luminance(color: Color) -> float:
+    """Return the relative luminance of an sRGB color."""
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return 0.2126 * r + 0.7152 * g + 0.0722 * b

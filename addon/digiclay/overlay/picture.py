@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .look import Colour
+from .look import Color
 
 __all__ = ["Box", "Dot", "Line", "Picture", "Words", "round_axis", "scale_curve"]
 
@@ -22,7 +22,7 @@ class Box:
     y: float
     width: float
     height: float
-    colour: Colour
+    color: Color
     alpha: float = 1.0
 
 
@@ -31,7 +31,7 @@ class Line:
     """Line through points (k, 2), pixels; solid or dashed."""
 
     points: Floats
-    colour: Colour
+    color: Color
     width: float
     dashed: bool = False
 
@@ -43,7 +43,7 @@ class Dot:
     x: float
     y: float
     radius: float
-    colour: Colour
+    color: Color
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Words:
     x: float
     y: float
     size: float
-    colour: Colour
+    color: Color
     text: str
     to_the_right_end: bool = False
 

@@ -1,4 +1,4 @@
-"""Sections of the overlay: head, force and set point, colours, heights of picked pins, modes.
+"""Sections of the overlay: head, force and set point, colors, heights of picked pins, modes.
 
 Each says how tall it is and draws itself. No Blender in here.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..core.base.modes import Mode
 from ..core.model.finger_range import MOST_FORCE
 from ..device import heat
-from .look import Colour, Look
+from .look import Color, Look
 from .picture import Box, Dot, Floats, Line, Picture, Words, round_axis, scale_curve
 
 __all__ = ["SECTIONS", "Pen", "Readings", "error_message"]
@@ -52,12 +52,12 @@ class Readings:
         Their heights, m; NaN where they were not followed yet.
     modes : ndarray of int (8,)
         Number of pins in each mode.
-    colours : tuple of Colour
+    colors : tuple of Color
         Of the modes, as the pins wear them.
     seconds : float
         How much of the past is shown, s.
     top : float or None
-        Force from which on a pin has the last colour, N; None while the colours tell the modes.
+        Force from which on a pin has the last color, N; None while the colors tell the modes.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Readings:
     pins: tuple[int, ...]
     heights: Floats
     modes: NDArray[np.int64]
-    colours: tuple[Colour, ...]
+    colors: tuple[Color, ...]
     seconds: float
     top: float | None = None
 
@@ -84,7 +84,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class Pen:
-    """Target of a section's drawing: picture, colours, position, width, scale."""
+    """Target of a section's drawing: picture, colors, position, width, scale."""
 
     picture: Picture
     look: Look
@@ -104,11 +104,11 @@ class Pen:
             In small letters.
         """
         size = (SMALL if small else LETTERS) * self.scale
-        colour = self.look.faint if small else self.look.ink
+        color = self.look.faint if small else self.look.ink
         y = top - 0.75 * ROW * self.scale
         for x, text, at_right in ((self.x, left, False), (self.x + self.width, right, True)):
             if text:
-                self.picture.words.append(Words(x, y, size, colour, text, at_right))
+                self.picture.words.append(Words(x, y, size, color, text, at_right))
         return top - ROW * self.scale
 
     def frame(self, top: float, low: str, high: str) -> Box:
@@ -145,10 +145,10 @@ class Pen:
         pin : int
             Which pin of the plot; below 0: the force.
         """
-        colour = self.look.force if pin < 0 else self.look.pins[pin]
+        color = self.look.force if pin < 0 else self.look.pins[pin]
         points = scale_curve(told.time, value, told.window, ends, box)
         if len(points) > 1:
-            self.picture.lines.append(Line(points, colour, 1.5 * self.scale))
+            self.picture.lines.append(Line(points, color, 1.5 * self.scale))
 
 
 def error_message(errors: tuple[float, float] | None) -> str:
@@ -232,18 +232,18 @@ def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
 
 
 def _scale_height(told: Readings) -> float:
-    """Return the height of the scale of colours, pixels at a UI scale of 1; 0 while none is needed."""
+    """Return the height of the scale of colors, pixels at a UI scale of 1; 0 while none is needed."""
     return 0.0 if told.top is None else 2.6 * ROW
 
 
 def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
-    """Draw the colours of the force on a pin."""
+    """Draw the colors of the force on a pin."""
     if told.top is None:
         return
     top = pen.row(top, "Force on a pin")
-    width, height = pen.width / len(heat.COLOURS), 0.5 * ROW * pen.scale
-    for place, colour in enumerate(heat.COLOURS):
-        pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, colour))
+    width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
+    for place, color in enumerate(heat.COLORS):
+        pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, color))
     pen.row(top - height, "0 N", f"{told.top:.3g} N", small=True)
 
 
@@ -253,12 +253,12 @@ def _modes_height(told: Readings) -> float:
 
 
 def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
-    """List how many pins are in each mode that occurs, with its colour."""
+    """List how many pins are in each mode that occurs, with its color."""
     top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):
         x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
         mode = Mode(int(code))
-        _entry(pen, x, y, told.colours[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
+        _entry(pen, x, y, told.colors[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
 
 
 def _size(error: float, unit: str) -> str:
@@ -266,12 +266,12 @@ def _size(error: float, unit: str) -> str:
     return f"{error:.2g} {unit}" if error >= 0.01 else f"0.01 {unit} or less"
 
 
-def _entry(pen: Pen, x: float, y: float, colour: tuple[float, float, float], text: str) -> None:
+def _entry(pen: Pen, x: float, y: float, color: tuple[float, float, float], text: str) -> None:
     """Draw a dot and what it stands for."""
     radius, size = 4.0 * pen.scale, (SMALL + 1.0) * pen.scale
     middle = y + 0.36 * size
     pen.picture.dots.append(Dot(x + radius, middle, radius + pen.scale, pen.look.frame))
-    pen.picture.dots.append(Dot(x + radius, middle, radius, colour))
+    pen.picture.dots.append(Dot(x + radius, middle, radius, color))
     pen.picture.words.append(Words(x + 3.5 * radius, y, size, pen.look.ink, text))
 
 

@@ -18,7 +18,7 @@ from ..core.model.set_point import find_set_point
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import project
-from .look import Look, choose_colours
+from .look import Look, choose_colors
 from .picture import Dot, Picture
 from .placement import Room, find_room, lay_out
 from .sections import Readings
@@ -70,7 +70,7 @@ def _again() -> float:
 
 
 def read_session(
-    bed: Any, session: running.Running, colours: dict[Mode, tuple[float, float, float]]
+    bed: Any, session: running.Running, colors: dict[Mode, tuple[float, float, float]]
 ) -> Readings:
     """Return the content of the overlay for a bed and its session.
 
@@ -78,7 +78,7 @@ def read_session(
     ----------
     bed : bpy.types.Object
     session : Running
-    colours : dict of Mode to (float, float, float)
+    colors : dict of Mode to (float, float, float)
     """
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else find_set_point(scene.set_point, 0))
@@ -95,9 +95,9 @@ def read_session(
         pins=trace.pins,
         heights=trace.heights,
         modes=np.bincount(session.state.mode(), minlength=len(Mode)),
-        colours=tuple(colours[mode] for mode in Mode),
+        colors=tuple(colors[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
-        top=view.top_colour(bed) if view.shows_force(bed) else None,
+        top=view.top_color(bed) if view.shows_force(bed) else None,
     )
 
 
@@ -153,28 +153,28 @@ def _draw() -> None:
         return
     settings = context.preferences
     theme = settings.themes[0].user_interface.wcol_menu_back
-    colours = palettes.PALETTES[preferences.get(context).palette]
-    chosen = choose_colours(tuple(theme.inner[:3]), tuple(theme.text))
+    colors = palettes.PALETTES[preferences.get(context).palette]
+    chosen = choose_colors(tuple(theme.inner[:3]), tuple(theme.text))
     scale = settings.system.ui_scale
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
         picture = lay_out(
-            read_session(bed, session, colours), chosen, _room(context.area, context.region), scale
+            read_session(bed, session, colors), chosen, _room(context.area, context.region), scale
         )
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 
 
 def _marks(
-    context: Any, bed: Any, session: running.Running, colours: Look, picture: Picture, scale: float
+    context: Any, bed: Any, session: running.Running, colors: Look, picture: Picture, scale: float
 ) -> list[Dot]:
-    """Return a dot on every picked pin that the picture does not cover, in the colour of its curve."""
+    """Return a dot on every picked pin that the picture does not cover, in the color of its curve."""
     pins = session.trace.pins
     cells = session.system.grid.positions[list(pins)]
     places = project(context, bed, np.column_stack([cells, session.state.row(0)[list(pins)]]))
     marks = []
-    for (x, y), colour in zip(places, colours.pins, strict=False):
+    for (x, y), color in zip(places, colors.pins, strict=False):
         hidden = any(0 <= x - box.x < box.width and 0 <= y - box.y < box.height for box in picture.boxes)
         if math.isfinite(x) and not hidden:
-            marks += [Dot(x, y, 5.5 * scale, colours.back), Dot(x, y, 4.0 * scale, colour)]
+            marks += [Dot(x, y, 5.5 * scale, colors.back), Dot(x, y, 4.0 * scale, color)]
     return marks

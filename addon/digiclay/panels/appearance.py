@@ -1,4 +1,4 @@
-"""Sub-panel Display: colours, arrows, and content of the overlay."""
+"""Sub-panel Display: colors, arrows, and content of the overlay."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Display(Panel, bpy.types.Panel):
             layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
         column = layout.column()
         column.enabled = drawn
-        column.row().prop(shown, "colour", expand=True)
+        column.row().prop(shown, "color", expand=True)
         row = column.row()
-        row.active = shown.colour == "force"
+        row.active = shown.color == "force"
         row.prop(shown, "top_force")
         column.prop(shown, "arrows")
         row = column.row()

@@ -96,9 +96,9 @@ def draw_force_plot(front: Front, time: Floats, force: Floats, set_point: float 
     areas = []
     corners = np.arange(len(place) - 1)[:, None] * 2 + [0, 2, 3, 1]
     faces: list[tuple[int, ...]] = [tuple(face) for face in corners.tolist()]
-    for name, colour, layer in (("to come", TO_COME, 4), ("been", BEEN, 3)):
+    for name, color, layer in (("to come", TO_COME, 4), ("been", BEEN, 3)):
         area = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, height), faces)))
-        areas.append(front.put(area, left, bottom, colour, layer))
+        areas.append(front.put(area, left, bottom, color, layer))
     thick = max(0.010 * full, 0.5 * front.pixel)
     size = front.readable(0.80 * front.letter)
     above = bottom + rise + 0.35 * size

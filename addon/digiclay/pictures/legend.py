@@ -1,4 +1,4 @@
-"""Legend of the colours in a picture, on a plane in front of the device."""
+"""Legend of the colors in a picture, on a plane in front of the device."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
 
-__all__ = ["FADED", "INK", "LEFT", "Colour", "Front", "flat", "write_force_legend", "write_mode_legend"]
+__all__ = ["FADED", "INK", "LEFT", "Color", "Front", "flat", "write_force_legend", "write_mode_legend"]
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 #: sRGB of letters, and of what is less important.
 INK, FADED = (0.10, 0.12, 0.15), (0.30, 0.33, 0.37)
@@ -28,7 +28,7 @@ LEFT = -0.94
 LOWEST = -0.50
 #: Sizes of letters that can still be read, pixels: ordinary ones, what must be read beside them, and notes.
 READ, READ_BESIDE, READ_NOTE = 11.0, 10.0, 9.0
-#: What Workbench's studio light leaves of a colour that looks straight at the camera, measured.
+#: What Workbench's studio light leaves of a color that looks straight at the camera, measured.
 STUDIO = 0.48
 #: How much farther away the next layer behind is, as a part of the distance.
 LAYER = 1e-3
@@ -93,7 +93,7 @@ class Front:
         """Whether notes could be read."""
         return self.note >= READ_NOTE * self.pixel
 
-    def put(self, part: Any, x: float, y: float, colour: Colour, layer: int = 0) -> Any:
+    def put(self, part: Any, x: float, y: float, color: Color, layer: int = 0) -> Any:
         """Hang an object at a place of the plane; layers with a higher number lie behind.
 
         Parameters
@@ -101,7 +101,7 @@ class Front:
         part : bpy.types.Object
         x, y : float
             Place in the plane.
-        colour : (float, float, float)
+        color : (float, float, float)
         layer : int
             Higher numbers lie behind.
         """
@@ -109,13 +109,13 @@ class Front:
         part.parent = self.camera
         part.location = (x * behind, y * behind, -self.depth * behind)
         part.scale = tuple(side * behind for side in part.scale)
-        part.data.materials.append(flat(part.name, colour))
+        part.data.materials.append(flat(part.name, color))
         part.visible_shadow = part.visible_diffuse = part.visible_glossy = False
         part.display.show_shadows = False
         self.scene.collection.objects.link(part)
         return part
 
-    def write(self, body: str, size: float, x: float, y: float, colour: Colour, align: str = "LEFT") -> Any:
+    def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Any:
         """Write a text; return the object, whose `data.body` may be changed.
 
         Parameters
@@ -123,16 +123,16 @@ class Front:
         body : str
         size, x, y : float
             Size of the letters and place, in the plane.
-        colour : (float, float, float)
+        color : (float, float, float)
         align : str
             Blender's word for the side that stands at x.
         """
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
-        return self.put(bpy.data.objects.new(body, text), x, y, colour)
+        return self.put(bpy.data.objects.new(body, text), x, y, color)
 
     def box(
-        self, name: str, low: tuple[float, float], high: tuple[float, float], colour: Colour, layer: int
+        self, name: str, low: tuple[float, float], high: tuple[float, float], color: Color, layer: int
     ) -> Any:
         """Fill a rectangle from its lower left to its upper right corner; it is placed by the lower left.
 
@@ -141,18 +141,18 @@ class Front:
         name : str
         low, high : (float, float)
             Lower left and upper right corner.
-        colour : (float, float, float)
+        color : (float, float, float)
         layer : int
             Higher numbers lie behind.
         """
         width, height = high[0] - low[0], high[1] - low[1]
         corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
         part = bpy.data.objects.new(name, bridge.mesh(name, (corners, [(0, 1, 2, 3)])))
-        return self.put(part, *low, colour, layer)
+        return self.put(part, *low, color, layer)
 
 
 def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
-    """List modes down the picture's left side, each with a dot of its colour; small pictures explain none.
+    """List modes down the picture's left side, each with a dot of its color; small pictures explain none.
 
     Parameters
     ----------
@@ -166,10 +166,10 @@ def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
     for mode in modes:
         name = mode.name.lower().replace("_", " ")
         lines = textwrap.wrap(MEANINGS[mode], 26) if front.explains else []
-        for radius, colour, layer in ((0.42, palettes.colour_of(mode), 0), (0.47, FADED, 1)):
+        for radius, color, layer in ((0.42, palettes.color_of(mode), 0), (0.47, FADED, 1)):
             dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
             dot.scale = (radius * size,) * 3
-            front.put(dot, left, y + 0.33 * size, colour, layer)
+            front.put(dot, left, y + 0.33 * size, color, layer)
         x = left + 0.95 * size
         front.write(name, size, x, y, INK)
         if lines:
@@ -179,42 +179,42 @@ def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
 
 
 def write_force_legend(front: Front) -> None:
-    """Draw the levels of force as a bar of colours down the picture's left side, their forces beside it."""
-    size, count = front.letter, 1 + len(heat.COLOURS)
+    """Draw the levels of force as a bar of colors down the picture's left side, their forces beside it."""
+    size, count = front.letter, 1 + len(heat.COLORS)
     left, top = LEFT * front.width, 0.78 * front.height
     step = min(0.95 * size, (top - LOWEST * front.height) / count)
     front.write("force on a pin", size, left - 0.4 * size, top + 0.7 * size, INK)
     low = top - step * count
     edge = 0.05 * size
     front.box("edge", (left - edge, low - edge), (left + size + edge, top + edge), FADED, 1)
-    for level, colour in enumerate((heat.NO_FORCE, *heat.COLOURS)):
+    for level, color in enumerate((heat.NO_FORCE, *heat.COLORS)):
         y = low + step * level
-        front.box(f"level {level}", (left, y), (left + size, y + step), colour, 0)
+        front.box(f"level {level}", (left, y), (left + size, y + step), color, 0)
     x, small = left + 1.5 * size, front.readable(front.note)
     for level in range(0, count, 3):
-        force = 1e3 * heat.TOP * level / len(heat.COLOURS)
+        force = 1e3 * heat.TOP * level / len(heat.COLORS)
         said = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
         # Level 0 is no force at all; every other ends at its force.
         front.write(said, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
 
 
-def flat(name: str, colour: Colour) -> Any:
-    """Make a material of one colour that no light changes.
+def flat(name: str, color: Color) -> Any:
+    """Make a material of one color that no light changes.
 
     Parameters
     ----------
     name : str
-    colour : (float, float, float)
+    color : (float, float, float)
     """
     material = bpy.data.materials.new(name)
-    *light, alpha = linear(colour)
+    *light, alpha = linear(color)
     # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue allows.
     brighter = min(1.0 / STUDIO, 1.0 / max(light))
     material.diffuse_color = (*(part * brighter for part in light), alpha)
     material.roughness = 1.0
     tree = shader_nodes(material)
     emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value = linear(colour)
+    emission.inputs["Color"].default_value = linear(color)
     output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
     tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     return material

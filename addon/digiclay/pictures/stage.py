@@ -68,7 +68,7 @@ def set_up(
         _floor(scene, floor, 60.0 * span)
     _lights(scene)
     front = Front.before(scene, camera, half_frame(scene))
-    if view.colour_source(bed) == "force":
+    if view.color_source(bed) == "force":
         write_force_legend(front)
     else:
         write_mode_legend(front, instant.modes if modes is None else modes)
@@ -91,7 +91,7 @@ def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Flo
     -----
     A point at camera coordinates (u, v, -d) is inside when low d <= (u, v) <= high d. In
     each direction the two extreme points give a depth and an offset in closed form; the
-    larger depth counts, and the other direction is centred in what is then free.
+    larger depth counts, and the other direction is centered in what is then free.
     """
     seen = points @ axes.T
     across, back = seen[:, :2], seen[:, 2:]

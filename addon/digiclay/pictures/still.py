@@ -34,7 +34,7 @@ def render_still(
     engine: str = "cycles",
     samples: int = 6,
     denoise: bool = True,
-    colour: str = "mode",
+    color: str = "mode",
     arrows: bool = False,
 ) -> Path:
     """Draw an instant into a PNG file.
@@ -54,8 +54,8 @@ def render_still(
         Samples per pixel of Cycles; more is smoother and slower in proportion.
     denoise : bool, optional
         Smooth what few samples leave, where Blender was built with Cycles' denoiser.
-    colour : {"mode", "force"}, optional
-        What the colour of a pin tells.
+    color : {"mode", "force"}, optional
+        What the color of a pin tells.
     arrows : bool, optional
         Draw the force on each pin as an arrow.
 
@@ -71,7 +71,7 @@ def render_still(
     OutputError
         When the file cannot be written.
     """
-    looks = Still(width=width, height=height, engine=engine, samples=samples, colour=colour, arrows=arrows)
+    looks = Still(width=width, height=height, engine=engine, samples=samples, color=color, arrows=arrows)
     partial = out.with_name(f".{out.name}.{os.getpid()}.partial.png")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -90,14 +90,14 @@ def render_still(
 
 
 def apply_style(bed: Any, looks: Picture) -> None:
-    """Colour the pins as asked, and show arrows or not.
+    """Color the pins as asked, and show arrows or not.
 
     Parameters
     ----------
     bed : bpy.types.Object
     looks : Picture
     """
-    view.colour_by(bed, looks.colour)
+    view.color_by(bed, looks.color)
     view.show_arrows(bed, looks.arrows)
 
 
@@ -192,7 +192,7 @@ def _cycles(cycles: Any, samples: int, denoise: bool) -> None:
 
 
 def _workbench(display: Any) -> None:
-    """Plain colours, with shadows and edges that show slopes."""
+    """Plain colors, with shadows and edges that show slopes."""
     shading = display.shading
     display.render_aa = "16"
     display.light_direction = (0.45, 0.35, 0.82)

@@ -30,7 +30,7 @@ RESOLVED = 100
 
 
 def draw_map(axes: Any, history: History, title: str) -> None:
-    """Draw the final heights from above, with a colour bar.
+    """Draw the final heights from above, with a color bar.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ def draw_relief(axes: Any, history: History) -> None:
         bright = _quartered(bright)
     low, high = ends(top * MM, 1.0)
     level, light = bright[:, :, 2].mean(axis=1), bright[:, :, 3].mean(axis=1)
-    colour = colormaps["cividis"]((level - low) / (high - low))[:, :3] * light[:, None]
+    color = colormaps["cividis"]((level - low) / (high - low))[:, :3] * light[:, None]
     limits = [(side.min(), side.max()) for side in vertices.T]
     axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)), zlabel="height (mm)")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
     axes.view_init(elev=34, azim=-62)
     fit_relief(axes, np.ptp(vertices, axis=0), limits)
-    for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], colour)):
+    for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], color)):
         axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
 
 

@@ -40,17 +40,17 @@ def comparison(
     name : str
         Of the scene.
     """
-    colours = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
+    colors = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
     bar = 0.3
     high = bar * len(found) + 0.1
     height = 4.2 + 2 * (high + 0.85)
     with canvas(12.5, height, name) as (figure, place):
         force = place("force", 0.85, height - 3.6, 11.3, 2.5)
         for method, (time, total, _) in forces.items():
-            force.plot(time, total, color=colours[method], linewidth=1.4, label=method)
+            force.plot(time, total, color=colors[method], linewidth=1.4, label=method)
         for method, (time, _, wanted) in forces.items():
             if not np.all(np.isnan(wanted)):
-                force.plot(time, wanted, color=colours[method], linewidth=1.0, linestyle=(0, (5, 3)))
+                force.plot(time, wanted, color=colors[method], linewidth=1.0, linestyle=(0, (5, 3)))
         force.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="set points")
         force.set(xlabel="time (s)", ylabel="total force (N)", ylim=(0.0, None), title="Total force")
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
@@ -59,17 +59,17 @@ def comparison(
             row, column = divmod(number, 4)
             bottom = 0.3 + (1 - row) * (high + 0.85)
             axes = place(key, 0.4 + 3.02 * column, bottom, 2.35, high)
-            _bars(axes, [found[method][key] for method in found], list(colours.values()), factor)
+            _bars(axes, [found[method][key] for method in found], list(colors.values()), factor)
             axes.set_title(title, fontsize=11)
     return figure
 
 
-def _bars(axes: Any, values: list[float | None], colours: list[str], factor: float) -> None:
+def _bars(axes: Any, values: list[float | None], colors: list[str], factor: float) -> None:
     """Draw a bar a method, its value beside it; a dash where there is none."""
     longest = max((value * factor for value in values if value is not None), default=0.0) or 1.0
-    for line, (value, colour) in enumerate(zip(values, colours, strict=True)):
+    for line, (value, color) in enumerate(zip(values, colors, strict=True)):
         size = 0.0 if value is None else value * factor
-        axes.barh(-line, size, height=0.7, color=colour)
+        axes.barh(-line, size, height=0.7, color=color)
         said = "–" if value is None else f"{size:.3g}"
         axes.text(max(size, 0.0) + 0.03 * longest, -line, said, va="center", fontsize=11)
     axes.set(xlim=(0.0, 1.3 * longest), ylim=(-len(values) + 0.4, 0.6))

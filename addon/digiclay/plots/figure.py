@@ -1,8 +1,8 @@
-"""Common parts of all plots: style, colours, legend, writing.
+"""Common parts of all plots: style, colors, legend, writing.
 
 matplotlib is imported where it is used, and drawn with its Agg canvas only: no window, no
-global state. Colours are Okabe and Ito's palette and cividis, told apart by people with
-any colour vision; letters and markers say the same once more.
+global state. Colors are Okabe and Ito's palette and cividis, told apart by people with
+any color vision; letters and markers say the same once more.
 """
 
 from __future__ import annotations

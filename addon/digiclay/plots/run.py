@@ -73,9 +73,9 @@ def session_cells(history: History) -> list[int]:
     stretch, pressed = np.hypot(*np.diff(finger, axis=0).T), np.diff(touching) == 1
     # The way through the air to the next place is one step at most: its ends are worth a cell, no more.
     stretch[~pressed] = np.minimum(stretch[~pressed], stretch[pressed].sum() / (count - 2))
-    travelled = np.concatenate([[0.0], np.cumsum(stretch)])
-    steps = np.linspace(0.0, travelled[-1], count)
-    evenly = finger[np.argmin(np.abs(travelled - steps[:, None]), axis=1)]
+    traveled = np.concatenate([[0.0], np.cumsum(stretch)])
+    steps = np.linspace(0.0, traveled[-1], count)
+    evenly = finger[np.argmin(np.abs(traveled - steps[:, None]), axis=1)]
     nearest = np.argmin(np.sum((evenly[:, None] - position[None]) ** 2, axis=2), axis=1)
     return list(dict.fromkeys(nearest.tolist()))
 
@@ -103,10 +103,10 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             across = axes.get_xaxis_transform()
             axes.fill_between(time, 0, 1, where=in_contact(total), transform=across, color=SHADE, linewidth=0)
         draw_map(plan, history, "Where the cells are")
-        for name, colour, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
-            heights.plot(time, height[:, cell] * MM, color=colour, label=name)
+        for name, color, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
+            heights.plot(time, height[:, cell] * MM, color=color, label=name)
             spot = array(history, "position")[cell] * MM
-            disc = {"markersize": 16, "markeredgecolor": colour, "markeredgewidth": 2.6, "clip_on": False}
+            disc = {"markersize": 16, "markeredgecolor": color, "markeredgewidth": 2.6, "clip_on": False}
             plan.plot(*spot, "o", color="white", **disc)
             plan.annotate(name, spot, fontsize=10, fontweight="bold", ha="center", va="center_baseline")
         heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))

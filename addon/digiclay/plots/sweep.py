@@ -130,7 +130,7 @@ def _draw_map(axes: Axes, scale: Axes, columns: Sequence[Column], values: Floats
     if max(values.shape) <= WRITTEN:
         _write_values(axes, shown)
     elif np.isnan(values).any():
-        axes.text(1.0, 1.015, "grey: no result", transform=axes.transAxes, ha="right")
+        axes.text(1.0, 1.015, "gray: no result", transform=axes.transAxes, ha="right")
     figure: Any = axes.figure
     figure.colorbar(field, cax=scale, label=label).outline.set_visible(False)
     scale.grid(False)

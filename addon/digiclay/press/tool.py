@@ -22,7 +22,7 @@ __all__ = ["PressTool", "register", "touch_outline", "unregister"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
-#: Colours of the patch: a light line on a dark one is seen on everything.
+#: Colors of the patch: a light line on a dark one is seen on everything.
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 
 

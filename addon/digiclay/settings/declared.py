@@ -27,6 +27,9 @@ REACH = 10.0
 #: Fields that take a shape's name or file.
 SHAPED = ("shape", "field", "file")
 
+#: Labels of parameters whose names, stored in files, are spelled otherwise.
+LABELS = {"centring_time": "Centering Time"}
+
 Update = Callable[[Any, Any], None]
 
 
@@ -49,7 +52,7 @@ def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type
 
 def title(name: str) -> str:
     """Return a name of the core as a label: ``valve_lag`` is Valve Lag."""
-    return name.replace("_", " ").title()
+    return LABELS.get(name) or name.replace("_", " ").title()
 
 
 def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:

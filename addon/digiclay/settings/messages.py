@@ -23,14 +23,14 @@ def relabel(error: ParameterError) -> ParameterError:
     ``Layout: Pitch must be at least Actuator: Bore, 2 mm (got 1 mm)``.
     """
 
-    def labelled(found: re.Match[str]) -> str:
+    def labeled(found: re.Match[str]) -> str:
         return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
 
     owner, field = error.owner, title(error.field)
     if owner in SECTIONS:
         owner = f"{title(owner)}: {field}" if field else title(owner)
         field = ""
-    rule = convert_units(_NAME.sub(labelled, error.rule))
+    rule = convert_units(_NAME.sub(labeled, error.rule))
     return ParameterError(owner, field, rule, convert_units(error.value), error.hint)
 
 

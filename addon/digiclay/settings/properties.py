@@ -30,7 +30,7 @@ __all__ = [
 ]  # fmt: skip
 
 #: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
-#: a bed of metres, less than any change of pitch worth making.
+#: a bed of meters, less than any change of pitch worth making.
 AWAY = 1e-6
 
 

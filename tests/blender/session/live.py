@@ -44,7 +44,7 @@ def move(bed: Any, clock: Clock, places: Iterable[tuple[float, float]]) -> list[
     """Move the fingertip through places x, z of its lowest point, in mm, tick by tick."""
     notes = []
     for x, z in places:
-        # The semi-axis upwards is 8 mm: the empty is the ellipsoid's centre.
+        # The semi-axis upwards is 8 mm: the empty is the ellipsoid's center.
         view.fingertip_of(bed).location = np.array([x, 0.0, z + 8.0]) * 1e-3 * bridge.SCALE
         notes += clock.tick()
     return notes

@@ -1,14 +1,14 @@
-"""Control modes of a cell: one table of codes, names, meanings and colours.
+"""Control modes of a cell: one table of codes, names, meanings and colors.
 
 The codes are what ``history.npz`` stores and what the view maps to materials. The
-colours are Okabe and Ito's palette, told apart by people with any colour vision.
+colors are Okabe and Ito's palette, told apart by people with any color vision.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["COLOURS", "MEANINGS", "Mode"]
+__all__ = ["COLORS", "MEANINGS", "Mode"]
 
 
 class Mode(IntEnum):
@@ -36,7 +36,7 @@ MEANINGS: dict[Mode, str] = {
 }
 
 #: sRGB in [0, 1], one per mode.
-COLOURS: dict[Mode, tuple[float, float, float]] = {
+COLORS: dict[Mode, tuple[float, float, float]] = {
     Mode.REST: (0.78, 0.79, 0.80),
     Mode.HOLD: (0.00, 0.45, 0.70),
     Mode.EDGE: (0.95, 0.90, 0.25),

@@ -40,7 +40,7 @@ def monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     width = (knot[cell + 1] - knot[cell])[:, None]
     right = (inside - knot[cell])[:, None] / width
     left = 1.0 - right
-    # Written from the values' difference, so that equal neighbours give exactly their value.
+    # Written from the values' difference, so that equal neighbors give exactly their value.
     step = value[cell + 1] - value[cell]
     bent = width * left * right * (left * slope[cell] - right * slope[cell + 1])
     curve: Floats = value[cell] + right * right * (1.0 + 2.0 * left) * step + bent

@@ -42,7 +42,7 @@ class Blister(Parameters):
             raise ParameterError("Blister", "edge_radius", rule, f"{self.edge_radius:g} m")
 
     def evaluate_profile(self, distance: Floats) -> Floats:
-        """Return the profile p(r), 1 at the centre, for distances r inside the blister, m.
+        """Return the profile p(r), 1 at the center, for distances r inside the blister, m.
 
         *cone*: 1 on the flat top, then falling linearly to 0 at the radius.
         *gaussian*: ``exp(-r²/(2 σ²))``.

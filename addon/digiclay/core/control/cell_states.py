@@ -1,6 +1,6 @@
 """Method II: a state machine in every cell, driven by its own force (Fig. 5 of the paper).
 
-No coordinator: a cell pressed hard enough follows the force, its neighbours become a blister
+No coordinator: a cell pressed hard enough follows the force, its neighbors become a blister
 around it, those of them that feel the finger follow the force in turn, and so the contact
 set spreads and moves with the finger.
 """
@@ -207,7 +207,7 @@ class CellStatesControl:
     def _around(
         self, memory: Patch, seen: Measurement, mode: Modes, under: NDArray[np.bool_], target: Floats
     ) -> tuple[Patch, Modes, Floats]:
-        """Form the blister around the cells under the finger: their neighbourhoods superposed."""
+        """Form the blister around the cells under the finger: their neighborhoods superposed."""
         blister, place = self.blister, seen.place
         distance = np.sqrt(measure_square(place[1, under], place[2, under], place))
         nearest = distance.min(axis=0)

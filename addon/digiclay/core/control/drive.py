@@ -1,4 +1,4 @@
-"""Pin motion by speed, height or force: common part of the behaviours.
+"""Pin motion by speed, height or force: common part of the behaviors.
 
 A valve's flow goes with the square of its opening, so a height control that is proportional in the
 opening comes in like 1/t. Here the opening is worked out from the wanted speed instead, by the flow law
@@ -40,7 +40,7 @@ OPENINGS = np.linspace(0.0, 1.0, 129)
 
 @dataclass(frozen=True)
 class DriveParameters(ControlParameters):
-    """Parameters of the height control of every behaviour."""
+    """Parameters of the height control of every behavior."""
 
     settling_time: float = quantity(
         20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
@@ -50,7 +50,7 @@ class DriveParameters(ControlParameters):
 
 @dataclass(frozen=True)
 class TouchParameters(DriveParameters):
-    """Parameters of the behaviours that use the force on each cell."""
+    """Parameters of the behaviors that use the force on each cell."""
 
     felt_force: float = quantity(
         5e-3,

@@ -1,4 +1,4 @@
-"""Elastic behaviour: a pressed pin yields like a spring and returns."""
+"""Elastic behavior: a pressed pin yields like a spring and returns."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Elastic(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class ElasticControl(CellwiseControl):
-    """Controller of the elastic behaviour for a bed.
+    """Controller of the elastic behavior for a bed.
 
     Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
     """
@@ -54,7 +54,7 @@ class ElasticControl(CellwiseControl):
 
 
 def build(parameters: Elastic, device: DeviceInfo) -> ElasticControl:
-    """Put the elastic behaviour together for a device.
+    """Put the elastic behavior together for a device.
 
     Parameters
     ----------

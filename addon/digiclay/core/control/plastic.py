@@ -1,4 +1,4 @@
-"""Plastic behaviour: a pin above its yield force gives way and keeps its lowest height."""
+"""Plastic behavior: a pin above its yield force gives way and keeps its lowest height."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Plastic(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class PlasticControl(CellwiseControl):
-    """Controller of the plastic behaviour for a bed.
+    """Controller of the plastic behavior for a bed.
 
     Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
     the pin stays; left alone, it goes to the deepest height it was pressed to.
@@ -66,7 +66,7 @@ class PlasticControl(CellwiseControl):
 
 
 def build(parameters: Plastic, device: DeviceInfo) -> PlasticControl:
-    """Put the plastic behaviour together for a device.
+    """Put the plastic behavior together for a device.
 
     Parameters
     ----------

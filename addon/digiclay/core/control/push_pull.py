@@ -54,7 +54,7 @@ class PushPull(DriveParameters):
         0.1e-3, "commanded less measured height at which contact is detected", unit="m", symbol="θ", above=0.0
     )
     centring_time: float = quantity(
-        0.5, "time constant of a listening pin's centring", unit="s", symbol="τ_c", above=0.0
+        0.5, "time constant of a listening pin's centering", unit="s", symbol="τ_c", above=0.0
     )
     assist: float = quantity(
         0.5, "share of its last drift speed that a touched pin keeps", symbol="a", at_least=0.0, at_most=0.9
@@ -120,8 +120,8 @@ class PushPullControl:
         error = target - seen.height
         stroke = np.where(touched, known.following_speed, known.listening_speed)
         # Brought back in the rising half alone, and so at twice the speed.
-        centring = CYCLE * error / known.centring_time
-        swing = stroke + centring if rising else -stroke
+        centering = CYCLE * error / known.centring_time
+        swing = stroke + centering if rising else -stroke
         speed = np.where(listening, swing + known.assist * seen.own[1], self.drive.approach(error))
         formed = np.abs(target - self.actuator.rest_height) > known.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))

@@ -31,7 +31,7 @@ class Tracking(ControlParameters):
     )
     dead_band: float = declare_dead_band()
     travel: float = quantity(
-        1.5e-3, "distance travelled that determines the direction", unit="m", symbol="d_t", above=0.0
+        1.5e-3, "distance traveled that determines the direction", unit="m", symbol="d_t", above=0.0
     )
     behind: float = quantity(
         -0.3, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0

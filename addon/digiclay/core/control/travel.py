@@ -1,6 +1,6 @@
 """Direction of the fingertip, and the cells behind it (Fig. 6 of the paper).
 
-The direction is settled by distance travelled, not by speed: a finger that slows down or
+The direction is settled by distance traveled, not by speed: a finger that slows down or
 rests keeps its direction, and what it has formed is not called back.
 """
 
@@ -39,7 +39,7 @@ class Heading(NamedTuple):
 
 
 def update_heading(heading: Heading, x: float, y: float, travel: float) -> Heading:
-    """Return the heading of a finger; a new one once it has travelled far enough.
+    """Return the heading of a finger; a new one once it has traveled far enough.
 
     Parameters
     ----------

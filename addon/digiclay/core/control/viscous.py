@@ -1,6 +1,6 @@
-"""Viscous behaviour: a pressed pin sinks slowly, displaces its neighbours, and recovers slowly.
+"""Viscous behavior: a pressed pin sinks slowly, displaces its neighbors, and recovers slowly.
 
-What Materiable calls viscosity: every cell a spring and a damper, and neighbours evened out.
+What Materiable calls viscosity: every cell a spring and a damper, and neighbors evened out.
 """
 
 from __future__ import annotations
@@ -56,29 +56,29 @@ class Spot(NamedTuple):
 
 @dataclass(frozen=True)
 class Viscous(TouchParameters):
-    """Spring and damper in parallel under every pin, and the exchange between neighbours."""
+    """Spring and damper in parallel under every pin, and the exchange between neighbors."""
 
     damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
     recovery_time: float = quantity(
         1.0, "time constant of the surface's recovery", unit="s", symbol="τ_r", above=0.0
     )
     diffusivity: float = quantity(
-        10e-6, "diffusivity of the displacement between neighbours", unit="m2/s", symbol="D", at_least=0.0
+        10e-6, "diffusivity of the displacement between neighbors", unit="m2/s", symbol="D", at_least=0.0
     )
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Exchange between neighbours in one control period.
+    """Exchange between neighbors in one control period.
 
     Attributes
     ----------
     columns : int
         Cells in a row.
     shifted : bool
-        Whether odd rows are shifted, so that a cell has six neighbours, not four.
+        Whether odd rows are shifted, so that a cell has six neighbors, not four.
     along, across : float
-        Share of their difference that two neighbours exchange, in a row and between rows.
+        Share of their difference that two neighbors exchange, in a row and between rows.
     """
 
     columns: int
@@ -87,7 +87,7 @@ class Exchange:
     across: float
 
     def find_pairs(self, cells: Cells) -> list[tuple[Cells, Cells, float]]:
-        """Return where in `cells` neighbours stand, each pair once, with the share they exchange."""
+        """Return where in `cells` neighbors stand, each pair once, with the share they exchange."""
         row, column = np.divmod(cells, self.columns)
         last = self.columns - 1
         steps = [(1, column < last, self.along), (self.columns, column <= last, self.across)]
@@ -107,7 +107,7 @@ class Exchange:
         return found
 
     def even_out(self, cells: Cells, values: Floats) -> Floats:
-        """Return values of some cells, shape (m,), after neighbours among them have exchanged.
+        """Return values of some cells, shape (m,), after neighbors among them have exchanged.
 
         What one gives the other gets, and nothing is exchanged with a cell that is not there: the
         sum stays what it was.
@@ -129,7 +129,7 @@ def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
     """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions.
 
     The rates come from matching ``D`` along x and y; their sum is limited so that no period,
-    however long, makes neighbours overshoot one another.
+    however long, makes neighbors overshoot one another.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
 
 @dataclass(frozen=True, eq=False)
 class ViscousControl:
-    """Controller of the viscous behaviour for a bed.
+    """Controller of the viscous behavior for a bed.
 
-    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbours exchange,
+    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbors exchange,
     then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
     dent decays with τ_r whatever D is.
 
@@ -207,7 +207,7 @@ class ViscousControl:
         return memory, Orders(target, self._modes(cells, pressed, formed), command)
 
     def _modes(self, cells: Cells, pressed: NDArray[np.bool_], formed: NDArray[np.bool_]) -> NDArray[np.int8]:
-        """Return the modes: pressed, drawn along by a pressed neighbour, recovering, at rest."""
+        """Return the modes: pressed, drawn along by a pressed neighbor, recovering, at rest."""
         drawn = np.zeros(cells.size, np.bool_)
         if pressed.any():
             for one, other, _ in self.exchange.find_pairs(cells):
@@ -220,7 +220,7 @@ class ViscousControl:
 
 
 def build(parameters: Viscous, device: DeviceInfo) -> ViscousControl:
-    """Put the viscous behaviour together for a device.
+    """Put the viscous behavior together for a device.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class ActiveSet:
     place : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
     reach, control : tuple or None
-        Discs of which every cell is in, the finger's and the controller's: centre x, y, radius, m; arrays
+        Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays
         (b,) of b runs.
     peak : float or ndarray (b,)
         No pin top in the finger's part is higher while this set is in use, m.

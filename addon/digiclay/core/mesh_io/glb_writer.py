@@ -1,4 +1,4 @@
-"""Binary glTF files, in metres and y up as their standard requires; a node a body."""
+"""Binary glTF files, in meters and y up as their standard requires; a node a body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading of glTF files, GLB and JSON: the triangles of all nodes of the scene, in metres, y up.
+"""Reading of glTF files, GLB and JSON: the triangles of all nodes of the scene, in meters, y up.
 
 Materials and pictures are not opened. Vertices in a file of their own are read if it lies in the
 folder of the glTF, or below it; a link that leads out of there is not followed.

@@ -25,7 +25,7 @@ Indices = NDArray[np.int64]
 
 #: Meshes by extension.
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")
-#: Formats whose standard says metres, and y upwards.
+#: Formats whose standard says meters, and y upwards.
 GLTF = (".glb", ".gltf")
 CHECKS = {".stl": check_stl, ".ply": check_ply, ".off": check_off}
 #: What a text in UTF-8 may begin with.
@@ -40,7 +40,7 @@ class Read(NamedTuple):
     vertices : ndarray (v, 3)
     faces : ndarray of int (f, 3)
     length : float or None
-        Metres in the vertices' unit; None where the format does not say.
+        Meters in the vertices' unit; None where the format does not say.
     up : str
         Which of its directions the format has upwards.
     """

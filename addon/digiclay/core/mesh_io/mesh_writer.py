@@ -19,7 +19,7 @@ FORMATS: dict[str, str] = {
     "stl_ascii": "STL as text",
     "obj": "Wavefront OBJ, with a group for each feature",
     "ply": "Stanford PLY, binary, with height, force and mode of each vertex",
-    "glb": "binary glTF, in metres and y up as its standard says",
+    "glb": "binary glTF, in meters and y up as its standard says",
     "3mf": "3MF, which names its unit",
 }
 WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
@@ -31,7 +31,7 @@ WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
     "3mf": threemf_writer.write,
 }
 
-#: Lengths a file can be written in: how many of them make a metre.
+#: Lengths a file can be written in: how many of them make a meter.
 UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
 
 
@@ -64,7 +64,7 @@ def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str 
     path : str or Path
         The file; an older one is replaced once the new one is complete.
     unit : {"mm", "m"}
-        Length unit of all formats but GLB, which is always in metres and y up, because its
+        Length unit of all formats but GLB, which is always in meters and y up, because its
         standard says so.
     kind : str, optional
         A key of `FORMATS`; by default the extension of `path`.

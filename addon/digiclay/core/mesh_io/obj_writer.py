@@ -13,14 +13,14 @@ __all__ = ["write"]
 
 
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies, lengths in 1 / `factor` m to the nearest nanometre; faces of no group come first.
+    """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first.
 
     Parameters
     ----------
     file : binary file
     bodies : sequence of Body
     factor : float
-        Units of the file in a metre.
+        Units of the file in a meter.
     """
     line = "v {0} {0} {0}\n".format("%.6f" if factor > 1.0 else "%.9f")
     file.write(f"# digiclay, lengths in {'mm' if factor > 1.0 else 'm'}, z up\n".encode())

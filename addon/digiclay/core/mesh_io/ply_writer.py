@@ -26,7 +26,7 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file : binary file
     bodies : sequence of Body
     factor : float
-        Units of the file in a metre.
+        Units of the file in a meter.
     """
     unit = "mm" if factor > 1.0 else "m"
     lines = [

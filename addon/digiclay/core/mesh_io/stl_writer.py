@@ -26,7 +26,7 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file : binary file
     bodies : sequence of Body
     factor : float
-        Units of the file in a metre.
+        Units of the file in a meter.
     """
     # The first word must not be "solid": by it readers know the text form.
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
@@ -47,7 +47,7 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file : binary file
     bodies : sequence of Body
     factor : float
-        Units of the file in a metre.
+        Units of the file in a meter.
     """
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())

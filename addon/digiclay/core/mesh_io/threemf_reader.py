@@ -34,7 +34,7 @@ CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02 "
 PATH = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06 path"
 RELATION = "http://schemas.openxmlformats.org/package/2006/relationships Relationship"
 MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
-#: Metres in a model's unit.
+#: Meters in a model's unit.
 UNITS = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 25.4e-3, "foot": 0.3048, "meter": 1.0,
 }  # fmt: skip
@@ -78,7 +78,7 @@ class _Extent:
 
 
 def read(path: Path) -> tuple[Floats, Indices, float]:
-    """Return vertices (v, 3), triangles (f, 3), and the metres in the vertices' unit.
+    """Return vertices (v, 3), triangles (f, 3), and the meters in the vertices' unit.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file : binary file
     bodies : sequence of Body
     factor : float
-        Units of the file in a metre.
+        Units of the file in a meter.
     """
     unit = "millimeter" if factor > 1.0 else "meter"
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
@@ -59,7 +59,7 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
-    """Write vertices to the nearest nanometre, and triangles."""
+    """Write vertices to the nearest nanometer, and triangles."""
     number = "%.6f" if factor > 1.0 else "%.9f"
     vertex = f'<vertex x="{number}" y="{number}" z="{number}"/>\n'
     part.write(b"<vertices>\n")

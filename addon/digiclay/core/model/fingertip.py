@@ -93,8 +93,8 @@ class Fingertip(Parameters):
         Returns
         -------
         ndarray (k, 10)
-            Centre x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²;
-            the tilt of the mid surface t_x, t_y; the half thickness over the centre, m; the
+            Center x, y, z, m; the matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²;
+            the tilt of the mid surface t_x, t_y; the half thickness over the center, m; the
             smaller eigenvalue of S, 1/m².
         """
         rotation = matrices(poses[:, 3:])
@@ -123,7 +123,7 @@ def reaches(outline: Floats) -> Floats:
 
 
 def reach(base: float, tilt: float, bend: float, peak: float) -> float:
-    """Return a radius about the centre beyond which the underside is above `peak`, m.
+    """Return a radius about the center beyond which the underside is above `peak`, m.
 
     A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
     stays one with the smallest base, the largest tilt and the smallest bend of several poses.
@@ -147,7 +147,7 @@ def reach(base: float, tilt: float, bend: float, peak: float) -> float:
 def forms(outline: Floats) -> tuple[Floats, Floats]:
     """Return what `underside` needs as quadratic forms of the position.
 
-    With r² the squared reduced radius, t the half thickness over the centre, and
+    With r² the squared reduced radius, t the half thickness over the center, and
     ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
     tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
 

@@ -18,16 +18,16 @@ Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
 #: First row, last row, first column, last column.
 Bounds = tuple[int, int, int, int]
-#: Centre x, y and radius, m.
+#: Center x, y and radius, m.
 Disc = tuple[float, float, float]
 
-#: Relative slack, so that cells exactly on a limit count the same on every side of the centre.
+#: Relative slack, so that cells exactly on a limit count the same on every side of the center.
 ON_THE_SIDE = 1e-9
 
 
 @dataclass(frozen=True)
 class Layout(Parameters):
-    """Rows and columns of cells, centred on the origin of the bed.
+    """Rows and columns of cells, centered on the origin of the bed.
 
     *aligned*: a square grid. *staggered*: every other row shifted by half a pitch, rows
     one pitch apart. *hexagonal*: shifted likewise, rows ``pitch * sqrt(3) / 2`` apart.
@@ -40,11 +40,11 @@ class Layout(Parameters):
         25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
     )
     pitch: float = quantity(
-        3e-3, "distance of neighbouring cells in a row", unit="m", symbol="p", source="P", above=0.0
+        3e-3, "distance of neighboring cells in a row", unit="m", symbol="p", source="P", above=0.0
     )
     arrangement: str = quantity(
         "aligned",
-        "offset of neighbouring rows",
+        "offset of neighboring rows",
         source="P",
         choices=("aligned", "staggered", "hexagonal"),
     )
@@ -102,7 +102,7 @@ class Grid:
         Parameters
         ----------
         x, y : float
-            Centre, m.
+            Center, m.
         radius : float
             m; cells exactly on a side are inside. Negative: no cells.
 
@@ -135,7 +135,7 @@ class Grid:
         Parameters
         ----------
         x, y : float
-            Its centre, m.
+            Its center, m.
         radius : float
             m.
         """
@@ -164,7 +164,7 @@ class Grid:
 
 
 def grid(layout: Layout) -> Grid:
-    """Lay out the cells of a bed, centred on the origin.
+    """Lay out the cells of a bed, centered on the origin.
 
     Returns
     -------

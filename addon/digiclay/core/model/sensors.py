@@ -1,7 +1,7 @@
-"""Sensor model: noise, quantisation and delay of forces and heights.
+"""Sensor model: noise, quantization and delay of forces and heights.
 
 Each is a small part around another, so a scene puts together what it wants:
-``Delayed(Quantised(Noisy(PerfectSensors())))``, and `observer.ValveObserver` in between. A
+``Delayed(Quantized(Noisy(PerfectSensors())))``, and `observer.ValveObserver` in between. A
 part without an effect is not put in.
 """
 
@@ -18,7 +18,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from .interfaces import Sensors, Truth
 
-__all__ = ["Delayed", "Noisy", "Quantised", "Sensing", "draw_normals"]
+__all__ = ["Delayed", "Noisy", "Quantized", "Sensing", "draw_normals"]
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
@@ -160,7 +160,7 @@ class Noisy:
 
 
 @dataclass(frozen=True)
-class Quantised:
+class Quantized:
     """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing.
 
     Attributes

@@ -31,7 +31,7 @@ class Touch:
     pulp: Pulp
 
 
-#: Which cells the finger may touch in a period: centre of its way x, y and half the length
+#: Which cells the finger may touch in a period: center of its way x, y and half the length
 #: of it, m; then the arguments of `fingertip.reach`.
 Window = tuple[float, float, float, float, float, float]
 

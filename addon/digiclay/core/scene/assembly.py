@@ -101,13 +101,13 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     if known is None:
         return None
     from ..model.null_parts import PerfectSensors
-    from ..model.sensors import Delayed, Noisy, Quantised
+    from ..model.sensors import Delayed, Noisy, Quantized
 
     sensors: Sensors = PerfectSensors()
     if known.force_noise or known.height_noise:
         sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
     if known.force_step or known.height_step:
-        sensors = Quantised(sensors, known.force_step, known.height_step)
+        sensors = Quantized(sensors, known.force_step, known.height_step)
     if known.observer == "valve":
         from ..model.observer import make_valve_observer
 

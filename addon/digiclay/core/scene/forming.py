@@ -32,7 +32,7 @@ GESTURES: dict[str, tuple[tuple[float, float], ...]] = {
 }  # fmt: skip
 #: Of the highest cells, those within this share of the relief are as good as the highest.
 NEARLY = 0.1
-#: Time for the last micrometres, and for a margin, s.
+#: Time for the last micrometers, and for a margin, s.
 MARGIN = 0.5
 
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["COLOURS", "ENGINES", "MOST_FRAMES", "Film", "Picture", "Still", "Turntable"]
+__all__ = ["COLORS", "ENGINES", "MOST_FRAMES", "Film", "Picture", "Still", "Turntable"]
 
 Floats = NDArray[np.float64]
 
-#: What draws, and what colours the pins.
+#: What draws, and what colors the pins.
 ENGINES = ("cycles", "workbench")
-COLOURS = ("mode", "force")
+COLORS = ("mode", "force")
 #: More frames than this are a slip of the keyboard: an hour of film is 90 000.
 MOST_FRAMES = 100_000
 
@@ -30,9 +30,7 @@ class Picture(Parameters):
     height: int = quantity(600, "height in pixels", at_least=16, at_most=16384)
     engine: str = quantity("workbench", "what draws: quick and plain, or with soft shadows", choices=ENGINES)
     samples: int = quantity(6, "samples a pixel, of cycles", at_least=1, at_most=65536)
-    colour: str = quantity(
-        "mode", "whether pins show their control mode or the force on them", choices=COLOURS
-    )
+    color: str = quantity("mode", "whether pins show their control mode or the force on them", choices=COLORS)
     arrows: bool = quantity(False, "whether arrows show the force on each pin")
 
 
@@ -50,7 +48,7 @@ class Moving(Picture):
     rate: int = quantity(25, "frames shown in a second", at_least=1, at_most=240)
 
     def check(self) -> None:
-        """H.264 keeps colours for blocks of 2 x 2 pixels."""
+        """H.264 keeps colors for blocks of 2 x 2 pixels."""
         for side in ("width", "height"):
             if getattr(self, side) % 2:
                 rule = "must be an even number of pixels, as H.264 wants it"

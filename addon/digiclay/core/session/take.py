@@ -32,7 +32,7 @@ __all__ = ["Take", "from_bytes", "refine", "replay", "to_bytes", "to_scene"]
 
 Floats = NDArray[np.float64]
 
-#: Waypoints that lie this near to the straight way between their neighbours are left out, m and 1.
+#: Waypoints that lie this near to the straight way between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")

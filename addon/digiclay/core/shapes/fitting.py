@@ -177,7 +177,7 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
 
 def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitted:
     """Keep heights within the stroke, and count what had to be clipped."""
-    # Less than a nanometre beyond an end is rounding.
+    # Less than a nanometer beyond an end is rounding.
     low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
     within = np.clip(heights, 0.0, actuator.stroke)
     counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]

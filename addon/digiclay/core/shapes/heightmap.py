@@ -35,7 +35,7 @@ class HeightMap:
         Rows and columns of pixels.
     block : int
     value_length : float or None
-        Metres in the unit of the values; None where they are no lengths.
+        Meters in the unit of the values; None where they are no lengths.
     """
 
     name: str
@@ -80,7 +80,7 @@ def height_map(name: str, values: NDArray[np.generic], value_length: float | Non
         What messages call it.
     values : ndarray (r, c)
     value_length : float, optional
-        Metres in the unit of the values; by default they are no lengths.
+        Meters in the unit of the values; by default they are no lengths.
 
     Raises
     ------

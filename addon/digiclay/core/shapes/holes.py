@@ -16,7 +16,7 @@ Cells = NDArray[np.intp]
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05
-#: Steps (rows, columns) to the neighbours: of an aligned bed; of shifted ones in even rows, in odd ones.
+#: Steps (rows, columns) to the neighbors: of an aligned bed; of shifted ones in even rows, in odd ones.
 SQUARE = ((0, 1), (1, 0), (0, -1), (-1, 0))
 EVEN = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
 ODD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
@@ -27,9 +27,9 @@ ROUNDS = 300
 def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
     """Return the values with those over small holes taken from around, and which pins these are.
 
-    A hole is a group of neighbouring pins that the surface misses, with pins under the surface all
+    A hole is a group of neighboring pins that the surface misses, with pins under the surface all
     around: a group that reaches the rim of the bed is what lies beside the shape. The values over it
-    are the flattest that join those around it: each becomes the mean of its neighbours.
+    are the flattest that join those around it: each becomes the mean of its neighbors.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     missing : ndarray (n,) of bool
         Pins whose value is not that of the surface.
     """
-    beside = _neighbours(grid)
+    beside = _neighbors(grid)
     number = np.flatnonzero(missing)
     position = np.full(grid.count + 1, -1)  # the last one stands for what is beyond the rim
     position[number] = np.arange(number.size)
@@ -55,8 +55,8 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     return _evened(value, hole, beside), hole
 
 
-def _neighbours(grid: Grid) -> Cells:
-    """Return the neighbours of all pins, (n, 4 or 6); n stands for what is beyond the rim."""
+def _neighbors(grid: Grid) -> Cells:
+    """Return the neighbors of all pins, (n, 4 or 6); n stands for what is beyond the rim."""
     plan = grid.layout
     row, column = np.divmod(np.arange(grid.count), plan.columns)
     steps = np.array((EVEN, ODD) if plan.shift else (SQUARE, SQUARE))[row % 2]
@@ -70,7 +70,7 @@ def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
     found, waiting = value.copy(), hole.copy()
     while waiting.any():
         cells = np.flatnonzero(waiting)
-        known = ~waiting[beside[cells]]  # a hole has no neighbour beyond the rim
+        known = ~waiting[beside[cells]]  # a hole has no neighbor beyond the rim
         ring = known.any(axis=1)
         sums = np.where(known, found[beside[cells]], 0.0).sum(axis=1)
         found[cells[ring]] = sums[ring] / known.sum(axis=1)[ring]

@@ -24,7 +24,7 @@ Flags = NDArray[np.bool_]
 #: Pairs of a ray and a triangle that are worked on at a time.
 CHUNK = 2_000_000
 #: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
-#: float32 or to six digits, which moves the rim by up to a micrometre, and no pin is placed as exactly.
+#: float32 or to six digits, which moves the rim by up to a micrometer, and no pin is placed as exactly.
 EDGE = 1e-3
 #: Faces of a mesh are known to be turned outwards if more than this share of the pins sees an upper side.
 UPPER = 0.8
@@ -43,7 +43,7 @@ class ShapeMesh:
         In the file's unit.
     faces : ndarray of int (f, 3)
     length : float
-        Metres in that unit.
+        Meters in that unit.
     """
 
     name: str
@@ -53,7 +53,7 @@ class ShapeMesh:
 
     @property
     def value_length(self) -> float:
-        """Metres in the unit of the heights."""
+        """Meters in the unit of the heights."""
         return self.length
 
     @cached_property
@@ -131,7 +131,7 @@ class ShapeMesh:
             grid, corners.min(axis=1) - slack, corners.max(axis=1) + slack
         )
         rows, columns = np.maximum(last_row - first_row + 1, 0), np.maximum(last - first + 1, 0)
-        # A triangle on edge covers no pin; its neighbours have the same edges.
+        # A triangle on edge covers no pin; its neighbors have the same edges.
         candidates = np.where(np.abs(area) > 1e-12 * size * size, rows * columns, 0)
         flat = np.flatnonzero(candidates)
         cuts = np.cumsum(candidates[flat]) // CHUNK
@@ -197,7 +197,7 @@ def shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: flo
     up : str
         A key of `request.UPWARDS`.
     length : float
-        Metres in the vertices' unit.
+        Meters in the vertices' unit.
 
     Raises
     ------

@@ -29,7 +29,7 @@ FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB")
 #: Those that Pillow cannot read.
 BLENDER_ONLY = (".exr", ".hdr")
 #: Pillow's names for pictures of one channel; all others are turned into brightness.
-GREY = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F")
+GRAY = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F")
 #: Most pixels of a picture: 16 000 x 8 000. Some memory is needed for each, see docs/shapes.md.
 MOST = 128_000_000
 #: Who reads pictures in Pillow's place, the last one first; each takes a file and returns what `pixels` does.
@@ -63,8 +63,8 @@ def pixels(path: Path) -> Pixels:
         try:
             with image.open(path, formats=FORMATS) as opened:
                 refuse_too_many(path, *opened.size)
-                grey = opened if opened.mode in GREY else opened.convert("L")
-                return np.flipud(np.asarray(grey))
+                gray = opened if opened.mode in GRAY else opened.convert("L")
+                return np.flipud(np.asarray(gray))
         except image.DecompressionBombError:
             raise too_large(path, "too many pixels to open") from None
         except OSError as error:

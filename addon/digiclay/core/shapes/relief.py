@@ -59,12 +59,12 @@ class Relief(Protocol):
 
     @property
     def length(self) -> float | None:
-        """Metres in the unit of its plan; None where that has no length, as a picture's pixels."""
+        """Meters in the unit of its plan; None where that has no length, as a picture's pixels."""
         ...
 
     @property
     def value_length(self) -> float | None:
-        """Metres in the unit of its heights; None where they are no lengths, as a picture's."""
+        """Meters in the unit of its heights; None where they are no lengths, as a picture's."""
         ...
 
     @property

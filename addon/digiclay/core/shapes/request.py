@@ -9,7 +9,7 @@ from ..base.quantity import Parameters, quantity
 
 __all__ = ["LENGTHS", "UPWARDS", "Shape"]
 
-#: Lengths a file can be in: metres in one of them.
+#: Lengths a file can be in: meters in one of them.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 #: Directions of a file that can point upwards: which of its axes become x, y, z, and their signs.
 UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {

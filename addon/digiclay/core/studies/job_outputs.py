@@ -21,6 +21,8 @@ PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable,
 SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
 #: The keys of a job.toml.
 KEYS = ("export", "errors", *SECTIONS)
+#: Keys of pictures in older files, and what they are called now.
+FORMER = {"colour": "color"}
 
 
 @dataclass(frozen=True)
@@ -90,5 +92,8 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
         own = table[section]
         if not isinstance(own, dict):
             raise ParameterError(section, "", f"must be a section, [{section}]", show_value(own))
-        parts[section] = read_part(section, kind, {}, own)
+        named: dict[str, Any] = {}
+        for key, value in own.items():
+            named[key if FORMER.get(key, key) in own else FORMER[key]] = value
+        parts[section] = read_part(section, kind, {}, named)
     return Outputs(tuple(export), errors, **parts)

@@ -61,12 +61,12 @@ class Network:
 
 
 def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
-    """Return the network of a skeleton: pins with three neighbours or more are junctions.
+    """Return the network of a skeleton: pins with three neighbors or more are junctions.
 
     Parameters
     ----------
     beside : ndarray of int (k, 8 or 6)
-        Neighbours within the feature; -1 where there is none.
+        Neighbors within the feature; -1 where there is none.
     pins : ndarray of int (m,)
         Those of the skeleton.
     place : ndarray (k, 2)
@@ -75,7 +75,7 @@ def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
         Half the feature's width at the pins of the skeleton, m.
     """
     wide = dict(zip(pins.tolist(), half.tolist(), strict=True))
-    around = _neighbours(beside, pins)
+    around = _neighbors(beside, pins)
     cluster: dict[int, int] = {}
     network = Network([], [])
     for pin in around:
@@ -116,7 +116,7 @@ def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
     return network
 
 
-def _neighbours(beside: Pins, pins: Pins) -> dict[int, list[int]]:
+def _neighbors(beside: Pins, pins: Pins) -> dict[int, list[int]]:
     """Return for each pin of a skeleton those it is joined to: corners only where there is no side way."""
     among = set(pins.tolist())
     found: dict[int, list[int]] = {}

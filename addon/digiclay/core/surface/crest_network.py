@@ -58,7 +58,7 @@ def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) 
     Parameters
     ----------
     beside : ndarray of int (k, 8 or 6)
-        Neighbours of all pins of the feature, -1 where there is none.
+        Neighbors of all pins of the feature, -1 where there is none.
     pins : ndarray of int (s,)
         Those of the skeleton.
     place : ndarray (k, 2)

@@ -95,7 +95,7 @@ def ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: flo
     """
     own = np.zeros(len(off))
     own[pins] = off[pins]
-    beside = lattice.neighbour[pins]
+    beside = lattice.neighbor[pins]
     place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
     among, on_bed = np.where(pins[place] == beside, place, -1), beside >= 0
     line = skeleton(among, on_bed, off[pins])

@@ -79,7 +79,7 @@ class Formed:
 
     @property
     def pitch(self) -> float:
-        """Distance between neighbours in a row, m."""
+        """Distance between neighbors in a row, m."""
         return float(np.hypot(*(self.position[1] - self.position[0])))
 
     @property

@@ -1,4 +1,4 @@
-"""Lattice of the pins: neighbours, and heights between them."""
+"""Lattice of the pins: neighbors, and heights between them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Lattice", "distance_to_level"]
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
-#: Steps to the neighbours, (rows, columns), counter-clockwise; a shifted bed has one list for rows
+#: Steps to the neighbors, (rows, columns), counter-clockwise; a shifted bed has one list for rows
 #: that stand back and one for rows that are shifted forward along x.
 SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
@@ -27,21 +27,21 @@ CHUNK = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Pins and their neighbours.
+    """Pins and their neighbors.
 
     Attributes
     ----------
     formed : Formed
-    neighbour : ndarray of int (n, 8 or 6)
+    neighbor : ndarray of int (n, 8 or 6)
         Counter-clockwise; -1 beyond the edge of the bed.
     """
 
     formed: Formed
-    neighbour: Pins
+    neighbor: Pins
 
     @classmethod
     def of(cls, formed: Formed) -> Lattice:
-        """Return the neighbours of all pins of a bed: 8 in an aligned one, else 6."""
+        """Return the neighbors of all pins of a bed: 8 in an aligned one, else 6."""
         row, column = np.divmod(np.arange(formed.rows * formed.columns), formed.columns)
         lists = (SQUARE, SQUARE) if not formed.shift else (BACK, FORWARD)
         lists = lists[::-1] if formed.shift < 0.0 else lists
@@ -52,7 +52,7 @@ class Lattice:
 
     @property
     def pitch(self) -> float:
-        """Distance of neighbours, the mean of that along a row and that of the rows, m."""
+        """Distance of neighbors, the mean of that along a row and that of the rows, m."""
         return 0.5 * (self.formed.pitch + self.formed.row_spacing)
 
     def at(self, values: Floats, place: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Stepped bed as one printable body: a prism for every pin.
 
 The parts are those that are nearest to a pin: squares in an aligned bed, hexagons in a shifted one. Where
-neighbours differ in height a wall stands between them. Two squares that meet at a corner only, and are
+neighbors differ in height a wall stands between them. Two squares that meet at a corner only, and are
 both higher than the other two there, would touch along a line without thickness, which no printer can
 make: they are joined by a bridge as narrow as `BRIDGE`.
 """
@@ -120,15 +120,15 @@ def _following(pin: Codes) -> Codes:
 
 
 def _walls(made: Parts, steps: Codes, own: Codes, ahead: Codes, ground: Codes) -> tuple[Indices, Codes]:
-    """Return the triangles of the walls a part has above its neighbours, and whose they are.
+    """Return the triangles of the walls a part has above its neighbors, and whose they are.
 
     The vertices of a corner have numbers in the order of their heights, so that those between the
-    neighbour's height and one's own stand in line.
+    neighbor's height and one's own stand in line.
     """
     other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
     side = np.flatnonzero(steps[made.pin] > other)
     twin = made.twin[side]
-    # The feet of the wall: the neighbour's vertices, or beyond the bed those of the base.
+    # The feet of the wall: the neighbor's vertices, or beyond the bed those of the base.
     left = np.where(twin >= 0, ahead[twin], ground[made.start[side]])
     right = np.where(twin >= 0, own[twin], ground[made.end[side]])
     i, step = _counted(own[side] - left)

@@ -78,7 +78,7 @@ class Field:
             return None
         line = smoothed(line, 2, chain.closed)
         for _ in range(ROUNDS):
-            spread = even(self._centred(line, chain), pitch)
+            spread = even(self._centered(line, chain), pitch)
             if spread is None:
                 return None
             line = smoothed(spread, 1, chain.closed)
@@ -101,7 +101,7 @@ class Field:
         level = share * self.at(line)
         return aside, self.falls(line, aside, level), self.falls(line, -aside, level)
 
-    def _centred(self, line: Floats, chain: Chain) -> Floats:
+    def _centered(self, line: Floats, chain: Chain) -> Floats:
         """Return a line moved into the middle of its sections."""
         aside, left, right = self._sections(line, chain.closed, MIDDLE)
         wide = left + right

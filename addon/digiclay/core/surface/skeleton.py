@@ -24,7 +24,7 @@ Flags = NDArray[np.bool_]
 DEEP = 0.25
 #: The end of a line stays when it is higher than this share of the pin it hangs on.
 END = 0.5
-#: A pin is ahead when it is this much further that way than the neighbours are.
+#: A pin is ahead when it is this much further that way than the neighbors are.
 AHEAD = 1.25
 
 
@@ -34,7 +34,7 @@ def half_width(beside: Pins, on_bed: Flags) -> int:
     Parameters
     ----------
     beside : ndarray of int (k, 8 or 6)
-        Neighbours within the feature; -1 where there is none.
+        Neighbors within the feature; -1 where there is none.
     on_bed : ndarray of bool (k, 8 or 6)
         Where the bed goes on.
     """
@@ -49,12 +49,12 @@ def half_width(beside: Pins, on_bed: Flags) -> int:
 
 
 def rounded(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
-    """Return heights averaged with those of the neighbours, the ground's included, some times.
+    """Return heights averaged with those of the neighbors, the ground's included, some times.
 
     Parameters
     ----------
     beside : ndarray of int (k, 8 or 6)
-        Neighbours within the feature; -1 where there is none.
+        Neighbors within the feature; -1 where there is none.
     on_bed : ndarray of bool (k, 8 or 6)
         Where the bed goes on.
     off : ndarray (k,)
@@ -74,7 +74,7 @@ def skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
     Parameters
     ----------
     beside : ndarray of int (k, 8 or 6)
-        Neighbours within the feature, whose pins are numbered from 0; -1 where there is none.
+        Neighbors within the feature, whose pins are numbered from 0; -1 where there is none.
     on_bed : ndarray of bool (k, 8 or 6)
         Where the bed goes on, within the feature or outside it.
     off : ndarray (k,)
@@ -111,10 +111,10 @@ def _hollows(beside: Pins, on_bed: Flags, off: Floats) -> list[int]:
         return pin
 
     height, flooded, holes = off.tolist(), [False] * count, []
-    neighbours = np.where(beside < 0, np.where(on_bed, count, -1), beside).tolist()
+    neighbors = np.where(beside < 0, np.where(on_bed, count, -1), beside).tolist()
     for pin in np.argsort(off, kind="stable").tolist():
         flooded[pin] = True
-        for other in neighbours[pin]:
+        for other in neighbors[pin]:
             if other < 0 or (other < count and not flooded[other]):
                 continue
             one, two = root(pin), root(other)
@@ -133,7 +133,7 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
     """Take pins off, the lowest first."""
     count, ways = beside.shape
     simple, ends = (_SIMPLE[ways], _ENDS[ways])
-    neighbours, height = beside.tolist(), top.tolist()
+    neighbors, height = beside.tolist(), top.tolist()
     left = [True] * count + [False]  # the last one stands for no pin, number -1
     for pin in holes:
         left[pin] = False
@@ -145,7 +145,7 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
         waiting[pin] = False
         if not left[pin]:
             continue
-        around = neighbours[pin]
+        around = neighbors[pin]
         code = 0
         for bit, other in enumerate(around):
             if left[other]:
@@ -153,7 +153,7 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
         if not simple[code]:
             continue
         high = ends[code] and height[pin] >= END * max(height[other] for other in around if left[other])
-        if high and (ends[code] == 1 or _goes_on(neighbours, left, around, code)):
+        if high and (ends[code] == 1 or _goes_on(neighbors, left, around, code)):
             continue
         left[pin] = False
         for other in around:
@@ -163,8 +163,8 @@ def _thinned(beside: Pins, top: Floats, holes: list[int]) -> Pins:
     return np.flatnonzero(left[:count])
 
 
-def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
-    """Return whether a line two pins wide goes on from a pin with two neighbours: all beyond them lies ahead.
+def _goes_on(neighbors: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
+    """Return whether a line two pins wide goes on from a pin with two neighbors: all beyond them lies ahead.
 
     Beside a line, what is beyond them lies along it.
     """
@@ -174,7 +174,7 @@ def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], c
     ahead = [0.5 * (steps[two[0]][axis] + steps[two[1]][axis]) for axis in (0, 1)]
     near = ahead[0] ** 2 + ahead[1] ** 2
     for bit in two:
-        for turn, other in enumerate(neighbours[around[bit]]):
+        for turn, other in enumerate(neighbors[around[bit]]):
             step = [steps[bit][axis] + steps[turn][axis] for axis in (0, 1)]
             beyond = abs(step[0]) + abs(step[1]) > 1e-9 and not any(other == around[k] for k in two)
             if beyond and left[other] and step[0] * ahead[0] + step[1] * ahead[1] < AHEAD * near:
@@ -183,7 +183,7 @@ def _goes_on(neighbours: list[list[int]], left: list[bool], around: list[int], c
 
 
 def _is_simple(code: int, ways: int) -> bool:
-    """Return whether what is left stays joined as it is without a pin whose neighbours have these bits."""
+    """Return whether what is left stays joined as it is without a pin whose neighbors have these bits."""
     there = [bool(code >> bit & 1) for bit in range(ways)]
     if ways == 6:
         return sum(there[k] and not there[k - 1] for k in range(ways)) == 1
@@ -194,7 +194,7 @@ def _is_simple(code: int, ways: int) -> bool:
 
 
 _SIMPLE = {ways: [_is_simple(code, ways) for code in range(1 << ways)] for ways in (6, 8)}
-#: How many neighbours the end of a line has with these bits, one or two side by side; 0 where it is no end.
+#: How many neighbors the end of a line has with these bits, one or two side by side; 0 where it is no end.
 _ENDS = {
     ways: [
         code.bit_count() if code.bit_count() < 3 and _is_simple(code, ways) else 0

@@ -1,6 +1,6 @@
 """Formed surface: a skin over the pin tops, and the closed solid under it.
 
-The skin is structured. Between two neighbouring rows every four pins, two of each row,
+The skin is structured. Between two neighboring rows every four pins, two of each row,
 make a cell of the skin that is cut in two along one of its diagonals. Nothing but the
 pins themselves decides which, so a mirrored or turned bed gives the mirrored or turned
 solid:

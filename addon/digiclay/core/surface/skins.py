@@ -97,7 +97,7 @@ def _linear(values: Floats, parts: int) -> Floats:
     """Divide each step along the first axis into straight parts."""
     share = (np.arange(parts) / parts).reshape((1, -1) + (1,) * (values.ndim - 1))
     low, high = values[:-1, None], values[1:, None]
-    # Of two equal neighbours the mean is exactly the same number.
+    # Of two equal neighbors the mean is exactly the same number.
     between = (low + share * (high - low)).reshape(-1, *values.shape[1:])
     return np.concatenate([between, values[-1:]])
 

@@ -95,7 +95,7 @@ def test_the_approximate_gradual_refresh_is_the_quickest_and_the_gradual_the_slo
 
 def test_a_small_step_settles_as_quickly_as_digital_clay_s_hardware() -> None:
     result = displayed("approximate_gradual", "dome", amplitude=1e-3)
-    # Three steps of a third of a millimetre; 50 to 100 ms each.
+    # Three steps of a third of a millimeter; 50 to 100 ms each.
     end = np.flatnonzero(moving(result).any(axis=1))[-1] * PERIOD
     assert 3 * 0.05 <= end <= 3 * 0.1
 

@@ -1,4 +1,4 @@
-"""A new behaviour is one file and one line: it runs alone and in batches, and is found where methods are."""
+"""A new behavior is one file and one line: it runs alone and in batches, and is found where methods are."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def copy(tmp_path: Path) -> Path:
     return package
 
 
-def test_a_new_behaviour_is_one_file_and_one_line(copy: Path) -> None:
+def test_a_new_behavior_is_one_file_and_one_line(copy: Path) -> None:
     assert find_changes(copy) == ["methods.py", "sponge.py"]
     found = json.loads(run_python(copy, "-c", SESSION))
     # Sums in another order: a last bit here and there.

@@ -1,4 +1,4 @@
-"""The behaviours in scene files: named, written back, and refused in one line what cannot be."""
+"""The behaviors in scene files: named, written back, and refused in one line what cannot be."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve
 
-BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
+BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 
 
 def build(method: str, **known: Any) -> Any:
-    """Return a behaviour, put together for a bed of 5 x 5 cells."""
+    """Return a behavior, put together for a bed of 5 x 5 cells."""
     return assemble(
         resolve({"layout": {"rows": 5, "columns": 5}, "control": {"method": method, **known}})
     ).controller
 
 
-@pytest.mark.parametrize("method", BEHAVIOURS)
-def test_a_scene_names_the_behaviour(method: str) -> None:
+@pytest.mark.parametrize("method", BEHAVIORS)
+def test_a_scene_names_the_behavior(method: str) -> None:
     assert build(method).name == method
 
 
-@pytest.mark.parametrize("method", BEHAVIOURS)
-def test_a_behaviour_forms_no_blister(method: str) -> None:
+@pytest.mark.parametrize("method", BEHAVIORS)
+def test_a_behavior_forms_no_blister(method: str) -> None:
     assert METHODS[method].blister is None
 
 
-@pytest.mark.parametrize("method", BEHAVIOURS)
-def test_a_scene_with_the_behaviour_reads_back_equal(method: str) -> None:
+@pytest.mark.parametrize("method", BEHAVIORS)
+def test_a_scene_with_the_behavior_reads_back_equal(method: str) -> None:
     scene = resolve({"control": {"method": method}})
     assert resolve(tomllib.loads(format_scene(scene))) == scene
 

@@ -1,4 +1,4 @@
-"""What the behaviours are made of: the drive, the exchange between neighbours, shapes."""
+"""What the behaviors are made of: the drive, the exchange between neighbors, shapes."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ def test_reservoirs_that_cannot_raise_a_pin_give_finite_commands() -> None:
     assert np.all(np.abs(drive.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
 
 
-# Neighbours
+# Neighbors
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_neighbours_are_the_nearest_cells(arrangement: str) -> None:
+def test_neighbors_are_the_nearest_cells(arrangement: str) -> None:
     plan = bed(arrangement)
     cells = np.random.default_rng(3).permutation(plan.count)
     found = {
@@ -86,7 +86,7 @@ def test_neighbours_are_the_nearest_cells(arrangement: str) -> None:
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_no_pair_of_neighbours_exchanges_twice(arrangement: str) -> None:
+def test_no_pair_of_neighbors_exchanges_twice(arrangement: str) -> None:
     plan = bed(arrangement)
     pairs = [
         frozenset(map(int, pair))
@@ -101,11 +101,11 @@ def test_values_spread_alike_along_x_and_y(arrangement: str) -> None:
     plan = bed(arrangement, 31, 31)
     rule, cells = make_exchange(plan, 10e-6, 5e-3), np.arange(plan.count)
     values = np.zeros(plan.count)
-    centre = plan.count // 2
-    values[centre] = 1.0
+    center = plan.count // 2
+    values[center] = 1.0
     for _ in range(50):
         values = rule.even_out(cells, values)
-    x, y = plan.x - plan.x[centre], plan.y - plan.y[centre]
+    x, y = plan.x - plan.x[center], plan.y - plan.y[center]
     spread = np.array([values @ x**2, values @ y**2])
     # Variance 2 D t = 2 x 10 mm²/s x 0.25 s; the limit on the rates takes 1 - (1 - e^-a)/a of it, with
     # a = 2 x 4 D T / p² = 0.044: 2 %. The bed's edge is 9 standard deviations away.
@@ -122,7 +122,7 @@ def test_no_exchange_overshoots_however_long_the_period(arrangement: str, period
     assert evened.max() <= 1.0 + 1e-12
 
 
-def test_what_neighbours_exchange_adds_up_to_nothing() -> None:
+def test_what_neighbors_exchange_adds_up_to_nothing() -> None:
     plan = bed("hexagonal")
     cells = np.random.default_rng(4).permutation(plan.count)[:30]
     values = np.random.default_rng(5).normal(size=30)
@@ -131,7 +131,7 @@ def test_what_neighbours_exchange_adds_up_to_nothing() -> None:
     assert np.abs(evened - values).max() > 0.01
 
 
-def test_a_bed_of_one_cell_has_no_neighbours() -> None:
+def test_a_bed_of_one_cell_has_no_neighbors() -> None:
     rule = make_exchange(bed("aligned", 1, 1), 1e-5, 5e-3)
     assert rule.even_out(np.zeros(1, np.intp), np.ones(1)).tolist() == [1.0]
 

@@ -1,4 +1,4 @@
-"""The behaviours under a finger: what each claims, over whole sessions."""
+"""The behaviors under a finger: what each claims, over whole sessions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result, run
 
 TOUCHING = ("elastic", "plastic", "viscous", "push_pull", "force_display")
-BEHAVIOURS = (*TOUCHING, "shape_display")
+BEHAVIORS = (*TOUCHING, "shape_display")
 SESSIONS = ("elastic_press", "plastic_press", "viscous_press", "push_pull", "force_display", "shape_display")
 RESTING = {int(Mode.REST), int(Mode.HOLD)}
 REST, DEAD_BAND, PERIOD = 40e-3, 10e-6, 5e-3
@@ -38,7 +38,7 @@ def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 1
 
 @cache
 def pressed(method: str, arrangement: str = "aligned") -> Result:
-    """Return a press under a behaviour."""
+    """Return a press under a behavior."""
     return run(scene(method, arrangement=arrangement))
 
 
@@ -252,7 +252,7 @@ def test_every_cell_is_in_a_resting_mode_a_second_after_the_finger_left(
     assert set(modes[at(result, GONE + 1.0)].tolist()) <= RESTING
 
 
-@pytest.mark.parametrize("method", BEHAVIOURS)
+@pytest.mark.parametrize("method", BEHAVIORS)
 def test_no_random_session_leaves_a_cell_in_a_mode_for_ever(method: str) -> None:
     # A failing one is named by its seed. Gone for the last 1.05 s, as in the test of the two methods; the
     # display, whose refresh takes longer than the way there, goes to a low shape all rows at once.

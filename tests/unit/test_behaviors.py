@@ -1,4 +1,4 @@
-"""The behaviours' laws, on measurements handed to them: what each commands, remembers and refuses."""
+"""The behaviors' laws, on measurements handed to them: what each commands, remembers and refuses."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from digiclay.core.model.interfaces import Measurement, Orders
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
-BEHAVIOURS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
+BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 REST = 40e-3
 #: Speed of a free pin at full valve without a conduit, m/s, two digits.
 FREE = 24e-3
 
 
 def control(method: str, **known: Any) -> Any:
-    """Return a behaviour, put together for a bed of 5 x 5 cells, without conduits."""
+    """Return a behavior, put together for a bed of 5 x 5 cells, without conduits."""
     table = {
         "layout": {"rows": 5, "columns": 5},
         "conduit": "absent",
@@ -27,9 +27,7 @@ def control(method: str, **known: Any) -> Any:
     return assemble(resolve(table)).controller
 
 
-def seen(
-    behaviour: Any, height: Any = 0.0, force: Any = 0.0, target: Any = 0.0, mode: int = 0
-) -> Measurement:
+def seen(behavior: Any, height: Any = 0.0, force: Any = 0.0, target: Any = 0.0, mode: int = 0) -> Measurement:
     """Return a measurement of the whole 5 x 5 bed: heights above rest in mm, forces in mN."""
     x, y = np.tile((np.arange(5) - 2.0) * 3e-3, 5), np.repeat((np.arange(5) - 2.0) * 3e-3, 5)
     full = np.zeros(25)
@@ -39,7 +37,7 @@ def seen(
         (full + force) * 1e-3,
         REST + (full + target) * 1e-3,
         np.full(25, mode, np.int8),
-        np.zeros((behaviour.rows, 25)),
+        np.zeros((behavior.rows, 25)),
         np.arange(25),
     )
 
@@ -49,38 +47,38 @@ def middle(value: float) -> np.ndarray:
     return np.where(np.arange(25) == 12, value, 0.0)
 
 
-def orders(behaviour: Any, measurement: Measurement) -> Orders:
-    """Return what a behaviour makes of a first measurement."""
-    memory, _ = behaviour.locate(behaviour.begin(), measurement)
-    return behaviour.command(memory, measurement)[1]
+def orders(behavior: Any, measurement: Measurement) -> Orders:
+    """Return what a behavior makes of a first measurement."""
+    memory, _ = behavior.locate(behavior.begin(), measurement)
+    return behavior.command(memory, measurement)[1]
 
 
-def speeds(behaviour: Any, command: np.ndarray) -> np.ndarray:
+def speeds(behavior: Any, command: np.ndarray) -> np.ndarray:
     """Return the speed of a pin without load under some commands: opening squared times the free speed."""
-    return np.sign(command) * command**2 * behaviour.drive.up[-1]
+    return np.sign(command) * command**2 * behavior.drive.up[-1]
 
 
 # All of them
 
 
-@pytest.mark.parametrize("method", BEHAVIOURS)
+@pytest.mark.parametrize("method", BEHAVIORS)
 def test_commands_are_openings(method: str) -> None:
-    behaviour = control(method)
+    behavior = control(method)
     chance = np.random.default_rng(1)
     wild = seen(
-        behaviour, chance.uniform(-40, 60, 25), chance.uniform(0, 500, 25), chance.uniform(-40, 60, 25)
+        behavior, chance.uniform(-40, 60, 25), chance.uniform(0, 500, 25), chance.uniform(-40, 60, 25)
     )
-    command = orders(behaviour, wild).command
+    command = orders(behavior, wild).command
     assert np.all(np.abs(command) <= 1.0)
 
 
-@pytest.mark.parametrize("method", [m for m in BEHAVIOURS if m != "shape_display"])
+@pytest.mark.parametrize("method", [m for m in BEHAVIORS if m != "shape_display"])
 def test_an_untouched_bed_at_rest_is_left_alone(method: str) -> None:
-    behaviour = control(method)
-    untouched = seen(behaviour)
+    behavior = control(method)
+    untouched = seen(behavior)
     nobody = Measurement(*(values[..., :0] for values in untouched))
-    memory, disc = behaviour.locate(behaviour.begin(), nobody)
-    given = behaviour.command(memory, untouched)[1]
+    memory, disc = behavior.locate(behavior.begin(), nobody)
+    given = behavior.command(memory, untouched)[1]
     assert disc is None
     assert not given.command.any()
     assert set(given.mode.tolist()) == {int(Mode.REST)}
@@ -89,118 +87,118 @@ def test_an_untouched_bed_at_rest_is_left_alone(method: str) -> None:
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display", "shape_display"])
 def test_a_cell_pressed_harder_than_its_reservoir_lifts_is_not_opened_to_it(method: str) -> None:
     # 0.157 N is what 0.5 bar lifts; opening to it would let the pin sink.
-    behaviour = control(method)
-    given = orders(behaviour, seen(behaviour, height=-10.0, force=160.0, target=0.0))
+    behavior = control(method)
+    given = orders(behavior, seen(behavior, height=-10.0, force=160.0, target=0.0))
     assert np.all(given.command <= 0.0)
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
 @pytest.mark.parametrize(("force", "touched"), [(4.9, False), (5.1, True)])
 def test_a_cell_is_touched_from_the_felt_force_on(method: str, force: float, touched: bool) -> None:
-    behaviour = control(method, felt_force=5e-3)
-    assert (orders(behaviour, seen(behaviour, force=force)).mode[0] > Mode.HOLD) == touched
+    behavior = control(method, felt_force=5e-3)
+    assert (orders(behavior, seen(behavior, force=force)).mode[0] > Mode.HOLD) == touched
 
 
 # Elastic
 
 
 def test_an_elastic_cell_is_at_rest_where_spring_and_force_balance() -> None:
-    behaviour = control("elastic", stiffness=20.0)
+    behavior = control("elastic", stiffness=20.0)
     # 20 N/m x 3 mm = 60 mN; rounding only.
-    assert orders(behaviour, seen(behaviour, height=-3.0, force=60.0)).command == pytest.approx(0.0, abs=1e-6)
+    assert orders(behavior, seen(behavior, height=-3.0, force=60.0)).command == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_elastic_cell_moves_by_force_over_damping() -> None:
-    behaviour = control("elastic", stiffness=20.0, damping=5.0)
-    given = orders(behaviour, seen(behaviour, height=-1.0, force=60.0)).command
+    behavior = control("elastic", stiffness=20.0, damping=5.0)
+    given = orders(behavior, seen(behavior, height=-1.0, force=60.0)).command
     # (20 N/m x 1 mm - 60 mN) / 5 N s/m; between 129 openings the speed is off by up to 1/4 of a step squared.
-    assert speeds(behaviour, given) == pytest.approx(-8e-3, abs=2e-5 * FREE)
+    assert speeds(behavior, given) == pytest.approx(-8e-3, abs=2e-5 * FREE)
 
 
 @pytest.mark.parametrize(("mode", "after"), [(Mode.REST, Mode.REST), (Mode.SPRING, Mode.SPRING)])
 def test_an_elastic_cell_once_touched_stays_touched_by_less_force(mode: Mode, after: Mode) -> None:
-    behaviour = control("elastic", felt_force=5e-3)
-    assert orders(behaviour, seen(behaviour, force=2.0, mode=mode)).mode[0] == after
+    behavior = control("elastic", felt_force=5e-3)
+    assert orders(behavior, seen(behavior, force=2.0, mode=mode)).mode[0] == after
 
 
 # Plastic
 
 
 def test_a_plastic_cell_pressed_below_yield_does_not_move() -> None:
-    behaviour = control("plastic", yield_force=0.03)
-    assert not orders(behaviour, seen(behaviour, force=29.0)).command.any()
+    behavior = control("plastic", yield_force=0.03)
+    assert not orders(behavior, seen(behavior, force=29.0)).command.any()
 
 
 def test_a_plastic_cell_sinks_by_the_force_above_yield() -> None:
-    behaviour = control("plastic", yield_force=0.03, damping=5.0)
-    given = orders(behaviour, seen(behaviour, force=50.0)).command
-    assert speeds(behaviour, given) == pytest.approx(-4e-3, abs=2e-5 * FREE)  # interpolation, as above
+    behavior = control("plastic", yield_force=0.03, damping=5.0)
+    given = orders(behavior, seen(behavior, force=50.0)).command
+    assert speeds(behavior, given) == pytest.approx(-4e-3, abs=2e-5 * FREE)  # interpolation, as above
 
 
 def test_a_plastic_cell_keeps_the_height_it_yielded_to() -> None:
-    behaviour = control("plastic")
-    assert orders(behaviour, seen(behaviour, height=-2.0, force=50.0)).target == pytest.approx(REST - 2e-3)
+    behavior = control("plastic")
+    assert orders(behavior, seen(behavior, height=-2.0, force=50.0)).target == pytest.approx(REST - 2e-3)
 
 
 def test_a_plastic_cell_never_forgets_a_deeper_press() -> None:
-    behaviour = control("plastic")
-    given = orders(behaviour, seen(behaviour, height=-1.0, force=50.0, target=-2.0))
+    behavior = control("plastic")
+    given = orders(behavior, seen(behavior, height=-1.0, force=50.0, target=-2.0))
     assert given.target == pytest.approx(REST - 2e-3)
 
 
 def test_a_plastic_cell_does_not_push_the_finger_back() -> None:
-    behaviour = control("plastic")
-    given = orders(behaviour, seen(behaviour, height=-2.0, force=10.0, target=-1.9))
+    behavior = control("plastic")
+    given = orders(behavior, seen(behavior, height=-2.0, force=10.0, target=-1.9))
     assert not given.command.any()
 
 
 def test_a_plastic_cell_left_alone_goes_back_to_where_it_yielded() -> None:
-    behaviour = control("plastic")
-    assert np.all(orders(behaviour, seen(behaviour, height=-2.0, target=-1.9)).command > 0.0)
+    behavior = control("plastic")
+    assert np.all(orders(behavior, seen(behavior, height=-2.0, target=-1.9)).command > 0.0)
 
 
 # Viscous
 
 
-def test_the_exchange_with_neighbours_keeps_the_sum() -> None:
-    behaviour = control("viscous", recovery_time=1e6)
-    given = orders(behaviour, seen(behaviour, target=middle(-5.0)))
+def test_the_exchange_with_neighbors_keeps_the_sum() -> None:
+    behavior = control("viscous", recovery_time=1e6)
+    given = orders(behavior, seen(behavior, target=middle(-5.0)))
     # 5 mm go over; rounding, and 5 ms of 1e6 s.
     assert (given.target - REST).sum() == pytest.approx(-5e-3, rel=1e-8)
 
 
-def test_the_neighbours_of_a_dent_are_drawn_along() -> None:
-    behaviour = control("viscous")
-    sunk = np.flatnonzero(orders(behaviour, seen(behaviour, target=middle(-5.0))).target < REST - 1e-6)
+def test_the_neighbors_of_a_dent_are_drawn_along() -> None:
+    behavior = control("viscous")
+    sunk = np.flatnonzero(orders(behavior, seen(behavior, target=middle(-5.0))).target < REST - 1e-6)
     assert sunk.tolist() == [7, 11, 12, 13, 17]
 
 
-def test_cells_drawn_along_by_a_pressed_neighbour_show_it() -> None:
-    behaviour = control("viscous")
-    given = orders(behaviour, seen(behaviour, target=middle(-5.0), force=middle(20.0)))
+def test_cells_drawn_along_by_a_pressed_neighbor_show_it() -> None:
+    behavior = control("viscous")
+    given = orders(behavior, seen(behavior, target=middle(-5.0), force=middle(20.0)))
     assert np.flatnonzero(given.mode == Mode.BLISTER).tolist() == [7, 11, 13, 17]
 
 
 def test_without_diffusivity_a_dent_stays_among_itself() -> None:
-    behaviour = control("viscous", diffusivity=0.0)
-    sunk = np.flatnonzero(orders(behaviour, seen(behaviour, target=middle(-5.0))).target < REST)
+    behavior = control("viscous", diffusivity=0.0)
+    sunk = np.flatnonzero(orders(behavior, seen(behavior, target=middle(-5.0))).target < REST)
     assert sunk.tolist() == [12]
 
 
 def test_a_viscous_cell_relaxes_exactly_over_a_period() -> None:
-    behaviour = control("viscous", diffusivity=0.0, damping=10.0, recovery_time=0.5)
-    given = orders(behaviour, seen(behaviour, force=50.0, target=-4.0)).target - REST
+    behavior = control("viscous", diffusivity=0.0, damping=10.0, recovery_time=0.5)
+    given = orders(behavior, seen(behavior, force=50.0, target=-4.0)).target - REST
     # u' = -F/c - u/τ from -4 mm: equilibrium -F τ/c = -2.5 mm, reached with exp(-T/τ). Rounding.
     assert given == pytest.approx(-2.5e-3 - 1.5e-3 * np.exp(-0.01), rel=1e-12)
 
 
 def test_the_cells_asked_for_hold_all_displaced_ones() -> None:
-    behaviour = control("viscous")
-    dent = seen(behaviour, target=middle(-5.0), force=middle(20.0))
-    memory, _ = behaviour.locate(behaviour.begin(), dent)
-    memory, _ = behaviour.command(memory, dent)
-    _, (x, y, radius) = behaviour.locate(memory, dent)
-    # The four neighbours, 3 mm away, in a box of 6 x 6 mm, and a margin of two pitches.
+    behavior = control("viscous")
+    dent = seen(behavior, target=middle(-5.0), force=middle(20.0))
+    memory, _ = behavior.locate(behavior.begin(), dent)
+    memory, _ = behavior.command(memory, dent)
+    _, (x, y, radius) = behavior.locate(memory, dent)
+    # The four neighbors, 3 mm away, in a box of 6 x 6 mm, and a margin of two pitches.
     assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert radius == pytest.approx(np.hypot(3e-3, 3e-3) + 6e-3)
 
@@ -208,19 +206,19 @@ def test_the_cells_asked_for_hold_all_displaced_ones() -> None:
 # Push and pull
 
 
-def cycle(behaviour: Any, measurement: Measurement) -> Orders:
+def cycle(behavior: Any, measurement: Measurement) -> Orders:
     """Return the orders at the end of a cycle of listening."""
-    memory = behaviour.begin()
+    memory = behavior.begin()
     for _ in range(2):
-        memory, _ = behaviour.locate(memory, measurement)
-        memory, given = behaviour.command(memory, measurement)
+        memory, _ = behavior.locate(memory, measurement)
+        memory, given = behavior.command(memory, measurement)
     return given
 
 
 def test_push_pull_never_reads_the_force() -> None:
-    behaviour = control("push_pull")
-    blind = seen(behaviour, height=middle(-0.5), force=np.nan)
-    given = cycle(behaviour, blind)
+    behavior = control("push_pull")
+    blind = seen(behavior, height=middle(-0.5), force=np.nan)
+    given = cycle(behavior, blind)
     for row in (given.target, given.command, blind.own):
         assert np.all(np.isfinite(row))
     assert np.flatnonzero(given.mode == Mode.FORCE_FOLLOW).tolist() == [12]
@@ -228,35 +226,35 @@ def test_push_pull_never_reads_the_force() -> None:
 
 @pytest.mark.parametrize(("drift", "touched"), [(-0.09, False), (-0.11, True), (0.09, False), (0.11, True)])
 def test_a_touch_is_a_drift_beyond_the_threshold_either_way(drift: float, touched: bool) -> None:
-    behaviour = control("push_pull", threshold=0.1e-3)
-    given = cycle(behaviour, seen(behaviour, height=middle(drift)))
+    behavior = control("push_pull", threshold=0.1e-3)
+    given = cycle(behavior, seen(behavior, height=middle(drift)))
     assert (given.mode[12] == Mode.FORCE_FOLLOW) == touched
 
 
 @pytest.mark.parametrize("drift", [-0.5, 0.5])
 def test_a_pin_pushed_or_pulled_takes_its_commanded_height_along(drift: float) -> None:
-    behaviour = control("push_pull", threshold=0.1e-3)
-    given = cycle(behaviour, seen(behaviour, height=middle(drift)))
+    behavior = control("push_pull", threshold=0.1e-3)
+    given = cycle(behavior, seen(behavior, height=middle(drift)))
     assert given.target[12] - REST == pytest.approx(np.sign(drift) * 0.4e-3)  # all but the threshold
 
 
 def test_a_pin_let_go_stays_where_it_was_let_go() -> None:
-    behaviour = control("push_pull", release_time=0.02)
-    still = seen(behaviour, height=middle(-0.5))
-    memory, target = behaviour.begin(), still.target
+    behavior = control("push_pull", release_time=0.02)
+    still = seen(behavior, height=middle(-0.5))
+    memory, target = behavior.begin(), still.target
     for _ in range(12):
         now = still._replace(target=target)
-        memory, _ = behaviour.locate(memory, now)
-        memory, given = behaviour.command(memory, now)
+        memory, _ = behavior.locate(memory, now)
+        memory, given = behavior.command(memory, now)
         target = given.target
     assert target[12] == pytest.approx(REST - 0.5e-3)
     assert given.mode[12] == Mode.HOLD
 
 
 def test_a_listening_pin_goes_down_as_fast_as_up() -> None:
-    behaviour = control("push_pull")
-    up = cycle(behaviour, seen(behaviour)).command
-    down = orders(behaviour, seen(behaviour)).command
+    behavior = control("push_pull")
+    up = cycle(behavior, seen(behavior)).command
+    down = orders(behavior, seen(behavior)).command
     assert np.all(up > 0.0)
     assert np.array_equal(up, -down)  # the reservoirs are alike
 
@@ -274,8 +272,8 @@ def test_a_listening_pin_s_speeds_are_alike_under_unlike_reservoirs() -> None:
 
 
 def test_a_force_display_cell_is_at_rest_under_the_force_of_the_field() -> None:
-    behaviour = control("force_display", field="flat", force=0.05)
-    given = orders(behaviour, seen(behaviour, height=-2.0, force=50.0)).command
+    behavior = control("force_display", field="flat", force=0.05)
+    given = orders(behavior, seen(behavior, height=-2.0, force=50.0)).command
     assert given == pytest.approx(0.0, abs=1e-6)
 
 
@@ -285,6 +283,6 @@ def test_a_named_field_varies_by_the_contrast() -> None:
 
 
 def test_a_cell_of_the_force_display_rises_to_its_limit_at_most() -> None:
-    behaviour = control("force_display", rise=1e-3)
-    given = orders(behaviour, seen(behaviour, height=1.1, force=10.0)).command
+    behavior = control("force_display", rise=1e-3)
+    given = orders(behavior, seen(behavior, height=1.1, force=10.0)).command
     assert np.all(given < 0.0)

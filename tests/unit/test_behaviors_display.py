@@ -22,41 +22,41 @@ def control(**known: Any) -> Any:
 
 
 def test_the_rows_of_a_one_time_refresh_go_one_after_another() -> None:
-    behaviour = control(refresh="one_time")
-    assert [move[:2] for move in behaviour.moves] == [(row, row) for row in range(5)]
+    behavior = control(refresh="one_time")
+    assert [move[:2] for move in behavior.moves] == [(row, row) for row in range(5)]
 
 
 def test_a_gradual_refresh_goes_through_its_surfaces_row_by_row() -> None:
-    behaviour = control(refresh="gradual", surfaces=2)
-    assert [tuple(move) for move in behaviour.moves] == [(r, r, s) for s in (0.5, 1.0) for r in range(5)]
+    behavior = control(refresh="gradual", surfaces=2)
+    assert [tuple(move) for move in behavior.moves] == [(r, r, s) for s in (0.5, 1.0) for r in range(5)]
 
 
 def test_an_approximate_gradual_refresh_moves_all_rows_at_once() -> None:
-    behaviour = control(refresh="approximate_gradual", surfaces=2)
-    assert [tuple(move) for move in behaviour.moves] == [(0, 4, 0.5), (0, 4, 1.0)]
+    behavior = control(refresh="approximate_gradual", surfaces=2)
+    assert [tuple(move) for move in behavior.moves] == [(0, 4, 0.5), (0, 4, 1.0)]
 
 
 def test_a_move_waits_no_longer_than_its_patience() -> None:
     # Every pin is held down by something; each row is given up in its turn.
-    behaviour = control(shape="pyramid", refresh="one_time", patience=0.05)
+    behavior = control(shape="pyramid", refresh="one_time", patience=0.05)
     bed, full = grid(Layout(5, 5)), np.full(25, 40e-3)
     place, mode = bed.place(np.arange(25)), np.zeros(25, np.int8)
     stuck = Measurement(place, full, np.zeros(25), full, mode, np.zeros((0, 25)), np.arange(25))
-    memory = behaviour.begin()
+    memory = behavior.begin()
     for _ in range(5 * 10 + 1):
-        memory, _ = behaviour.command(memory, stuck)
+        memory, _ = behavior.command(memory, stuck)
     assert memory.move == 5
 
 
 def test_a_move_waits_as_long_as_its_patience() -> None:
-    behaviour = control(shape="pyramid", refresh="one_time", patience=0.0525)
+    behavior = control(shape="pyramid", refresh="one_time", patience=0.0525)
     place, full = grid(Layout(5, 5)).place(np.arange(25)), np.full(25, 40e-3)
     stuck = Measurement(
         place, full, np.zeros(25), full, np.zeros(25, np.int8), np.zeros((0, 25)), np.arange(25)
     )
-    memory, moves = behaviour.begin(), []
+    memory, moves = behavior.begin(), []
     for _ in range(25):
-        memory, _ = behaviour.command(memory, stuck)
+        memory, _ = behavior.command(memory, stuck)
         moves.append(memory.move)
     # The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.
     assert np.flatnonzero(np.diff([0, *moves])).tolist() == [0, 11, 22]
@@ -91,11 +91,11 @@ def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_fing
         "layout": {"rows": 1, "columns": 1},
         "control": {"method": "force_display", "release_time": 0.0225},
     }
-    behaviour = assemble(resolve(table)).controller
+    behavior = assemble(resolve(table)).controller
     place, full = grid(Layout(1, 1)).place(np.arange(1)), np.full(1, 40e-3)
-    mode, own, follows = np.full(1, Mode.FORCE_FOLLOW, np.int8), np.zeros((behaviour.rows, 1)), []
+    mode, own, follows = np.full(1, Mode.FORCE_FOLLOW, np.int8), np.zeros((behavior.rows, 1)), []
     for _ in range(6):
-        _, given = behaviour.command(
+        _, given = behavior.command(
             None, Measurement(place, full, np.zeros(1), full, mode, own, np.arange(1))
         )
         mode = given.mode
