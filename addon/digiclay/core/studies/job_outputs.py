@@ -22,7 +22,7 @@ SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
 #: The keys of a job.toml.
 KEYS = ("export", "errors", *SECTIONS)
 #: Keys of pictures in older files, and what they are called now.
-FORMER = {"colour": "color"}
+FORMER = {"color": "color"}
 
 
 @dataclass(frozen=True)
