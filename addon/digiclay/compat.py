@@ -29,7 +29,7 @@ __all__ = [
 #: The name Blender knows the extension by.
 PACKAGE = __package__
 #: What inputs of the bed's geometry nodes are called in older files.
-FORMER_INPUTS = {"Color by Force": "Color by Force", "Top Color at (N)": "Top Color at (N)"}
+FORMER_INPUTS = {"Color by Force": "Colour by Force", "Top Color at (N)": "Top Colour at (N)"}
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
     "scenes", "objects", "collections", "meshes", "curves", "fonts", "lights",

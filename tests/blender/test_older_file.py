@@ -70,7 +70,7 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names() -> None:
     shown_as.color, shown_as.top_force = "force", 0.5
     assert (shown_as.color, view.top_color(found)) == ("force", 0.5)
     names = set(found.modifiers["Pins"].node_group.interface.items_tree.keys())
-    assert {"Color by Force", "Top Color at (N)"} <= names
+    assert {"Colour by Force", "Top Colour at (N)"} <= names
 
 
 def test_the_take_replays_to_the_stored_heights() -> None:

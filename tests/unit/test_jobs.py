@@ -46,9 +46,9 @@ def test_every_scene_meets_every_method_and_every_setting(tmp_path: Path) -> Non
 
 
 def test_a_picture_of_an_older_file_has_its_color_under_the_former_key() -> None:
-    assert make_outputs({"still": {"color": "force"}}).still == Still(color="force")
-    with pytest.raises(ParameterError, match="color"):
-        make_outputs({"still": {"color": "force", "color": "mode"}})
+    assert make_outputs({"still": {"colour": "force"}}).still == Still(color="force")
+    with pytest.raises(ParameterError, match="colour"):
+        make_outputs({"still": {"colour": "force", "color": "mode"}})
 
 
 def test_a_file_that_names_only_scenes_runs_each_as_it_is(tmp_path: Path) -> None:

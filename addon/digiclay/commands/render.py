@@ -58,7 +58,7 @@ def add(commands: Any) -> None:
         "--color", choices=COLORS, help="quantity shown by the colors of the pins; default: mode"
     )
     # Scripts written for older versions have it so.
-    parser.add_argument("--color", dest="color", choices=COLORS, help=argparse.SUPPRESS)
+    parser.add_argument("--colour", dest="color", choices=COLORS, help=argparse.SUPPRESS)
     parser.add_argument(
         "--arrows", action=argparse.BooleanOptionalAction, help="forces as arrows; default: in films only"
     )

@@ -22,7 +22,7 @@ SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
 #: The keys of a job.toml.
 KEYS = ("export", "errors", *SECTIONS)
 #: Keys of pictures in older files, and what they are called now.
-FORMER = {"color": "color"}
+FORMER = {"colour": "color"}
 
 
 @dataclass(frozen=True)
