@@ -134,7 +134,7 @@ def _within_reach(
     """Return whether heights, (n,), are within `Speeds.reach` of those a control period before."""
     assert system.cell.touch is not None
     poses = require_one(trajectories).poses(period * system.period + system.instants)
-    places = system.grid.place(np.arange(system.grid.count))
+    places = system.grid.compute_basis(np.arange(system.grid.count))
     under = underside(*forms(system.cell.touch.fingertip.outline(poses)), places)
     lowest, highest = speeds(system.cell).reach(before, under, system.period)
     # Rounding: these undersides are worked out from other products.

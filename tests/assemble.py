@@ -19,7 +19,7 @@ from digiclay.core.model.contact import Contact
 from digiclay.core.model.delay import Delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, underside
 from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.interfaces import Commands, Measurement
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
@@ -117,11 +117,11 @@ class Scripted:
         """Ask for the whole bed."""
         return memory, (0.0, 0.0, 1.0)
 
-    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
         """Command what the script says."""
-        _, x, y, *_ = seen.place
+        _, x, y, *_ = seen.quadratic_basis
         command = np.broadcast_to(self.script(memory * self.period, x, y), x.shape).astype(float)
-        return memory + 1, Orders(seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command)
+        return memory + 1, Commands(seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command)
 
 
 def scripted(script: Callable[[float, Floats, Floats], Any]) -> Callable[[float], Scripted]:
@@ -169,14 +169,14 @@ def replayed(take: Take) -> bool:
     return snapshot.dump(assemble(take.scene), last) == take.end
 
 
-def place(x: Floats, y: Floats) -> Floats:
+def make_basis(x: Floats, y: Floats) -> Floats:
     """Return rows 1, x, y, x², x y, y² of some places."""
     return np.array([np.ones(x.size), x, y, x * x, x * y, y * y])
 
 
 def under(outline: Floats, x: Floats, y: Floats) -> Floats:
     """Return the finger's underside, (k, n), m, for outlines (k, 10)."""
-    return underside(*forms(outline), place(x, y))
+    return underside(*forms(outline), make_basis(x, y))
 
 
 def one_cell(**parts: Any) -> System:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 __all__ = ["dead"]
 
@@ -13,5 +13,5 @@ __all__ = ["dead"]
 def dead() -> int:
     """Return the number of a process that has ended."""
     process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait(HANGS)
+    process.wait(TIMEOUT)
     return process.pid

@@ -8,7 +8,7 @@ import sys
 from filecmp import dircmp
 from pathlib import Path
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[1]
 
@@ -24,7 +24,7 @@ def run_python(copy: Path, *arguments: str) -> str:
     """Run Python on the copy; return what it printed."""
     done = subprocess.run(
         [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
-        capture_output=True, text=True, check=False, timeout=HANGS,
+        capture_output=True, text=True, check=False, timeout=TIMEOUT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout

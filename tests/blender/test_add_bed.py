@@ -18,7 +18,7 @@ from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -126,7 +126,7 @@ def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset: str) -> Non
 def test_an_imported_run_has_the_settings_it_was_run_with(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "digiclay", "run", "tap", "--quiet", "--out", str(tmp_path / "run")]
     command += ["--set", "valve.stroke=41 um", "--set", "simulation.duration=0.05"]
-    subprocess.run(command, check=True, timeout=HANGS, cwd=Path(digiclay.__file__).parents[1])
+    subprocess.run(command, check=True, timeout=TIMEOUT, cwd=Path(digiclay.__file__).parents[1])
     path = str(tmp_path / "run" / "history.npz")
     assert bpy.ops.import_scene.digital_clay_run(filepath=path) == {"FINISHED"}
     scene = properties.scene_of(bpy.context.object)

@@ -15,7 +15,7 @@ from typing import Any
 import digiclay
 import pytest
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 HERE = Path(__file__).parent
 TOOL = HERE.parents[1] / "tools" / "extension.py"
@@ -28,7 +28,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The zip, built by the tool of this Blender."""
     out = tmp_path_factory.mktemp("dist")
     command = [sys.executable, str(TOOL), "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=HANGS)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, done.stderr
     (found,) = out.glob("*.zip")
     return found
@@ -42,7 +42,9 @@ def seen(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, A
     # Started elsewhere and without the checkout's path: it has the zip and nothing else of digiclay.
     environment.pop("PYTHONPATH", None)
     command = [sys.executable, "-P", str(HERE / "use_the_zip.py"), str(archive), str(folder)]
-    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, timeout=HANGS)
+    done = subprocess.run(
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
+    )
     assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     assert "Traceback" not in done.stderr
     result: dict[str, Any] = json.loads((folder / "seen.json").read_text())
@@ -86,7 +88,7 @@ def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path: Path) -> None:
     manifest = copy / "addon" / "digiclay" / "blender_manifest.toml"
     manifest.write_text(manifest.read_text().replace('"Modeling"', '"Pottery"'))
     command = [sys.executable, str(copy / "tools" / "extension.py")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=HANGS)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode != 0
     assert "Pottery" in done.stderr
     assert not (copy / "dist").exists()

@@ -18,7 +18,7 @@ from digiclay.device import palettes, view
 from digiclay.device.instant import Instant
 from digiclay.pictures import stage, still
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 WIDTH, HEIGHT = 240, 150
 
@@ -149,7 +149,11 @@ def test_rendering_without_blender_says_in_one_line_what_to_install(tmp_path: Pa
     )
     path = f"{tmp_path}:{Path(digiclay.__file__).parents[1]}"
     done = subprocess.run(
-        [sys.executable, "-c", code], env={"PYTHONPATH": path}, capture_output=True, text=True, timeout=HANGS
+        [sys.executable, "-c", code],
+        env={"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
     )
     assert done.stderr == ""
     assert done.stdout.splitlines() == [

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 PROGRAMS = ("admesh", "assimp", "prusa-slicer")
 
@@ -56,7 +56,7 @@ def told(*command: str | Path) -> str:
     done = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        text=True, errors="replace", timeout=HANGS,
+        text=True, errors="replace", timeout=TIMEOUT,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     return done.stdout

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.model.interfaces import Controller, Measurement, Orders
+from digiclay.core.model.interfaces import Commands, Controller, Measurement
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import level
 from hypothesis import example, given, settings
@@ -42,7 +42,7 @@ class Everywhere:
         """Attend as the inner one does, but ask for all cells."""
         return self.inner.locate(memory, touched)[0], (0.0, 0.0, 1.0)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Command as the inner one does."""
         return self.inner.command(memory, seen)
 

@@ -11,7 +11,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.session.run_scene import run
 from digiclay.core.surface.features import Feature, find
 from digiclay.core.surface.formed import of_history
-from digiclay.core.surface.sheet import stretched
+from digiclay.core.surface.surface_grid import fit_skin
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def history() -> dict[str, Any]:
 def features(history: dict[str, Any], time: float, former: float) -> list[Feature]:
     """Return what was formed between two times, s."""
     row, before = (int(np.argmin(np.abs(history["time"] - moment))) for moment in (time, former))
-    return find(stretched(of_history(history, row, before), "bilinear", 1, 1e-3))
+    return find(fit_skin(of_history(history, row, before), "bilinear", 1, 1e-3))
 
 
 def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley(history):
@@ -49,7 +49,7 @@ def test_their_crests_are_the_ways_of_the_finger(history):
 def test_the_mound_stands_where_the_finger_was_lifted_and_the_ridge_is_as_high_as_before(history):
     found = {one.form: one for one in features(history, 26.5, 0.0)}
     (before,) = features(history, 10.3, 0.0)
-    middle = found["mound"].region.place.mean(axis=0)
+    middle = found["mound"].region.quadratic_basis.mean(axis=0)
     assert np.linalg.norm(middle - (21e-3, -21e-3)) < 6e-3
     assert found["mound"].extreme > 24e-3
     # Its crest goes on under the mound, as high as it was: 15 mm, and the pulp over it.
@@ -64,6 +64,6 @@ def test_the_ridge_stands_before_the_mound_and_the_mound_at_its_end(history):
     assert ridge.extreme == pytest.approx(15e-3, abs=2e-3)  # drawn up by 15 mm, and the pulp over it
     (line,) = ridge.crests
     assert np.ptp(line[:, 2]) < 2e-3
-    middle = mound.region.place.mean(axis=0)
+    middle = mound.region.quadratic_basis.mean(axis=0)
     assert np.linalg.norm(middle - (21e-3, -21e-3)) < 6e-3
     assert mound.extreme == pytest.approx(10e-3, abs=3e-3)

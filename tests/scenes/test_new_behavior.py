@@ -22,7 +22,7 @@ import numpy as np
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Measurement, Commands
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
 
@@ -44,7 +44,7 @@ class SpongeControl(CellwiseControl):
     name = "sponge"
     rows = 1
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let pressed cells sink, and the others swell; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         pressed = seen.force >= known.felt_force
@@ -52,7 +52,7 @@ class SpongeControl(CellwiseControl):
         speed = np.where(pressed, -seen.force / known.damping, (rest - seen.height) / known.swelling_time)
         mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
         target = np.full(seen.height.shape, rest)
-        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
 def build(parameters: Sponge, device: DeviceInfo) -> SpongeControl:

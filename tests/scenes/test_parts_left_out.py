@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 ADDON = Path(__file__).parents[2] / "addon"
 
@@ -30,7 +30,7 @@ def imported(*absent: str) -> set[str]:
     """Run a short session without some parts; return the core's modules it imported."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN, *absent],
-        cwd=ADDON, capture_output=True, text=True, check=False, timeout=HANGS,
+        cwd=ADDON, capture_output=True, text=True, check=False, timeout=TIMEOUT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return set(done.stdout.split())

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import pytest
-from digiclay.core.batch.packing import STACKED, structure
+from digiclay.core.batch.packing import BATCHED, structure
 from digiclay.core.batch.run_together import measure_together
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
@@ -40,7 +40,7 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
             assert found.metrics[f"{name}_error"] == expected, name
 
 
-@pytest.mark.parametrize("method", STACKED)
+@pytest.mark.parametrize("method", BATCHED)
 def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
     first, *others = known.section("trajectory").waypoints

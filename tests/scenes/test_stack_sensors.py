@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
-from digiclay.core.batch.packing import why_not
+from digiclay.core.batch.packing import find_reason
 
 from tests.assemble import sample
 from tests.scenes.test_stack import assert_as_alone, moved, together
@@ -36,7 +36,7 @@ def test_runs_with_sensors_of_their_own_come_to_what_they_come_to_alone() -> Non
 
 
 def test_noisy_sensors_keep_a_scene_out_of_stacks() -> None:
-    reasons = {why_not(sample("tap", f"sensors.{one}_noise=1e-6")) for one in ("force", "height")}
+    reasons = {find_reason(sample("tap", f"sensors.{one}_noise=1e-6")) for one in ("force", "height")}
     assert reasons == {"what noisy sensors make of a cell depends on which cells take part"}
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
@@ -103,7 +103,7 @@ def tracked(*patterns: str) -> list[Path]:
     """Return the files git tracks, and new ones it would not ignore."""
     listed = subprocess.run(
         ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "-z", "--", *patterns],
-        cwd=ROOT, capture_output=True, text=True, check=True, timeout=HANGS,
+        cwd=ROOT, capture_output=True, text=True, check=True, timeout=TIMEOUT,
     )  # fmt: skip
     found = [ROOT / name for name in listed.stdout.split("\0") if name]
     assert found, f"git lists no file for {patterns}"
@@ -223,7 +223,7 @@ def test_core_imports_with_blender_and_every_heavy_library_blocked() -> None:
     script = BLOCKED_IMPORT.format(refused={*BLENDER, "trimesh", "matplotlib", "scipy"})
     done = subprocess.run(
         [sys.executable, "-c", script],
-        cwd=ROOT / "addon", capture_output=True, text=True, check=False, timeout=HANGS,
+        cwd=ROOT / "addon", capture_output=True, text=True, check=False, timeout=TIMEOUT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) == len(core_modules()) - 1  # all but the core's own __init__

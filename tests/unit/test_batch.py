@@ -19,7 +19,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.studies.job_table import read_jobs
 
 from tests.other_process import dead
-from tests.patience import HANGS, until
+from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
 
@@ -139,9 +139,9 @@ def test_a_folder_that_was_half_written_does_not_count() -> None:
 def test_ctrl_c_ends_all_processes_and_leaves_nothing_half_done() -> None:
     jobs(HOURS)
     process = started("two.toml", "--jobs", "2")
-    until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    wait_until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    out, err = process.communicate(timeout=HANGS)
+    out, err = process.communicate(timeout=TIMEOUT)
     assert (process.returncode, err) == (130, "")
     assert "Stopped: what is done is kept, and the same command goes on from there." in out
     assert runs() == []
@@ -151,11 +151,11 @@ def test_ctrl_c_ends_all_processes_and_leaves_nothing_half_done() -> None:
 def test_when_a_batch_is_killed_its_processes_end_and_the_next_one_goes_on() -> None:
     jobs(HOURS)
     process = started("two.toml", "--jobs", "2")
-    until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
+    wait_until(lambda: len(list(Path("two/runs").glob(".*.part"))) == 2)
     process.kill()
-    process.communicate(timeout=HANGS)
+    process.communicate(timeout=TIMEOUT)
     # The processes notice that nobody is there, and take back what they have begun.
-    until(lambda: runs() == [])
+    wait_until(lambda: runs() == [])
     jobs(TWO)
     assert main(["batch", "two.toml", "--quiet"]) == 0
 
@@ -164,7 +164,7 @@ def test_a_process_that_dies_is_told_by_its_signal() -> None:
     jobs(HOURS)
     main(["batch", "two.toml", "--prepare", "--quiet"])
     worker = JobProcess(["job", "two/jobs/tap-a", "--follow"], Path("log.txt"))
-    until(lambda: list(Path("two/runs").glob(".*.part")))
+    wait_until(lambda: list(Path("two/runs").glob(".*.part")))
     worker.kill()
     assert worker.read_error().startswith("The process ended with signal 9")
 

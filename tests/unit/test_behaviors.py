@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.interfaces import Measurement, Commands
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
@@ -47,7 +47,7 @@ def middle(value: float) -> np.ndarray:
     return np.where(np.arange(25) == 12, value, 0.0)
 
 
-def orders(behavior: Any, measurement: Measurement) -> Orders:
+def orders(behavior: Any, measurement: Measurement) -> Commands:
     """Return what a behavior makes of a first measurement."""
     memory, _ = behavior.locate(behavior.begin(), measurement)
     return behavior.command(memory, measurement)[1]
@@ -206,7 +206,7 @@ def test_the_cells_asked_for_hold_all_displaced_ones() -> None:
 # Push and pull
 
 
-def cycle(behavior: Any, measurement: Measurement) -> Orders:
+def cycle(behavior: Any, measurement: Measurement) -> Commands:
     """Return the orders at the end of a cycle of listening."""
     memory = behavior.begin()
     for _ in range(2):

@@ -12,7 +12,7 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.control.cell_states import CellStates, CellStatesControl, Patch
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.interfaces import Commands, Measurement
 from digiclay.core.model.layout import Grid, Layout, grid
 
 REST = 40e-3
@@ -33,10 +33,12 @@ def seen(
         modes[cell] = value
     level = np.full(bed.count, REST)
     cells = np.arange(bed.count)
-    return Measurement(bed.place(cells), level, forces, level.copy(), modes, np.zeros((1, bed.count)), cells)
+    return Measurement(
+        bed.compute_basis(cells), level, forces, level.copy(), modes, np.zeros((1, bed.count)), cells
+    )
 
 
-def ordered(measured: Measurement, memory: Patch | None = None) -> tuple[Patch, Orders]:
+def ordered(measured: Measurement, memory: Patch | None = None) -> tuple[Patch, Commands]:
     """Let the controller locate the finger and command."""
     memory, _ = CONTROL.locate(memory or CONTROL.begin(), measured)
     return CONTROL.command(memory, measured)

@@ -20,8 +20,8 @@ from digiclay.core.base.run_folder import claim_files, claim_folder, find_lock, 
 from digiclay.core.base.unfinished import remove_abandoned
 
 from tests.other_process import dead
-from tests.patience import HANGS, until
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
 SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
@@ -51,12 +51,12 @@ def running(*arguments: str, sign: str) -> Iterator[subprocess.Popen[str]]:
     """Keep a process that works for hours, from the time a file of it is there; then kill it."""
     process = started(*arguments)
     try:
-        until(lambda: process.poll() is not None or list(Path().glob(sign)))
+        wait_until(lambda: process.poll() is not None or list(Path().glob(sign)))
         assert process.poll() is None, process.communicate()
         yield process
     finally:
         process.kill()
-        process.communicate(timeout=HANGS)
+        process.communicate(timeout=TIMEOUT)
 
 
 def names(folder: Path = Path()) -> list[str]:
@@ -113,7 +113,7 @@ def test_a_second_series_in_one_folder_is_refused_at_once(
     sweep = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", *HOURS, "--out", "o"]
     batch = ["batch", "jobs.toml", "--quiet", "--out", "o"]
     with running(*(sweep if series == "sweep" else batch), sign=f"o/{series}.json"):
-        until(lambda: not Path(".o.lock").exists())  # the folder is made
+        wait_until(lambda: not Path(".o.lock").exists())  # the folder is made
         assert main(sweep if series == "sweep" else batch) == 2
         told = capsys.readouterr().err
         assert told == REFUSED.format("worked in")
@@ -135,7 +135,7 @@ def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it
         remove_abandoned(Path("jobs/runs"))
         assert part.is_dir()
         process.kill()
-        process.wait(HANGS)
+        process.wait(TIMEOUT)
     assert names(Path("jobs/runs")) == [part.name, ".my.lock"]
     scene.write_text(short, encoding="utf-8")
     assert main(["job", "jobs/jobs/my", "--quiet"]) == 0
@@ -204,8 +204,8 @@ def test_whoever_waits_gets_the_claim_when_the_other_one_ends() -> None:
     )  # fmt: skip
     assert other.stdout is not None
     assert other.stdout.readline() == "here\n"
-    other.communicate("go\n", timeout=HANGS)
-    with claim_folder(Path("o"), overwrite=False, patience=HANGS):
+    other.communicate("go\n", timeout=TIMEOUT)
+    with claim_folder(Path("o"), overwrite=False, patience=TIMEOUT):
         assert find_lock(Path("o")).exists()
     assert names() == ["my.toml"]
 
@@ -215,7 +215,7 @@ def test_a_process_that_was_started_does_not_keep_the_claim() -> None:
     with claim_folder(Path("o"), overwrite=False):
         child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     with claim_folder(Path("o"), overwrite=False):
-        child.communicate(b"\n", timeout=HANGS)
+        child.communicate(b"\n", timeout=TIMEOUT)
     assert child.returncode == 0
 
 

@@ -16,8 +16,8 @@ from digiclay.commands import describe, export
 from digiclay.commands.describe import size
 from digiclay.core.base.errors import BEGINNING, END, one_line
 
-from tests.patience import HANGS
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+from tests.timeouts import TIMEOUT
 
 ADDON = Path(__file__).parents[2] / "addon"
 SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
@@ -174,7 +174,7 @@ def test_a_commands_help_begins_with_a_sentence(command: str, capsys: pytest.Cap
 
 def test_a_terminal_that_does_not_know_a_letter_gets_another(here: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "digiclay", "run", "my.toml"], capture_output=True, text=True, timeout=HANGS,
+        [sys.executable, "-m", "digiclay", "run", "my.toml"], capture_output=True, text=True, timeout=TIMEOUT,
         env={**os.environ, "PYTHONPATH": str(ADDON), "PYTHONIOENCODING": "ascii"}, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr, "height error about " in done.stdout) == (0, "", True)
@@ -197,7 +197,7 @@ def test_a_signal_while_the_program_starts_stops_it_in_one_line(here: Path) -> N
         "from digiclay.cli import console; console()\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script, "run", "my.toml"], capture_output=True, text=True, timeout=HANGS,
+        [sys.executable, "-c", script, "run", "my.toml"], capture_output=True, text=True, timeout=TIMEOUT,
         env={**os.environ, "PYTHONPATH": str(ADDON)}, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr, left(here)) == (130, "Stopped; no file is half-written.\n", [])

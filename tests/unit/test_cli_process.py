@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 
-from tests.patience import HANGS, until
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, left, scene_text
+from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
 SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
@@ -45,7 +45,7 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said: dict[str, str
     )
     known = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     told = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=HANGS, check=True,
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT, check=True,
         env={**known, **said, "PYTHONPATH": str(ADDON)},
     ).stdout  # fmt: skip
     # Numpy reads it when it is imported, so that must not have happened before.
@@ -63,7 +63,7 @@ def test_a_missing_library_is_told_before_any_work(
     arguments: list[str], missing: str, install: str, here: Path
 ) -> None:
     started = process(*arguments, block=missing)
-    _, err = started.communicate(timeout=HANGS)
+    _, err = started.communicate(timeout=TIMEOUT)
     assert (started.returncode, err.count("\n"), install in err, left(here)) == (2, 1, True, []), err
 
 
@@ -72,7 +72,7 @@ def test_a_job_of_a_batch_exports_without_any_library(here: Path) -> None:
     assert main(["batch", "jobs.toml", "--prepare", "--quiet"]) == 0
     (job,) = (here / "jobs" / "jobs").iterdir()
     started = process("job", str(job), block="trimesh scipy matplotlib")
-    _, err = started.communicate(timeout=HANGS)
+    _, err = started.communicate(timeout=TIMEOUT)
     assert started.returncode == 0, err
     made = here / "jobs" / "runs" / job.name
     assert (made / "surface.stl").is_file()
@@ -87,7 +87,7 @@ def test_an_output_folder_that_cannot_be_used_is_told_before_any_work(here: Path
     (here / "my" / "metrics.json").touch()
     started = process(*LONG)
     try:
-        _, err = started.communicate(timeout=HANGS)  # the session itself would take hours
+        _, err = started.communicate(timeout=TIMEOUT)  # the session itself would take hours
     finally:
         started.kill()
     assert (started.returncode, "is not empty" in err) == (2, True)
@@ -114,10 +114,10 @@ def interrupted(number: int, here: Path) -> tuple[int, str]:
         env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
     try:
-        until(ready.exists)
+        wait_until(ready.exists)
         ready.unlink()
         started.send_signal(number)
-        _, err = started.communicate(timeout=HANGS)
+        _, err = started.communicate(timeout=TIMEOUT)
     finally:
         started.kill()
     return started.returncode, err

@@ -11,7 +11,7 @@ from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputErro
 from digiclay.core.model.contact import Contact
 
 from tests.assemble import Record, one_cell, path, record, scripted
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 
 def test_a_parameter_error_names_owner_field_rule_and_value() -> None:
@@ -66,7 +66,7 @@ def test_the_closed_form_step_does_not_diverge_where_the_explicit_one_does() -> 
 def test_a_warning_of_numpy_is_an_error_in_the_processes_that_tests_start() -> None:
     code = "import numpy; numpy.exp(numpy.array([1000.0]))"
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=HANGS, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=TIMEOUT, check=False
     )
     assert done.returncode == 1
     assert "RuntimeWarning: overflow encountered in exp" in done.stderr

@@ -19,7 +19,7 @@ from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.body import Body
 from digiclay.core.surface.formed import Formed
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_a_file_that_cannot_be_replaced_leaves_no_temporary_one(tmp_path):
 def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     disk = tmp_path / "disk"
     disk.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=HANGS)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=TIMEOUT)
     try:
         path = disk / f"surface{mesh_writer.suffix(kind)}"
         path.write_bytes(b"older")
@@ -103,7 +103,7 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
         assert [one.name for one in disk.iterdir()] == [path.name]
         assert path.read_bytes() == b"older"
     finally:
-        subprocess.run(["umount", disk], check=True, timeout=HANGS)
+        subprocess.run(["umount", disk], check=True, timeout=TIMEOUT)
 
 
 def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
@@ -128,7 +128,7 @@ def test_exporting_needs_numpy_alone():
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
-        timeout=HANGS,
+        timeout=TIMEOUT,
         check=True,
         env=environment,
     )

@@ -15,7 +15,7 @@ import pytest
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.features import Feature, Finding, find
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.sheet import stretched
+from digiclay.core.surface.surface_grid import fit_skin
 
 #: Pitch in mm; three of a kind that no ridge here fits to.
 BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))
@@ -157,7 +157,7 @@ def in_plan(crest: np.ndarray) -> float:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_found_as_what_it_is(name: str, arrangement: str, pitch: float) -> None:
     bed = formed(name, arrangement, pitch)
-    found = find(stretched(bed, "bilinear", 1, 1e-3))
+    found = find(fit_skin(bed, "bilinear", 1, 1e-3))
     draw(name, arrangement, pitch, bed, found)
     wanted = SHAPES[name][1]
     assert sorted((one.kind, one.form) for one in found) == sorted((kind, form) for kind, form, _ in wanted)
@@ -172,7 +172,7 @@ def test_a_shape_is_found_as_what_it_is(name: str, arrangement: str, pitch: floa
 
 @pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
 def test_the_crests_of_a_cross_keep_to_its_lines(arrangement: str, pitch: float) -> None:
-    (boss,) = find(stretched(formed("slanted cross", arrangement, pitch), "bilinear", 1, 1e-3))
+    (boss,) = find(fit_skin(formed("slanted cross", arrangement, pitch), "bilinear", 1, 1e-3))
     for crest in boss.crests:
         x, y = crest[:, :2].T * 1e3
         assert min(one(x, y).max() for one in SLANTED) < 0.5 * pitch
@@ -185,13 +185,13 @@ def test_the_parts_of_a_boss_share_its_pins_area_and_volume(
     name: str, arrangement: str, pitch: float
 ) -> None:
     bed = formed(name, arrangement, pitch)
-    parts = find(stretched(bed, "bilinear", 1, 1e-3))
+    parts = find(fit_skin(bed, "bilinear", 1, 1e-3))
     whole = np.flatnonzero(bed.raised > Finding().threshold)
     np.testing.assert_array_equal(np.sort(np.concatenate([one.pins for one in parts])), whole)
     # Without what divides them: saddles and mounds as deep as nothing here is.
     place = np.concatenate([one.region.place[one.region.faces] for one in parts])
     assert sum(one.area for one in parts) == pytest.approx(area(place), rel=1e-9)
-    (undivided,) = find(stretched(bed, "bilinear", 1, 1e-3), Finding(smallest=len(whole) // 2 + 1))
+    (undivided,) = find(fit_skin(bed, "bilinear", 1, 1e-3), Finding(smallest=len(whole) // 2 + 1))
     # The smaller parts have too few pins then.
     assert sum(one.area for one in parts) == pytest.approx(undivided.area, rel=1e-9)
     assert sum(one.volume for one in parts) == pytest.approx(undivided.volume, rel=1e-9)
@@ -204,7 +204,7 @@ def area(corners: np.ndarray) -> float:
 
 
 def test_a_mound_on_a_ridge_is_as_high_as_it_is_and_the_ridge_no_higher_than_its_foot() -> None:
-    found = find(stretched(formed("ridge with a mound at its end", "aligned", 3.0), "bilinear", 1, 1e-3))
+    found = find(fit_skin(formed("ridge with a mound at its end", "aligned", 3.0), "bilinear", 1, 1e-3))
     height = {one.form: one.extreme * 1e3 for one in found}
     assert height["mound"] == pytest.approx(24.0, abs=1.0)  # between the pins
     assert height["ridge"] < 16.0

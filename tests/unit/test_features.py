@@ -10,7 +10,7 @@ from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.feature_solids import solid
 from digiclay.core.surface.features import Feature, Finding, find, summary, table
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.sheet import stretched
+from digiclay.core.surface.surface_grid import fit_skin
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 LEVEL = 0.04
@@ -28,7 +28,7 @@ def formed(
 def features(
     bed: Formed, finding: Finding | None = None, skin: str = "bilinear", parts: int = 1
 ) -> list[Feature]:
-    return find(stretched(bed, skin, parts, 1e-3), finding)
+    return find(fit_skin(bed, skin, parts, 1e-3), finding)
 
 
 def ridge(x, y, half: float = 12.0, height: float = 6.0, angle: float = 0.0):

@@ -16,7 +16,7 @@ from digiclay.core.base.processes import find_host, find_start, may_have_made
 from digiclay.core.base.unfinished import is_unfinished, name_unfinished, remove_abandoned
 
 from tests.other_process import dead
-from tests.patience import HANGS, until
+from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
 
@@ -70,15 +70,15 @@ def test_a_process_is_known_by_the_time_it_was_started() -> None:
         assert not may_have_made(process.pid, since - 3600.0)
     finally:
         process.kill()
-        process.wait(HANGS)
+        process.wait(TIMEOUT)
     assert find_start(process.pid) is None
     assert not may_have_made(process.pid, time.time())
 
 
 def test_a_process_that_nobody_has_asked_how_it_ended_is_gone() -> None:
     process = subprocess.Popen([sys.executable, "-c", ""])
-    until(lambda: find_start(process.pid) is None)
-    process.wait(HANGS)
+    wait_until(lambda: find_start(process.pid) is None)
+    process.wait(TIMEOUT)
 
 
 def test_where_a_drive_has_no_locks_a_record_is_held_instead(here: Path) -> None:
@@ -120,7 +120,7 @@ def test_a_lock_taken_away_by_its_owner_is_made_anew() -> None:
         subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": str(ADDON)})
         for _ in range(3)
     ]
-    assert [process.wait(HANGS) for process in several] == [0, 0, 0]
+    assert [process.wait(TIMEOUT) for process in several] == [0, 0, 0]
     assert names(Path("d")) == []
 
 
@@ -149,7 +149,7 @@ def test_a_lock_is_free_as_soon_as_its_process_is_killed() -> None:
     with pytest.raises(OutputError, match="taken"), hold_lock(Path("lock"), "taken"):
         pass
     other.send_signal(signal.SIGKILL)
-    other.communicate(timeout=HANGS)
+    other.communicate(timeout=TIMEOUT)
     assert Path("lock").exists()
     with hold_lock(Path("lock"), "taken"):
         pass

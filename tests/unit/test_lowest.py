@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 from digiclay.core.mesh_io.mesh_reader import read
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
 LOWEST = ROOT / "requirements" / "lowest.txt"
@@ -60,7 +60,7 @@ def test_meshes_are_read_with_the_lowest_trimesh_as_with_ours(tmp_path: Path) ->
     own = f"import sys; sys.path[:0] = [{str(tmp_path / 'lowest')!r}, {str(ROOT / 'addon')!r}]"
     ran = subprocess.run(
         [sys.executable, "-c", own + SCRIPT, *map(str, files)],
-        capture_output=True, text=True, timeout=HANGS, check=True,
+        capture_output=True, text=True, timeout=TIMEOUT, check=True,
     )  # fmt: skip
     told = json.loads(ran.stdout)
     assert told["version"] == "5.0.0"

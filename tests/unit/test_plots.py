@@ -16,7 +16,7 @@ from digiclay.core.model.set_point import SetPoint
 from digiclay.plots import run as plots
 from digiclay.plots.relief import hidden
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 
 def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
@@ -228,7 +228,7 @@ def python(script: str) -> str:
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
-        timeout=HANGS,
+        timeout=TIMEOUT,
         check=True,
         env=environment,
     )

@@ -21,7 +21,7 @@ from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session.run_scene import run
 from numpy.typing import NDArray
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 Floats = NDArray[np.float64]
 
@@ -259,7 +259,7 @@ def test_only_the_sensor_models_asked_for_are_imported(setting: str, modules: st
     )
     done = subprocess.run(
         [sys.executable, "-c", script, "simulation.duration=0.1", *filter(None, [setting])],
-        cwd=Path(__file__).parents[2] / "addon", capture_output=True, text=True, check=True, timeout=HANGS,
+        cwd=Path(__file__).parents[2] / "addon", capture_output=True, text=True, check=True, timeout=TIMEOUT,
     )  # fmt: skip
     assert done.stdout.strip() == modules
 

@@ -8,8 +8,8 @@ import scipy.sparse
 from digiclay.core.base.spline import monotone
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.sheet import Sheet, stretched
 from digiclay.core.surface.skins import SKINS
+from digiclay.core.surface.surface_grid import SurfaceGrid, fit_skin
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
@@ -27,8 +27,8 @@ def bed(arrangement: str = "aligned", rows: int = 7, columns: int = 9, seed: int
     return Formed.of(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)), 0.04, 0.0, 0)
 
 
-def covered(formed: Formed, skin: str, parts: int) -> Sheet:
-    return stretched(formed, skin, parts, CAP)
+def covered(formed: Formed, skin: str, parts: int) -> SurfaceGrid:
+    return fit_skin(formed, skin, parts, CAP)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

@@ -42,7 +42,7 @@ def same(first: State, second: State) -> bool:
 def packed_parts(state: State) -> list[Any]:
     """Return all of a state as things that compare exactly."""
     held = state.active
-    arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.place)
+    arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.quadratic_basis)
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
     return [*(array.tobytes() for array in arrays), *rest, state.memory, type(state.memory)]
 

@@ -25,7 +25,7 @@ from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import Record, evaluate, evaluate_bundle
 from digiclay.core.studies.series import finish
 
-from tests.patience import HANGS, until
+from tests.timeouts import TIMEOUT, wait_until
 
 #: A tenth of a second of a scene is enough for most of this.
 SHORT = [Setting("simulation.duration", "0.1")]
@@ -125,8 +125,8 @@ def test_after_a_stop_nothing_is_begun_and_what_is_done_stays() -> None:
     def task(bundle: list[Point]) -> list[Record | None]:
         begun.extend(bundle)
         # Asked once more after it was told to stop, it has given up what was not begun.
-        assert asked.acquire(timeout=HANGS)
-        assert asked.acquire(timeout=HANGS)
+        assert asked.acquire(timeout=TIMEOUT)
+        assert asked.acquire(timeout=TIMEOUT)
         return [{"figures": {}}]
 
     def stopped() -> bool:
@@ -184,7 +184,7 @@ def interrupted(out: Path, number: int) -> tuple[int, str]:
     )
     done = subprocess.run(
         [sys.executable, "-c", script, *QUICK, "--out", str(out)], capture_output=True, text=True,
-        timeout=HANGS, env={**os.environ, "PYTHONPATH": str(ADDON)},
+        timeout=TIMEOUT, env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
     return done.returncode, done.stderr
 
@@ -213,10 +213,10 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) 
         env={**os.environ, "PYTHONPATH": str(ADDON)}, start_new_session=True,
     )  # fmt: skip
     try:
-        until((here / "out" / "sweep.json").exists)
+        wait_until((here / "out" / "sweep.json").exists)
         time.sleep(3.0)  # the workers run or are being started; a terminal sends Ctrl-C to them as well
         os.killpg(started.pid, signal.SIGINT)
-        _, err = started.communicate(timeout=HANGS)  # the sessions would take hours
+        _, err = started.communicate(timeout=TIMEOUT)  # the sessions would take hours
     finally:
         if started.poll() is None:
             os.killpg(started.pid, signal.SIGKILL)
@@ -243,12 +243,12 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here: Path, whol
         [sys.executable, "-m", "digiclay", *QUICK, "--out", str(out)], stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ADDON)},
     )  # fmt: skip
-    until(lambda: list(out.glob("points/*.json")))
+    wait_until(lambda: list(out.glob("points/*.json")))
     told = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
     pairs = [tuple(map(int, line.split())) for line in told.splitlines()]
     worker, *_ = (pid for pid, parent in pairs if parent == sweep.pid)
     os.kill(worker, signal.SIGKILL)
-    _, err = sweep.communicate(timeout=HANGS)
+    _, err = sweep.communicate(timeout=TIMEOUT)
     assert (sweep.returncode, err) == (0, "")
     assert (out / "sweep.csv").read_bytes() == whole
 
@@ -272,7 +272,7 @@ def test_a_worker_that_cannot_read_its_bundle_ends() -> None:
         assert worker is not None
         worker.input.write(b"cdigiclay.no_such_module\nPoint\n.")  # as another version may send it
         worker.input.flush()
-        assert worker.process.wait(HANGS) == 0
+        assert worker.process.wait(TIMEOUT) == 0
 
 
 def test_after_a_stop_a_bundle_has_no_records() -> None:

@@ -23,10 +23,10 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import (
     RUNS,
-    StackWarning,
+    BatchWarning,
     evaluate,
     evaluate_bundle,
-    explain_failed_stacks,
+    explain_failed_batches,
     make_bundles,
 )
 
@@ -112,46 +112,46 @@ def test_a_control_period_of_a_larger_stack_takes_no_more_calls() -> None:
 
 def test_points_of_one_structure_run_together() -> None:
     parts = make_bundles(some("control.force_gain=1,2,3,4", "layout.rows=11,13"))
-    assert indices(parts.stacks) == [[0, 2, 4, 6], [1, 3, 5, 7]]
+    assert indices(parts.batches) == [[0, 2, 4, 6], [1, 3, 5, 7]]
     assert parts.describe() == ["8 points run in 2 stacks"]
 
 
 def test_a_stack_has_no_more_runs_than_pay() -> None:
     for count, sizes in ((2 * RUNS - 1, [2 * RUNS - 1]), (2 * RUNS + 1, [RUNS, RUNS + 1])):
         parts = make_bundles(some(f"control.force_gain=1:6:{count}"))
-        assert [len(stack) for stack in parts.stacks] == sizes
+        assert [len(batch) for batch in parts.batches] == sizes
 
 
 def test_long_sessions_make_smaller_stacks() -> None:
     long = [Setting("simulation.duration", "1e4")]
     parts = make_bundles(some("control.force_gain=1:6:20", settings=long))
     # 2 million rows of 41 bytes are 82 MB, and a stack may hold 1 GiB.
-    assert [len(stack) for stack in parts.stacks] == [10, 10]
+    assert [len(batch) for batch in parts.batches] == [10, 10]
 
 
 def test_points_whose_half_steps_are_cut_elsewhere_are_judged_in_stacks_of_their_own() -> None:
     # A dead time of half a control period falls on the end of a half step.
     varied = ("delay.dead_time=1 ms,2.5 ms", "control.force_gain=1:4:4")
-    assert indices(make_bundles(some(*varied)).stacks) == [[0, 1, 2, 3, 4, 5, 6, 7]]
-    assert indices(make_bundles(some(*varied), errors=True).stacks) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+    assert indices(make_bundles(some(*varied)).batches) == [[0, 1, 2, 3, 4, 5, 6, 7]]
+    assert indices(make_bundles(some(*varied), errors=True).batches) == [[0, 1, 2, 3], [4, 5, 6, 7]]
 
 
 def test_points_whose_steps_cannot_be_halved_are_told_when_they_run() -> None:
     finest = [*SHORT, Setting("simulation.physics_step", "5e-6")]
     parts = make_bundles(some("control.force_gain=1:4:4", settings=finest), errors=True)
-    assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
+    assert (parts.batches, indices(parts.alone)) == ((), [[0], [1], [2], [3]])
 
 
 def test_points_without_their_like_run_alone_and_it_is_said() -> None:
     parts = make_bundles(some("layout.rows=11,13,15"))
-    assert (parts.stacks, indices(parts.alone)) == ((), [[0], [1], [2]])
+    assert (parts.batches, indices(parts.alone)) == ((), [[0], [1], [2]])
     assert parts.describe() == ["3 points one at a time: fewer than 4 have the same bed, parts and steps"]
 
 
 def test_sessions_of_days_run_alone_and_it_is_said() -> None:
     days = [Setting("simulation.duration", "1e5")]
     parts = make_bundles(some("control.force_gain=1:6:5", settings=days))
-    assert parts.stacks == ()
+    assert parts.batches == ()
     assert parts.describe() == ["5 points one at a time: they have too many rows to keep for many at once"]
 
 
@@ -159,7 +159,7 @@ def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
     parts = make_bundles(
         some("control.method=viscous,push_pull,elastic", "valve_lag.time_constant=1e-3:2e-3:4")
     )
-    assert indices(parts.stacks) == [[8, 9, 10, 11]]
+    assert indices(parts.batches) == [[8, 9, 10, 11]]
     assert parts.describe() == [
         "4 points run in 1 stack",
         "4 points one at a time: what viscous does depends on which cells take part",
@@ -171,7 +171,7 @@ def test_values_that_do_not_go_together_are_in_no_stack() -> None:
     triggers = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
     method = [*SHORT, Setting("control.method", "cell_states")]
     parts = make_bundles(some(*triggers, settings=method))
-    assert (indices(parts.stacks), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
+    assert (indices(parts.batches), indices(parts.alone)) == ([[0, 1, 2, 4, 5]], [[3]])
 
 
 @pytest.mark.parametrize("errors", [False, True])
@@ -205,7 +205,7 @@ def test_a_stack_that_fails_as_a_whole_is_run_point_by_point(monkeypatch: pytest
     bundle = some("control.force_gain=1,5")
     records = dict(enumerate(record or {} for record in evaluate_bundle(bundle)))
     assert all("figures" in record for record in records.values())
-    assert explain_failed_stacks(records) == (
+    assert explain_failed_batches(records) == (
         "2 points one at a time: there is not enough memory for a stack",
     )
 
@@ -214,9 +214,9 @@ def test_a_fault_in_a_stack_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) 
     # Warnings are errors in tests: a stack that fails by our own fault fails the test it runs in.
     break_stacks(monkeypatch, ZeroDivisionError("by\nzero"))
     bundle = some("control.force_gain=1,5")
-    with pytest.raises(StackWarning, match="A stack of 2 runs failed: ZeroDivisionError: by zero"):
+    with pytest.raises(BatchWarning, match="A stack of 2 runs failed: ZeroDivisionError: by zero"):
         evaluate_bundle(bundle)
-    with pytest.warns(StackWarning):
+    with pytest.warns(BatchWarning):
         records = evaluate_bundle(bundle)
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
 

@@ -73,7 +73,7 @@ def dragged(periods: int) -> np.ndarray:
 
 
 def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
-    poses, places = dragged(70), grid(Layout()).place(np.arange(100, 400))
+    poses, places = dragged(70), grid(Layout()).compute_basis(np.arange(100, 400))
     together = [one.under(places) for one in trace_finger(Fingertip(), poses)]
     alone = [trace_finger(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
     assert np.array_equal(np.array(together), np.array(alone))
@@ -81,7 +81,7 @@ def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_th
 
 def test_other_places_in_mid_way_have_their_own_undersides() -> None:
     bed, coming = grid(Layout()), trace_finger(Fingertip(), dragged(8))
-    first, second = bed.place(np.arange(50)), bed.place(np.arange(300, 350))
+    first, second = bed.compute_basis(np.arange(50)), bed.compute_basis(np.arange(300, 350))
     coming[0].under(first)
     fresh = trace_finger(Fingertip(), dragged(8))[1].under(second)
     assert np.array_equal(coming[1].under(second), fresh)

@@ -11,7 +11,7 @@ from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster, V
 from digiclay.core.model.interfaces import Measurement
 from digiclay.core.model.layout import Layout
 
-from tests.assemble import make_system, master, place
+from tests.assemble import make_basis, make_system, master
 
 PERIOD = 5e-3
 
@@ -26,7 +26,7 @@ def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measu
     x, y, force = np.array(presses).reshape(-1, 3).T
     level, rest = np.full(x.size, height * 1e-3), np.full(x.size, Mode.REST, np.int8)
     return Measurement(
-        place(x * 1e-3, y * 1e-3), level, force, level, rest, np.empty((0, x.size)), np.arange(x.size)
+        make_basis(x * 1e-3, y * 1e-3), level, force, level, rest, np.empty((0, x.size)), np.arange(x.size)
     )
 
 

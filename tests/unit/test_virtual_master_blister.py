@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
-from digiclay.core.model.interfaces import Measurement, Orders
+from digiclay.core.model.interfaces import Commands, Measurement
 from digiclay.core.model.layout import Layout, grid
 
 from tests.assemble import make_system, master, path, record
@@ -23,7 +23,7 @@ def bed(height: float = 40.0, mode: Mode = Mode.REST) -> Measurement:
     """Return a measurement of a whole bed that nobody touches."""
     level, modes = np.full(BED.count, height * 1e-3), np.full(BED.count, mode, np.int8)
     cells, free, own = np.arange(BED.count), np.zeros(BED.count), np.empty((0, BED.count))
-    return Measurement(BED.place(cells), level, free, level.copy(), modes, own, cells)
+    return Measurement(BED.compute_basis(cells), level, free, level.copy(), modes, own, cells)
 
 
 def at(x: float, y: float) -> int:
@@ -31,7 +31,7 @@ def at(x: float, y: float) -> int:
     return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
 
 
-def created(memory: Master, seen: Measurement, blister: Blister | None = None) -> tuple[Master, Orders]:
+def created(memory: Master, seen: Measurement, blister: Blister | None = None) -> tuple[Master, Commands]:
     """Return what Method I commands."""
     system = make_system(Layout(15, 15), control=VirtualMaster(), blister=blister)
     return system.controller.command(memory, seen)

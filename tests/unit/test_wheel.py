@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
 #: All that a wheel is built from, and the benchmarks, which must not get into it.
@@ -30,7 +30,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
             shutil.copy(source, copy / name)
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
     command = [*pip, "--no-deps", "--no-build-isolation", "--wheel-dir", "dist", "."]
-    done = subprocess.run(command, cwd=copy, capture_output=True, text=True, timeout=HANGS)
+    done = subprocess.run(command, cwd=copy, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, done.stderr
     (found,) = (copy / "dist").glob("*.whl")
     return found
@@ -54,6 +54,6 @@ def test_the_paper_is_reproduced_from_the_wheel(wheel: Path, tmp_path: Path) -> 
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "installed")}
     command = [sys.executable, "-P", "-m", "digiclay", "paper", "--help"]
     done = subprocess.run(
-        command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=HANGS
+        command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=TIMEOUT
     )
     assert (done.returncode, "reproduce the paper" in done.stdout.lower()) == (0, True), done.stderr

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.patience import HANGS
+from tests.timeouts import TIMEOUT
 from tests.window.blender_window import BLENDER
 
 TOOL = Path(__file__).parents[2] / "tools" / "extension.py"
@@ -27,11 +27,11 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         given = [BLENDER, "--command", *words]
         return subprocess.run(
-            given, env=environment, cwd=folder, capture_output=True, text=True, timeout=HANGS
+            given, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
         )
 
     built = [sys.executable, str(TOOL), "--out", str(folder)]
-    done = subprocess.run(built, capture_output=True, text=True, timeout=HANGS)
+    done = subprocess.run(built, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, done.stderr
     (archive,) = folder.glob("*.zip")
     done = run("extension", "validate", str(archive))

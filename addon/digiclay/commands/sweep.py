@@ -20,7 +20,7 @@ from ..core.studies.evaluation import (
     Bundles,
     Record,
     evaluate_bundle,
-    explain_failed_stacks,
+    explain_failed_batches,
     find_figure,
     make_bundles,
 )
@@ -110,7 +110,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
         if not arguments.quiet:
             tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-            lines = [*bundles.describe(), *explain_failed_stacks(records), *notes]
+            lines = [*bundles.describe(), *explain_failed_batches(records), *notes]
             print(f"{len(points)} points{tail}", *lines, f"written to {arguments.out}", sep="\n")
         return 0
 
@@ -143,8 +143,8 @@ def _finish(
         for index, record in folder.read_records().items()
         if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys()
     }
-    every = (*bundles.stacks, *bundles.alone)
-    # A stack of which a point is missing is run as a whole, or its results would be others in the last bit.
+    every = (*bundles.batches, *bundles.alone)
+    # A batch of which a point is missing is run as a whole, or its results would be others in the last bit.
     todo = [bundle for bundle in every if any(point.index not in records for point in bundle)]
     total = sum(len(bundle) for bundle in every)
 

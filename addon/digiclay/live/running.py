@@ -13,7 +13,7 @@ from ..core.engine.system import System
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import ErrorMonitor, Errors
 from ..core.session.live_periods import Clock
-from ..core.session.recent_trace import Trace
+from ..core.session.recent_trace import RecentTrace
 from .stroke import Stroke
 
 __all__ = [
@@ -186,7 +186,7 @@ class Running:
     pose: Floats
     tick: int
     clock: Clock
-    trace: Trace
+    trace: RecentTrace
     monitor: ErrorMonitor | None
     errors: Errors | None = None
     paused: bool = False

@@ -71,7 +71,7 @@ def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceErr
     state : State
         After the control period.
     run : int
-        Its place on the last axis.
+        Its index on the last axis.
     """
     held = state.active
     error = find_divergence(batch.systems[run], held.cells[:, run], held.block[..., run], state.period - 1)
@@ -86,7 +86,7 @@ def select_runs(state: State, runs: Sequence[int]) -> State:
     ----------
     state : State
     runs : sequence of int
-        Their places on the last axis.
+        Their indices on the last axis.
     """
     chosen, held = np.array(runs, np.intp), state.active
     # The discs are not worth keeping: the set is made anew.
@@ -95,7 +95,7 @@ def select_runs(state: State, runs: Sequence[int]) -> State:
         cells=held.cells[:, chosen],
         block=held.block[..., chosen],
         mode=held.mode[:, chosen],
-        place=held.place[..., chosen],
+        quadratic_basis=held.quadratic_basis[..., chosen],
         peak=held.peak[chosen],
         until=0,
     )

@@ -60,9 +60,9 @@ class FingersPeriod(NamedTuple):
         window: Floats = self.coming.window[self.period - self.coming.first]
         return window
 
-    def under(self, place: Floats) -> Floats:
+    def under(self, basis: Floats) -> Floats:
         """Return their undersides over some places (6, k, b), shape (p, k, b), m."""
-        return undersides(self.coming, self.period, place)
+        return undersides(self.coming, self.period, basis)
 
 
 def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, count: int) -> Fingers:
@@ -127,7 +127,7 @@ def _trace_finger(system: System, way: Trajectory, first: int, count: int) -> tu
     return coming.forms, coming.join, np.array(coming.windows)
 
 
-def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
+def undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
     """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.underside`.
 
     Parameters
@@ -135,10 +135,10 @@ def undersides(coming: Fingers, period: int, place: Floats) -> Floats:
     coming : Fingers
     period : int
         One of these.
-    place : ndarray (6, k, b)
+    basis : ndarray (6, k, b)
     """
     forms, (least, root) = coming.forms[period - coming.first], coming.join[period - coming.first]
-    rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, place)
+    rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, basis)
     return join_surfaces(rows[: len(least)], rows[len(least) :], least, root)
 
 

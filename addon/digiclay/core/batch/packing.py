@@ -18,7 +18,7 @@ from .movement import BatchStepper
 from .padding import PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["STACKED", "make_batch", "structure", "why_not"]
+__all__ = ["BATCHED", "find_reason", "make_batch", "structure"]
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
@@ -27,20 +27,20 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 #: Methods whose orders for a cell are the same whichever others take part.
-STACKED = tuple(name for name, method in METHODS.items() if not method.by_set)
+BATCHED = tuple(name for name, method in METHODS.items() if not method.by_set)
 
 
-def why_not(scene: Scene) -> str:
+def find_reason(scene: Scene) -> str:
     """Return why a scene cannot stand in a batch; empty for one that can."""
     if scene.sensors and (scene.sensors.force_noise or scene.sensors.height_noise):
         return "what noisy sensors make of a cell depends on which cells take part"
-    if scene.control and scene.method not in STACKED:
+    if scene.control and scene.method not in BATCHED:
         return f"what {scene.method} does depends on which cells take part"
     return ""
 
 
 def structure(scene: Scene) -> Any:
-    """Return what scenes must have in common to stand in one batch; see also `why_not`.
+    """Return what scenes must have in common to stand in one batch; see also `find_reason`.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
     The other steppers know no runs, so for them all cells must be alike.

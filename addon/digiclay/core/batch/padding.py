@@ -79,7 +79,7 @@ class PaddedSelection(Selection):
             held,
             cells=cells,
             near=count,
-            place=grid.place(cells.ravel()).reshape(6, *cells.shape),
+            quadratic_basis=grid.compute_basis(cells.ravel()).reshape(6, *cells.shape),
             reach=near,
             control=discs,
             peak=peak,

@@ -99,10 +99,10 @@ class Instant:
     failed: NDArray[np.bool_]
     share: float
 
-    def ended(self, place: int) -> Ended:
-        """Return how far the run at a place on the last axis has come."""
+    def ended(self, index: int) -> Ended:
+        """Return how far the run at an index of the last axis has come."""
         state = self.play.state
-        return Ended(state.period, self.share, count_losses(state.memory[place]))
+        return Ended(state.period, self.share, count_losses(state.memory[index]))
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:

@@ -61,7 +61,7 @@ class Histories:
             self._present = now.play.runs
         self._recording.observe(now.play.state)
 
-    def finish(self, now: Instant, place: int) -> Result:
+    def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run; its history is valid until that of another run is requested.
 
         New memory for every run would take longer than all that is written into it.
@@ -70,12 +70,12 @@ class Histories:
         ----------
         now : Instant
             In which it has come to its end.
-        place : int
+        index : int
             Where on the last axis the run is.
         """
-        run = now.play.runs[place]
+        run = now.play.runs[index]
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
-        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(place))
+        return evaluate(self._scenes[run], now.play.systems[run], rows, now.ended(index))
 
     def _write(self, recording: Recording, run: int, period: int) -> dict[str, NDArray[Any]]:
         """Write the history of a run up to a period; return its rows."""
@@ -123,25 +123,25 @@ class Sums:
         if period % self._every == 0:
             self._sums[period // self._every, :, self._columns] = self._sum(held).T
 
-    def finish(self, now: Instant, place: int) -> Result:
+    def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run, without a history.
 
         Parameters
         ----------
         now : Instant
             In which it has come to its end.
-        place : int
+        index : int
             Where on the last axis the run is.
         """
-        play, run, period = now.play, now.play.runs[place], now.play.state.period
+        play, run, period = now.play, now.play.runs[index], now.play.state.period
         scene, column, held = self._scenes[run], self._runs.index(run), play.state.active
         count = 1 - (-period // self._every)
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
-            rows[-1], following[-1] = self._sum(held)[:, place], _count_following(held)[place]
+            rows[-1], following[-1] = self._sum(held)[:, index], _count_following(held)[index]
         # In one piece each: they are gone through many times.
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
-        first, last = self._first[:, column], play.state.row(0)[:, place]
+        first, last = self._first[:, column], play.state.row(0)[:, index]
         sums = CellSums(total, x, y, height, strongest, following, first, last)
         grid, time = play.systems[run].grid, scene.simulation.control_period
         same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
@@ -152,14 +152,14 @@ class Sums:
         found = compute_metrics_from_sums(
             sums, way.time, way.fingertip, grid.positions, scene.set_point, way.cells
         )
-        return report(scene, now.ended(place), found)
+        return report(scene, now.ended(index), found)
 
     def _sum(self, held: ActiveSet) -> Floats:
         """Return the numbers of a row of `CellSums`, total to strongest, shape (5, b)."""
         force = held.block[self._force, : held.near]
         sums = np.empty((5, force.shape[1]))
         np.add.reduce(force, out=sums[0])
-        for values, found in zip((*held.place[1:3], held.block[0]), sums[1:4], strict=True):
+        for values, found in zip((*held.quadratic_basis[1:3], held.block[0]), sums[1:4], strict=True):
             np.einsum("kb,kb->b", values[: held.near], force, out=found)
         np.maximum.reduce(force, out=sums[4], initial=0.0)
         return sums

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..control.runs import BatchControl
-from ..model.interfaces import Controller, Measurement, Orders
+from ..model.interfaces import Commands, Controller, Measurement
 from .broadcasting import merge_parts
 
 __all__ = ["RunByRun", "join_controllers"]
@@ -38,14 +38,14 @@ class RunByRun:
         ]
         return [known for known, _ in found], [disc for _, disc in found]
 
-    def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Orders]:
+    def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Commands]:
         """Let each give its orders."""
         given = [
             controller.command(known, _take_run(seen, run))
             for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
         ]
         orders = zip(*(orders for _, orders in given), strict=True)
-        return [known for known, _ in given], Orders(*(np.stack(rows, axis=-1) for rows in orders))
+        return [known for known, _ in given], Commands(*(np.stack(rows, axis=-1) for rows in orders))
 
 
 def join_controllers(controllers: Sequence[Any]) -> Any:

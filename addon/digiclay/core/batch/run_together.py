@@ -32,7 +32,7 @@ class _Observer(Protocol):
 
     def observe(self, now: Instant) -> None: ...
 
-    def finish(self, now: Instant, place: int) -> Result: ...
+    def finish(self, now: Instant, index: int) -> Result: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +98,14 @@ def _run(
     for now in play_all(play, {run: scene.periods for run, scene in running.items()}, stopped):
         watching.observe(now)
         monitor = monitor and _follow(monitor, now.play)
-        for place in np.flatnonzero(now.over).tolist():
-            run = now.play.runs[place]
-            if now.failed[place]:
-                yield run, make_divergence_error(now.play.batch, now.play.state, place)
+        for index in np.flatnonzero(now.over).tolist():
+            run = now.play.runs[index]
+            if now.failed[index]:
+                yield run, make_divergence_error(now.play.batch, now.play.state, index)
                 continue
-            result = watching.finish(now, place)
+            result = watching.finish(now, index)
             if monitor:
-                result = result.with_errors(Errors.estimate(monitor.largest[:, place]))
+                result = result.with_errors(Errors.estimate(monitor.largest[:, index]))
             yield run, result
 
 

@@ -19,7 +19,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Measurement, Commands
 from ..model.layout import ON_THE_SIDE
 from ..model.set_point import SetPoint
 from .blister import Blister
@@ -154,10 +154,10 @@ class CellStatesControl:
         pressed = touched.force > self._least(touched.mode)
         if not any_true(pressed):
             return memory, None
-        force, place = touched.force[pressed], touched.place[:, pressed]
-        total, x, y = np.dot(place[:3], force).tolist()
+        force, basis = touched.force[pressed], touched.quadratic_basis[:, pressed]
+        total, x, y = np.dot(basis[:3], force).tolist()
         x, y = x / total, y / total
-        radius = math.sqrt(float(measure_square(x, y, place).max()))
+        radius = math.sqrt(float(measure_square(x, y, basis).max()))
         if not memory.felt:
             edge = float(np.dot(force, touched.height[pressed])) / total
             memory = memory._replace(heading=Heading(x, y), edge=edge)
@@ -166,7 +166,7 @@ class CellStatesControl:
         heading = update_heading(memory.heading, x, y, self.parameters.travel)
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
-    def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Orders]:
+    def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
         """Apply the transitions of every cell, then the control of its mode; see `interfaces.Controller`."""
         seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
         mode = follow_arrows(seen.mode, BY_FORCE, self._by_force(seen))
@@ -182,7 +182,7 @@ class CellStatesControl:
             memory = memory._replace(felt=False, losses=memory.losses + memory.felt)
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == Mode.CRITICAL, seen.own[0] + 1.0, 0.0)
-        return memory, Orders(target, mode, self._commands(seen, mode, target, under))
+        return memory, Commands(target, mode, self._commands(seen, mode, target, under))
 
     def _least(self, mode: Modes) -> Floats | float:
         """Return the force above which a cell counts to the patch, N: one that follows keeps what it reads.
@@ -208,16 +208,16 @@ class CellStatesControl:
         self, memory: Patch, seen: Measurement, mode: Modes, under: NDArray[np.bool_], target: Floats
     ) -> tuple[Patch, Modes, Floats]:
         """Form the blister around the cells under the finger: their neighborhoods superposed."""
-        blister, place = self.blister, seen.place
-        distance = np.sqrt(measure_square(place[1, under], place[2, under], place))
+        blister, basis = self.blister, seen.quadratic_basis
+        distance = np.sqrt(measure_square(basis[1, under], basis[2, under], basis))
         nearest = distance.min(axis=0)
         in_blister = nearest < blister.radius * (1.0 - ON_THE_SIDE)
         at_edge = ~in_blister & (nearest < blister.edge_radius * (1.0 - ON_THE_SIDE))
-        ahead = measure_lead(memory.heading, memory.x, memory.y, place)
+        ahead = measure_lead(memory.heading, memory.x, memory.y, basis)
         facing = seen.height[at_edge & (ahead >= -ABEAM)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
-        from_patch = np.sqrt(measure_square(memory.x, memory.y, place))
+        from_patch = np.sqrt(measure_square(memory.x, memory.y, basis))
         left_behind = (ahead < self.parameters.behind * from_patch) & (nearest > blister.flat_radius)
         left_behind &= in_blister
         conditions = {

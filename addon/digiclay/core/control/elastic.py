@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
@@ -41,7 +41,7 @@ class ElasticControl(CellwiseControl):
 
     name = "elastic"
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let pressed cells give way, and the others spring back; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
@@ -50,7 +50,7 @@ class ElasticControl(CellwiseControl):
         speed = np.where(pressed, giving, self.drive.approach(error))
         mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
         target = np.full(seen.height.shape, rest)
-        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
 def build(parameters: Elastic, device: DeviceInfo) -> ElasticControl:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 from .named_shapes import FILE, check_shape, evaluate_shape, read_values
@@ -66,7 +66,7 @@ class ForceDisplayControl(CellwiseControl):
     name = "force_display"
     rows = 1
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Control the force of touched cells and the height of the others; see `interfaces.Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         asked = take_cells(self.field, seen.cells)
@@ -82,7 +82,7 @@ class ForceDisplayControl(CellwiseControl):
         speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
         mode = np.where(felt, np.int8(Mode.FORCE_FOLLOW), np.int8(Mode.REST))
         target = np.full(seen.height.shape, rest)
-        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
 def build(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.interfaces import Controller, Measurement, Orders
+from ..model.interfaces import Commands, Controller, Measurement
 from ..shapes.request import Shape
 from .device_info import DeviceInfo
 from .drive import DriveParameters
@@ -78,7 +78,7 @@ class Handover:
         known, disc = self.method.locate(memory.method, self._subtract_shape(touched))
         return memory._replace(method=known), disc
 
-    def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Orders]:
+    def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Commands]:
         """Let the one whose turn it is command the cells; see `interfaces.Controller`."""
         if self.method is None or not self.is_displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
@@ -86,7 +86,7 @@ class Handover:
         known, orders = self.method.command(memory.method, self._subtract_shape(seen))
         if self.raised is not None:
             target = orders.target + self.raised.take(seen.cells)
-            orders = Orders(target, orders.mode, orders.command)
+            orders = Commands(target, orders.mode, orders.command)
         return memory._replace(method=known), orders
 
     def _subtract_shape(self, seen: Measurement) -> Measurement:

@@ -18,7 +18,7 @@ from .travel import Heading, update_heading
 __all__ = ["Master", "MasterControl", "Phase", "VirtualMaster"]
 
 
-#: Where an idle master of a stack stands, m: so far away that no cell is in its blister.
+#: Where an idle master of a batch stands, m: so far away that no cell is in its blister.
 NOWHERE = 1e3
 #: Plain numbers: numpy takes an enumeration's member ten times as long.
 SPRING, FORCE_FOLLOW = int(Mode.SPRING), int(Mode.FORCE_FOLLOW)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
@@ -48,7 +48,7 @@ class PlasticControl(CellwiseControl):
 
     name = "plastic"
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let cells give way that are pressed beyond yield, hold the others; see `interfaces.Controller`."""
         known = self.parameters
         pressed = seen.force >= known.felt_force
@@ -62,7 +62,7 @@ class PlasticControl(CellwiseControl):
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, pressed, np.int8(Mode.SPRING))
         np.putmask(mode, yielding, np.int8(Mode.FORCE_FOLLOW))
-        return memory, Orders(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
 def build(parameters: Plastic, device: DeviceInfo) -> PlasticControl:

@@ -17,7 +17,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
@@ -103,16 +103,16 @@ class PushPullControl:
         memory = memory._replace(period=memory.period + 1, radius=-1.0)
         if not touched.height.size:
             return memory, None
-        low, high = touched.place[1:3].min(axis=1), touched.place[1:3].max(axis=1)
+        low, high = touched.quadratic_basis[1:3].min(axis=1), touched.quadratic_basis[1:3].max(axis=1)
         x, y = ((low + high) / 2).tolist()
         radius = float(np.hypot(*(high - low))) / 2 + self.margin
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
 
-    def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Orders]:
+    def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
         """Drag commanded heights along, and move every pin up or down; see `interfaces.Controller`."""
         known, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
-        listening = measure_square(memory.x, memory.y, seen.place) <= limit
+        listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle lies behind: what is left of it is no ripple
             target = self._drag_targets(seen, listening)
@@ -126,7 +126,7 @@ class PushPullControl:
         formed = np.abs(target - self.actuator.rest_height) > known.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
-        return memory, Orders(target, mode, self.drive.open_for(speed))
+        return memory, Commands(target, mode, self.drive.open_for(speed))
 
     def _drag_targets(self, seen: Measurement, listening: NDArray[np.bool_]) -> Floats:
         """Return the targets after a cycle; what the cells remember is brought up to date in place."""

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import Grid
 
 __all__ = ["Replay"]
@@ -51,9 +51,9 @@ class Replay:
         """Take every commanded cell along."""
         return memory, self.disc
 
-    def command(self, memory: int, seen: Measurement) -> tuple[int, Orders]:
+    def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
         """Return the commands of the period."""
         command = np.zeros(seen.height.size)
         if memory < len(self.commands):
             command = self.commands[memory, seen.cells]
-        return memory + 1, Orders(seen.target, seen.mode, command)
+        return memory + 1, Commands(seen.target, seen.mode, command)

@@ -13,7 +13,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
@@ -118,7 +118,7 @@ class ShapeDisplayControl:
         """Request all cells during the moves; see `interfaces.Controller`."""
         return memory, self.whole if memory.move < len(self.moves) else None
 
-    def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Orders]:
+    def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Commands]:
         """Set the heights of the move under way, and command every cell; see `interfaces.Controller`."""
         rest, target = self.actuator.rest_height, seen.target
         if memory.move < len(self.moves):
@@ -128,7 +128,7 @@ class ShapeDisplayControl:
         formed = np.abs(target - rest) > self.parameters.dead_band
         mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
         np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
-        return memory, Orders(target, mode, command)
+        return memory, Commands(target, mode, command)
 
     def _make_moves(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
         """Return the progress and the targets of the move under way; on to the next if it is over."""

@@ -54,7 +54,7 @@ def update_heading(heading: Heading, x: float, y: float, travel: float) -> Headi
     return heading if way < travel else Heading(x, y, dx / way, dy / way)
 
 
-def measure_lead(heading: Heading, x: float, y: float, place: Floats) -> Floats:
+def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
     """Return how far cells lie ahead of a point, m; negative behind it, 0 before any travel.
 
     Parameters
@@ -62,15 +62,15 @@ def measure_lead(heading: Heading, x: float, y: float, place: Floats) -> Floats:
     heading : Heading
     x, y : float
         The point, m.
-    place : ndarray (6, m)
+    basis : ndarray (6, m)
         Rows 1, x, y, ... of the cells.
     """
     _, _, toward_x, toward_y = heading
-    ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], place[:3])
+    ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
     return ahead
 
 
-def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, place: Floats) -> tuple[Floats, Floats]:
+def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
     """Return distances from a point, and how far cells lie ahead of it, see `measure_lead`.
 
     Parameters
@@ -79,7 +79,7 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, place: Floats)
         The point, m.
     toward_x, toward_y : float or ndarray (b,)
         The direction, a unit vector.
-    place : ndarray (6, m) or (6, m, b)
+    basis : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y² of the cells.
 
     Returns
@@ -87,12 +87,12 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, place: Floats)
     distance, ahead : ndarray (m,) or (m, b)
         m.
     """
-    if place.ndim == 2:  # one product
+    if basis.ndim == 2:  # one product
         forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
-        distance, ahead = np.array((_circle(x, y), forward)).dot(place)
+        distance, ahead = np.array((_circle(x, y), forward)).dot(basis)
         np.abs(distance, distance)  # at the point itself rounding may leave a negative square
     else:
-        dx, dy = place[1] - x, place[2] - y
+        dx, dy = basis[1] - x, basis[2] - y
         ahead = dx * toward_x
         ahead += dy * toward_y
         dx *= dx
@@ -102,20 +102,20 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, place: Floats)
     return distance, ahead
 
 
-def measure_excess(x: Any, y: Any, radius: Any, place: Floats) -> Floats:
+def measure_excess(x: Any, y: Any, radius: Any, basis: Floats) -> Floats:
     """Return by how much the squares of distances from a point exceed that of a radius, m².
 
     Parameters
     ----------
     x, y, radius : float or ndarray (b,)
         m.
-    place : ndarray (6, m) or (6, m, b)
+    basis : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y² of the cells.
     """
-    if place.ndim == 2:  # one product
-        excess: Floats = np.array(_circle(x, y, radius)).dot(place)
+    if basis.ndim == 2:  # one product
+        excess: Floats = np.array(_circle(x, y, radius)).dot(basis)
         return excess
-    dx, dy = place[1] - x, place[2] - y
+    dx, dy = basis[1] - x, basis[2] - y
     dx *= dx
     dy *= dy
     square: Floats = np.add(dx, dy, out=dx)
@@ -128,18 +128,18 @@ def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
     return (x * x + y * y - radius * radius, -2.0 * x, -2.0 * y, 1.0, 0.0, 1.0)
 
 
-def measure_square(x: Floats | float, y: Floats | float, place: Floats) -> Floats:
+def measure_square(x: Floats | float, y: Floats | float, basis: Floats) -> Floats:
     """Return squared distances from one point, shape (m,), or from s points, shape (s, m), m².
 
     Parameters
     ----------
     x, y : float or ndarray (s,)
         m.
-    place : ndarray (6, m)
+    basis : ndarray (6, m)
         Rows 1, x, y, x², x y, y² of the cells.
     """
     one = x * 0.0 + 1.0
     form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
-    square: Floats = form.dot(place)
+    square: Floats = form.dot(basis)
     np.abs(square, square)  # at a point itself rounding may leave a negative one
     return square

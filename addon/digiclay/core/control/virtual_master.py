@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import any_true, constants, count_true
 from ..base.modes import Mode
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Measurement, Commands
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster
@@ -79,15 +79,15 @@ class VirtualMasterControl(MasterControl):
 
     def _sum_forces(self, memory: Any, touched: Measurement) -> tuple[Any, ...]:
         """Return what `_follow` takes: sums over all cells, and over those near the master."""
-        place, force = touched.place, touched.force
+        basis, force = touched.quadratic_basis, touched.force
         if self._noisy:
             force = suppress_noise(force, self.floor)
         (none,) = constants((0.0,), force.shape)
-        total, x, y, *_ = near = sum_weighted(place, force).tolist()
-        far = self._measure_excess(memory, place) > none
+        total, x, y, *_ = near = sum_weighted(basis, force).tolist()
+        far = self._measure_excess(memory, basis) > none
         far &= force != none
         if any_true(far):
-            near = sum_weighted(place, np.where(far, none, force)).tolist()
+            near = sum_weighted(basis, np.where(far, none, force)).tolist()
         return total, x, y, *near[:3], sum_weighted(touched.height, force).tolist()
 
     def _sum_held(self, memory: Any, touched: Measurement, felt: Any) -> Any:
@@ -96,17 +96,17 @@ class VirtualMasterControl(MasterControl):
         Next to the master noise stays in, for what is below the floor adds up; farther off only what is no
         noise counts. `felt` is the sum of that everywhere, N.
         """
-        hidden = self._measure_excess(memory, touched.place) <= 0.0
+        hidden = self._measure_excess(memory, touched.quadratic_basis) <= 0.0
         hidden &= touched.force < self.floor
         noise = sum_weighted(touched.force, hidden.astype(float)).tolist()
         return self.add_noise(memory, felt, noise)
 
-    def _measure_excess(self, memory: Any, place: Floats) -> Floats:
+    def _measure_excess(self, memory: Any, basis: Floats) -> Floats:
         """Return by how much cells are beyond the circle in which the finger is looked for, m²."""
         x, y = self.get_place(memory)
-        return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), place)
+        return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), basis)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `interfaces.Controller`."""
         target = seen.target
         *limits, rest, band = constants(self._limits, target.shape)
@@ -117,7 +117,7 @@ class VirtualMasterControl(MasterControl):
         if self.is_active(memory):
             memory, target = self._create_blister(memory, seen, mode, limits)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
-        return memory, Orders(target, mode, command)
+        return memory, Commands(target, mode, command)
 
     def _create_blister(
         self, memory: Any, seen: Measurement, mode: NDArray[np.int8], limits: Sequence[Any]
@@ -126,7 +126,7 @@ class VirtualMasterControl(MasterControl):
         abeam, radius, edge_radius, flat_radius, behind, release, noise = limits
         edge_mode, formed, froze = constants(CODES, mode.shape, np.int8)
         x, y, toward_x, toward_y = self.get_pose(memory)
-        distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.place)
+        distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.quadratic_basis)
         inside = distance <= radius
         ring = distance <= edge_radius
         ring ^= inside

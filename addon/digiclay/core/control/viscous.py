@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement, Orders
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, TouchParameters, check_damping, make_drive, raise_felt_force
@@ -37,11 +37,11 @@ class Spot(NamedTuple):
     bottom: float = math.inf
     top: float = -math.inf
 
-    def around(self, place: Floats) -> Spot:
+    def around(self, basis: Floats) -> Spot:
         """Return a box that holds some places as well."""
-        if not place.shape[1]:
+        if not basis.shape[1]:
             return self
-        (left, bottom), (right, top) = place[1:3].min(axis=1).tolist(), place[1:3].max(axis=1).tolist()
+        (left, bottom), (right, top) = basis[1:3].min(axis=1).tolist(), basis[1:3].max(axis=1).tolist()
         return Spot(
             min(self.left, left), max(self.right, right), min(self.bottom, bottom), max(self.top, top)
         )
@@ -181,10 +181,10 @@ class ViscousControl:
 
     def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
         """Request all displaced cells and a margin around them; see `interfaces.Controller`."""
-        spot = memory.around(touched.place[:, touched.force >= self.parameters.felt_force])
+        spot = memory.around(touched.quadratic_basis[:, touched.force >= self.parameters.felt_force])
         return spot, spot.disc(self.margin)
 
-    def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Orders]:
+    def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Commands]:
         """Exchange, relax, and move every cell to its new height; see `interfaces.Controller`."""
         known, actuator = self.parameters, self.actuator
         cells, rest = seen.cells, actuator.rest_height
@@ -199,12 +199,12 @@ class ViscousControl:
         if not pressed.any() and size.max(initial=0.0) <= known.dead_band:
             memory, shift, size = Spot(), np.zeros(shift.size), np.zeros(shift.size)
         else:
-            memory = memory.around(seen.place[:, size > BORDER * known.dead_band])
+            memory = memory.around(seen.quadratic_basis[:, size > BORDER * known.dead_band])
         target, formed = rest + shift, size > known.dead_band
         # The surface creeps by less than the dead band a period: its own speed is asked for as well.
         creep = np.where(formed, (target - seen.target) / self.period, 0.0)
         command = self.drive.command(creep + self.drive.approach(target - seen.height), seen.force)
-        return memory, Orders(target, self._modes(cells, pressed, formed), command)
+        return memory, Commands(target, self._modes(cells, pressed, formed), command)
 
     def _modes(self, cells: Cells, pressed: NDArray[np.bool_], formed: NDArray[np.bool_]) -> NDArray[np.int8]:
         """Return the modes: pressed, drawn along by a pressed neighbor, recovering, at rest."""

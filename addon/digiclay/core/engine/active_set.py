@@ -81,7 +81,7 @@ class Selection:
             held,
             cells=cells,
             near=near.size,
-            place=grid.place(cells),
+            quadratic_basis=grid.compute_basis(cells),
             reach=wide_reach,
             control=wide_control,
             peak=peak,

@@ -15,7 +15,7 @@ from ..model.fingertip import require_one
 from ..model.interfaces import Measurement, Movement, Truth
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
-from .state import ActiveSet, Part, State, at_rest
+from .state import ActiveSet, CellGroup, State, at_rest
 from .system import System
 
 __all__ = ["advance", "begin", "periods", "repeat_period", "step", "trace_fingers"]
@@ -173,9 +173,9 @@ def _ready(system: System, held: ActiveSet) -> _Ready:
     if known is None:
         touched, everything = (
             Measurement(
-                part.place, part.height, part.force, part.target, part.mode, part.controlled, part.cells
+                one.quadratic_basis, one.height, one.force, one.target, one.mode, one.controlled, one.cells
             )
-            for part in (held.touched, held.all)
+            for one in (held.touched, held.all)
         )
         movement = system.stepper.prepare(system.plan, held.driven, held.near)
         known = held.ready[system.plan] = _Ready(touched, everything, movement)
@@ -191,12 +191,12 @@ def _locate(system: System, state: State) -> tuple[Any, Any]:
     return system.controller.locate(state.memory, seen)
 
 
-def _truth(part: Part, period: int) -> Truth:
+def _truth(part: CellGroup, period: int) -> Truth:
     """Return what there is to be measured of some active cells."""
     return Truth(part.cells, period, part.force, part.height, part.command)
 
 
-def _measured(system: System, true: Measurement, part: Part, period: int) -> Measurement:
+def _measured(system: System, true: Measurement, part: CellGroup, period: int) -> Measurement:
     """Measure some active cells."""
     if system.sensors is None:
         return true
@@ -208,7 +208,7 @@ def _underside(system: System, finger: Any, held: ActiveSet) -> Floats:
     """Return the finger's underside over the near cells at the period's instants, shape (p, k[, b]), m."""
     if finger is None or not held.near:
         return np.empty((system.instants.size, 0, *held.cells.shape[1:]))
-    under: Floats = finger.under(held.touched.place)
+    under: Floats = finger.under(held.touched.quadratic_basis)
     return under
 
 

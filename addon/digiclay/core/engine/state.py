@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 
-__all__ = ["ActiveSet", "Part", "Rows", "State", "at_rest"]
+__all__ = ["ActiveSet", "CellGroup", "Rows", "State", "at_rest"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -95,7 +95,7 @@ class ActiveSet:
         Their rows, see `Rows`.
     mode : ndarray (m,) or (m, b) of int8
         Their control modes, `modes.Mode`.
-    place : ndarray (6, m) or (6, m, b)
+    quadratic_basis : ndarray (6, m) or (6, m, b)
         Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product.
     reach, control : tuple or None
         Discs of which every cell is in, the finger's and the controller's: center x, y, radius, m; arrays
@@ -111,7 +111,7 @@ class ActiveSet:
     near: int
     block: Floats
     mode: NDArray[np.int8]
-    place: Floats
+    quadratic_basis: Floats
     reach: Any
     control: Any
     peak: Any
@@ -120,21 +120,21 @@ class ActiveSet:
     # Parts of the block, all of them views. Each is made once: a set lives for many periods.
 
     @cached_property
-    def all(self) -> Part:
+    def all(self) -> CellGroup:
         """All cells."""
         return self._part(len(self.cells))
 
     @cached_property
-    def touched(self) -> Part:
+    def touched(self) -> CellGroup:
         """The cells the finger may touch."""
         return self._part(self.near)
 
-    def _part(self, count: int) -> Part:
+    def _part(self, count: int) -> CellGroup:
         """Return the rows of the first `count` cells."""
         rows, block = self.rows, self.block[:, :count]
-        return Part(
+        return CellGroup(
             self.cells[:count],
-            self.place[:, :count],
+            self.quadratic_basis[:, :count],
             self.mode[:count],
             block[0],
             block[rows.command],
@@ -173,11 +173,11 @@ class ActiveSet:
         return self.block.reshape(-1)
 
 
-class Part(NamedTuple):
+class CellGroup(NamedTuple):
     """Rows of the first active cells, as `Rows` and `ActiveSet` define them."""
 
     cells: Cells
-    place: Floats
+    quadratic_basis: Floats
     mode: NDArray[np.int8]
     height: Floats
     command: Floats

@@ -14,9 +14,9 @@ from ..surface.feature_solids import solid as feature_solid
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
 from ..surface.pins_solid import pins_solid
-from ..surface.sheet import Sheet, stretched
 from ..surface.skin_mesh import BASE_THICKNESS, base_level, solid
 from ..surface.skins import SKINS
+from ..surface.surface_grid import SurfaceGrid, fit_skin
 
 __all__ = ["KINDS", "Model", "bodies", "features", "sheet"]
 
@@ -55,7 +55,7 @@ class Model(Parameters):
         return self.resolution or (1 if self.skin == "bilinear" else CURVED)
 
 
-def sheet(formed: Formed, model: Model) -> Sheet:
+def sheet(formed: Formed, model: Model) -> SurfaceGrid:
     """Return the skin of a model.
 
     Parameters
@@ -74,7 +74,7 @@ def sheet(formed: Formed, model: Model) -> Sheet:
         rule = f"must be low enough for {MOST_POINTS // 1_000_000} million points on this bed"
         value = f"{model.parts}: {points / 1e6:.3g} million points"
         raise ParameterError("Model", "resolution", rule, value)
-    return stretched(formed, model.skin, model.parts, model.cap)
+    return fit_skin(formed, model.skin, model.parts, model.cap)
 
 
 def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
@@ -129,7 +129,7 @@ def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list
     return [_skin(skin, model, names, label)]
 
 
-def _skin(sheet: Sheet, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+def _skin(sheet: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indices) -> Body:
     """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
     if model.kind == "surface":
         vertices, faces = np.column_stack([sheet.place, sheet.height]), sheet.faces

@@ -38,12 +38,12 @@ def find_largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]
     deepest_first, found = np.argsort(-most, kind="stable"), 0.0
     cells = np.flatnonzero(felt.any(axis=0))  # the only ones that are worked out: of a large bed they are few
     x, y = np.asarray(history["position"], dtype=np.float64)[cells].T
-    place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
+    basis = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     for start in range(0, len(most), ROWS):
         rows = deepest_first[start : start + ROWS]
         if most[rows[0]] <= found:
             break
-        under = underside(*forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), place)
+        under = underside(*forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis)
         part = np.ix_(rows, cells)
         depth = np.max(height[part] - under, where=felt[part], initial=0.0)
         found = max(found, float(depth))

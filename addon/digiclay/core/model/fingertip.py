@@ -177,7 +177,7 @@ def forms(outline: Floats) -> tuple[Floats, Floats]:
     return rows, np.stack([join, np.sqrt(join)], -3)
 
 
-def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
+def underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     """Return the height of the finger's underside, shape (..., p, k), m.
 
     Parameters
@@ -185,12 +185,12 @@ def underside(forms: Floats, join: Floats, place: Floats) -> Floats:
     forms : ndarray (..., 2 p, 6)
     join : ndarray (..., 2, p, 1)
         From `forms`.
-    place : ndarray (6, k)
+    basis : ndarray (6, k)
         Rows 1, x, y, x², x y, y² of the places asked for.
     """
     count = join.shape[-2]
     # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
-    rows = np.matmul(forms, place)
+    rows = np.matmul(forms, basis)
     return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
 
 

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from .delay import Queue
 
 __all__ = [
+    "Commands",
     "Controller",
     "Flow",
     "Lag",
     "Measurement",
     "Movement",
-    "Orders",
     "Pulp",
     "Segment",
     "Sensors",
@@ -214,7 +214,7 @@ class Measurement(NamedTuple):
 
     Attributes
     ----------
-    place : ndarray (6, m)
+    quadratic_basis : ndarray (6, m)
         Rows 1, x, y, x², x y, y² of where they are, m.
     height, force : ndarray (m,)
         As measured, m and N.
@@ -227,7 +227,7 @@ class Measurement(NamedTuple):
         Their numbers in the bed.
     """
 
-    place: Floats
+    quadratic_basis: Floats
     height: Floats
     force: Floats
     target: Floats
@@ -236,7 +236,7 @@ class Measurement(NamedTuple):
     cells: NDArray[np.intp]
 
 
-class Orders(NamedTuple):
+class Commands(NamedTuple):
     """Output of a controller, (m,) each: targets, m; modes; valve commands."""
 
     target: Floats
@@ -271,7 +271,7 @@ class Controller(Protocol):
         """
         ...
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Orders]:
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Return memory and orders for the cells of the disc and all that still move.
 
         Parameters

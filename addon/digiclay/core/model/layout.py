@@ -157,7 +157,7 @@ class Grid:
         cells: Cells = (row * plan.columns + column).astype(np.intp)
         return cells
 
-    def place(self, cells: Cells) -> Floats:
+    def compute_basis(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of some cells, shape (6, m)."""
         x, y = self.x.take(cells), self.y.take(cells)
         return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])

@@ -57,7 +57,7 @@ class FingerPath:
         # The undersides worked out last: of which places, from which period on.
         self._last: tuple[Floats | None, int, Floats] = (None, 0, np.empty((0, 0, 0)))
 
-    def under(self, period: int, place: Floats) -> Floats:
+    def under(self, period: int, basis: Floats) -> Floats:
         """Return the underside in one of the periods, see `FingerPeriod.under`.
 
         It is asked for period by period, mostly of the same places: several are worked out at a time.
@@ -65,16 +65,16 @@ class FingerPath:
         Parameters
         ----------
         period : int
-        place : ndarray (6, k)
+        basis : ndarray (6, k)
             See `fingertip.underside`.
         """
         known, first, unders = self._last
-        if known is not place or not first <= period < first + len(unders):
+        if known is not basis or not first <= period < first + len(unders):
             # Not so many that a large bed under a large finger would not fit in memory.
-            count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * place.shape[1])))
+            count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * basis.shape[1])))
             several = slice(period, period + count)
-            first, unders = period, underside(self.forms[several], self.join[several], place)
-            self._last = (place, first, unders)
+            first, unders = period, underside(self.forms[several], self.join[several], basis)
+            self._last = (basis, first, unders)
         under: Floats = unders[period - first]
         return under
 
@@ -86,9 +86,9 @@ class FingerPeriod(NamedTuple):
     period: int
     window: Window
 
-    def under(self, place: Floats) -> Floats:
+    def under(self, basis: Floats) -> Floats:
         """Return its underside at the period's p instants over some places (6, k), shape (p, k), m."""
-        return self.coming.under(self.period, place)
+        return self.coming.under(self.period, basis)
 
 
 def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:

@@ -87,7 +87,7 @@ def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: fl
         The place, m.
     """
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
-    under = underside(*forms(outline), grid.place(np.arange(grid.count)))
+    under = underside(*forms(outline), grid.compute_basis(np.arange(grid.count)))
     return float(np.max(heights - under[0]))
 
 

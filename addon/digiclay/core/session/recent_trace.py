@@ -14,7 +14,9 @@ from ..engine.state import State
 from ..engine.system import System
 from ..model.set_point import SetPoint, find_set_point
 
-__all__ = ["PICKED", "ROWS", "SPAN", "Trace", "extend", "measure_total_force", "pick", "sample", "start"]
+__all__ = [
+    "PICKED", "ROWS", "SPAN", "RecentTrace", "extend", "measure_total_force", "pick", "sample", "start",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +27,7 @@ SPAN, ROWS = 10.0, 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class RecentTrace:
     """Ring buffer of rows: a new row replaces the oldest.
 
     Attributes
@@ -64,7 +66,7 @@ class Trace:
         return self.rows[:, 3 : 3 + len(self.pins)]
 
 
-def start(period: float, pins: Sequence[int] = ()) -> Trace:
+def start(period: float, pins: Sequence[int] = ()) -> RecentTrace:
     """Return an empty trace for a control period, s.
 
     Parameters
@@ -74,10 +76,12 @@ def start(period: float, pins: Sequence[int] = ()) -> Trace:
     pins : sequence of int
         Whose heights are kept.
     """
-    return Trace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED)))
+    return RecentTrace(
+        max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), np.empty((0, 3 + PICKED))
+    )
 
 
-def pick(trace: Trace, pins: Sequence[int], count: int) -> Trace:
+def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
     """Return a trace that follows other pins; those a bed of `count` cells does not have are left out.
 
     Parameters
@@ -129,7 +133,7 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
     return [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
 
 
-def extend(trace: Trace, rows: list[list[float]]) -> Trace:
+def extend(trace: RecentTrace, rows: list[list[float]]) -> RecentTrace:
     """Return the trace with rows added, each as wide as its own; time may have gone back in between.
 
     Parameters

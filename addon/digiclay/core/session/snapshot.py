@@ -40,7 +40,7 @@ REMEDY = "Reset the session to begin with a bed at rest."
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Snapshot:
     """Content of a snapshot: the header, and the arrays by their names in `State` and `ActiveSet`."""
 
     header: dict[str, Any]
@@ -127,7 +127,7 @@ def load(system: System, data: bytes) -> State:
         gathered["near"],
         kept.arrays["block"],
         kept.arrays["mode"],
-        system.grid.place(cells),
+        system.grid.compute_basis(cells),
         _read_disc(require_one(gathered["fingers"])["reach"]),
         _read_disc(gathered["control"]),
         gathered["peak"],
@@ -175,7 +175,7 @@ def transfer_heights(system: System, data: bytes) -> State:
     return State(0, state.rows, state.modes, state.aged, peak, state.active, state.memory)
 
 
-def _check_limits(system: System, kept: Kept) -> None:
+def _check_limits(system: System, kept: Snapshot) -> None:
     """Refuse pins beyond their end stops, and valves opened wider than all the way."""
     rows, top = system.rows, system.cell.actuator.stroke + SLACK
     for name in ("rows", "block"):
@@ -186,7 +186,7 @@ def _check_limits(system: System, kept: Kept) -> None:
             raise _make_error("holds numbers that no state has")
 
 
-def _read(data: bytes) -> Kept:
+def _read(data: bytes) -> Snapshot:
     """Read bytes without regard to any system; their arrays are new ones."""
     if not isinstance(data, bytes) or not data.startswith((START, FIRST)):
         raise _make_error("does not begin as one")
@@ -211,7 +211,7 @@ def _read(data: bytes) -> Kept:
         discs = [held["control"], *(finger["reach"] for finger in held["fingers"])]
         numbers += [number for disc in discs for number in _read_disc(disc) or ()]
         names = ("rows", "modes", "aged", "cells", "block", "mode")
-        kept = Kept(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
+        kept = Snapshot(header, dict(zip(names, arrays, strict=False)), arrays[len(names) :])
         # A memory of nothing is None; one that is not there at all is damage.
         sound = "memory" in header and held["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
@@ -235,7 +235,7 @@ def _read_arrays(
     return found, at
 
 
-def _is_sound(kept: Kept, count: int) -> bool:
+def _is_sound(kept: Snapshot, count: int) -> bool:
     """Return whether the arrays hold what those of a state can hold."""
     arrays = kept.arrays
     cells = arrays["cells"]

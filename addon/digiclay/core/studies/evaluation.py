@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import nearest
-from ..batch.packing import structure, why_not
+from ..batch.packing import find_reason, structure
 from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
 from ..scene.schema import Scene
@@ -21,8 +21,8 @@ from .axes import Point
 from .series import describe_error
 
 __all__ = [
-    "ERRORS", "FIGURES", "RUNS", "TIMES", "Bundles", "Record", "StackWarning", "evaluate", "evaluate_bundle",
-    "explain_failed_stacks", "find_figure", "make_bundles",
+    "ERRORS", "FIGURES", "RUNS", "TIMES", "BatchWarning", "Bundles", "Record", "evaluate",
+    "evaluate_bundle", "explain_failed_batches", "find_figure", "make_bundles",
 ]  # fmt: skip
 
 #: What is kept of a point: its ``figures``, or the ``error`` it ended in.
@@ -48,12 +48,12 @@ TIMES = ("run_time", "real_time_factor")
 SHORT = {"lag": "lag_mean"}
 #: Fewer points than this are as quick one at a time.
 LEAST = 4
-#: From twice as many points on there are two stacks: a larger one gains little, and busies one core only.
+#: From twice as many points on there are two batches: a larger one gains little, and busies one core only.
 RUNS = 32
-#: Bytes a stack may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
+#: Bytes a batch may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
 #: by unseen.
 BUDGET, BYTES_A_ROW = 2**30, 41
-#: Where a record says why its point was run by itself although it stood in a stack.
+#: Where a record says why its point was run by itself although it stood in a batch.
 ALONE = "alone"
 
 
@@ -79,7 +79,7 @@ class Bundles:
 
     Attributes
     ----------
-    stacks : tuple of tuple of Point
+    batches : tuple of tuple of Point
         Of `LEAST` points or more.
     alone : tuple of tuple of Point
         Of one point each.
@@ -87,21 +87,21 @@ class Bundles:
         Why some run alone, one line a reason.
     """
 
-    stacks: tuple[tuple[Point, ...], ...]
+    batches: tuple[tuple[Point, ...], ...]
     alone: tuple[tuple[Point, ...], ...]
     why: tuple[str, ...]
 
     def describe(self) -> list[str]:
         """Return how the points run, as lines for a person."""
         lines = []
-        if self.stacks:
-            count = sum(len(stack) for stack in self.stacks)
-            lines.append(f"{count} points run in {_count(len(self.stacks), 'stack')}")
+        if self.batches:
+            count = sum(len(batch) for batch in self.batches)
+            lines.append(f"{count} points run in {_count(len(self.batches), 'stack')}")
         return [*lines, *self.why]
 
 
 def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
-    """Put points of one structure together, as many as make a stack; in the order of the points.
+    """Put points of one structure together, as many as make a batch; in the order of the points.
 
     Which stand together depends on the points alone, not on what is done already or how many
     workers there are: the same sweep comes to the same results to the last bit.
@@ -117,7 +117,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     alone: list[Point] = []
     why: Counter[str] = Counter()
     for point in points:
-        reason = why_not(point.scene) if point.scene else ""
+        reason = find_reason(point.scene) if point.scene else ""
         if point.scene is None or reason:
             alone.append(point)
             why.update([reason] if reason else [])
@@ -128,7 +128,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             alone.append(point)
             continue
         alike.setdefault((structure(point.scene), judge), []).append(point)
-    stacks: list[tuple[Point, ...]] = []
+    batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)
         if min(len(group), most) < LEAST:
@@ -142,13 +142,13 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             continue
         pieces = max(1, len(group) // RUNS, -(-len(group) // most))
         edges = [len(group) * i // pieces for i in range(pieces + 1)]
-        stacks += [tuple(group[a:b]) for a, b in pairwise(edges)]
+        batches += [tuple(group[a:b]) for a, b in pairwise(edges)]
     alone.sort(key=lambda point: point.index)
-    return Bundles(tuple(stacks), tuple((point,) for point in alone), _explain(why))
+    return Bundles(tuple(batches), tuple((point,) for point in alone), _explain(why))
 
 
 def _limit_runs(scene: Scene | None) -> int:
-    """Return how many runs like this one may be in a stack."""
+    """Return how many runs like this one may be in a batch."""
     assert scene is not None
     rows = scene.recorder.rows(scene.periods) if scene.recorder else 1
     return BUDGET // (rows * BYTES_A_ROW)
@@ -164,8 +164,8 @@ def _explain(why: Mapping[str, int]) -> tuple[str, ...]:
     return tuple(f"{_count(count, 'point')} one at a time: {reason}" for reason, count in why.items())
 
 
-def explain_failed_stacks(records: Mapping[int, Record]) -> tuple[str, ...]:
-    """Return a line a reason for points that were run one by one because their stack failed."""
+def explain_failed_batches(records: Mapping[int, Record]) -> tuple[str, ...]:
+    """Return a line a reason for points that were run one by one because their batch failed."""
     return _explain(Counter(record[ALONE] for record in records.values() if record.get(ALONE)))
 
 
@@ -200,7 +200,7 @@ def _make_record(result: Result, *, errors: bool) -> Record:
     return {"figures": {name: result.metrics.get(name) for name in names}}
 
 
-class StackWarning(RuntimeWarning):
+class BatchWarning(RuntimeWarning):
     """Failure of a whole batch by no fault of the user."""
 
 
@@ -209,23 +209,23 @@ def evaluate_bundle(
 ) -> list[Record | None]:
     """Run a bundle; return the record of each of its points, None for one that was stopped.
 
-    When a stack fails as a whole, its points are run one by one, and each record says why under
+    When a batch fails as a whole, its points are run one by one, and each record says why under
     ``alone``.
 
     Parameters
     ----------
     bundle : sequence of Point
-        One, or several of one stack.
+        One, or several of one batch.
     stopped, errors
         As `evaluate` has them.
 
     Warns
     -----
     StackWarning
-        When a stack failed neither for lack of memory nor by an error a user can cause.
+        When a batch failed neither for lack of memory nor by an error a user can cause.
     """
     scenes = [point.scene for point in bundle if point.scene]
-    if not scenes:  # values that do not go together are in no stack
+    if not scenes:  # values that do not go together are in no batch
         return [{"error": point.error} for point in bundle]
     records: list[Record | None] = [None] * len(scenes)
     why = ""
@@ -241,7 +241,7 @@ def evaluate_bundle(
         except Exception as error:  # each point meets it again by itself, and says what it is
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
-                warnings.warn(f"A stack of {len(scenes)} runs failed: {why}", StackWarning, stacklevel=2)
+                warnings.warn(f"A stack of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)
         if why:
             records = [None] * len(scenes)
     for number, scene in enumerate(scenes):

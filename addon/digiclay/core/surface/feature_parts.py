@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .crests import Crest, Ridge
 
-__all__ = ["Part", "nearest", "parts"]
+__all__ = ["FeaturePart", "nearest", "parts"]
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ CHUNK = 1 << 21
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class FeaturePart:
     """Ridge with its crests, or mound.
 
     Attributes
@@ -56,7 +56,7 @@ class Part:
     reach: float
 
 
-def parts(ridge: Ridge, least: float) -> tuple[Part, ...]:
+def parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
     """Return the parts of a ridge: itself, and the mounds on it.
 
     Parameters
@@ -83,13 +83,13 @@ def parts(ridge: Ridge, least: float) -> tuple[Part, ...]:
                 mounds.append((middle, away))
         cores.append(crest.points[on_ridge, :2])
     if not mounds:
-        return (Part(ridge.crests, ridge.core, ridge.half),)
+        return (FeaturePart(ridge.crests, ridge.core, ridge.half),)
     core = np.concatenate(cores)
-    on_discs = [Part((), middle[None], away + ridge.half) for middle, away in mounds]
-    return (Part(tuple(crests), core, ridge.half), *on_discs)
+    on_discs = [FeaturePart((), middle[None], away + ridge.half) for middle, away in mounds]
+    return (FeaturePart(tuple(crests), core, ridge.half), *on_discs)
 
 
-def nearest(places: Floats, every: tuple[Part, ...] | list[Part]) -> Floats:
+def nearest(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
     """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k).
 
     Parameters

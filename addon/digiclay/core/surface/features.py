@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..base.quantity import Parameters, quantity
 from .crests import ridges
-from .feature_parts import Part, nearest, parts
+from .feature_parts import FeaturePart, nearest, parts
 from .pin_lattice import Lattice
 from .regions import Region, components, cut, divided
-from .sheet import Sheet
+from .surface_grid import SurfaceGrid
 
 __all__ = ["Feature", "Finding", "find", "summary", "table"]
 
@@ -108,7 +108,7 @@ class Feature:
         }  # fmt: skip
 
 
-def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
+def find(sheet: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first.
 
     Points belong together that the skin's triangles join; so two bosses that only touch at
@@ -116,7 +116,7 @@ def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
 
     Parameters
     ----------
-    sheet : Sheet
+    grid : SurfaceGrid
     finding : Finding, optional
         Thresholds; by default its own defaults.
     """
@@ -129,7 +129,9 @@ def find(sheet: Sheet, finding: Finding | None = None) -> list[Feature]:
     return found
 
 
-def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: float) -> Iterator[Feature]:
+def _of_kind(
+    sheet: SurfaceGrid, finding: Finding, lattice: Lattice, kind: str, sign: float
+) -> Iterator[Feature]:
     """Give the features of one kind, not yet numbered."""
     off = sign * sheet.raised
     inside = off > finding.threshold
@@ -156,8 +158,8 @@ def _of_kind(sheet: Sheet, finding: Finding, lattice: Lattice, kind: str, sign: 
 
 
 def _shared_out(
-    sheet: Sheet, every: list[Part], pins: NDArray[np.int64], region: Region, smallest: int
-) -> Iterator[tuple[Part, NDArray[np.int64], Region]]:
+    sheet: SurfaceGrid, every: list[FeaturePart], pins: NDArray[np.int64], region: Region, smallest: int
+) -> Iterator[tuple[FeaturePart, NDArray[np.int64], Region]]:
     """Give each part its pins and its piece of a region; one with too few pins goes to those beside it."""
     place = sheet.formed.position[pins]
     while len(every) > 1:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-__all__ = ["HANGS", "until"]
+__all__ = ["TIMEOUT", "wait_until"]
 
 #: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it hangs, s.
-HANGS = 240.0
+TIMEOUT = 240.0
 
 
-def until(holds: Callable[[], object]) -> None:
+def wait_until(holds: Callable[[], object]) -> None:
     """Wait until something holds."""
-    deadline = time.monotonic() + HANGS
+    deadline = time.monotonic() + TIMEOUT
     while not holds():
         assert time.monotonic() < deadline, "What was waited for did not come"
         time.sleep(0.02)

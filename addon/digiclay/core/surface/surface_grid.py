@@ -14,14 +14,14 @@ from .formed import Formed
 from .skin_mesh import skin
 from .skins import nearest_pin, over, places
 
-__all__ = ["Sheet", "stretched"]
+__all__ = ["SurfaceGrid", "fit_skin"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class SurfaceGrid:
     """Points of a skin, row by row.
 
     Attributes
@@ -82,7 +82,7 @@ class Sheet:
         }
 
 
-def stretched(formed: Formed, skin_name: str, parts: int, cap: float) -> Sheet:
+def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
     """Return the skin over formed pins.
 
     Parameters
@@ -98,4 +98,4 @@ def stretched(formed: Formed, skin_name: str, parts: int, cap: float) -> Sheet:
     place = places(formed, parts)
     rows, columns = place.shape[:2]
     now, before = (over(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former))
-    return Sheet(formed, parts, place.reshape(-1, 2), now, before, rows, columns)
+    return SurfaceGrid(formed, parts, place.reshape(-1, 2), now, before, rows, columns)
