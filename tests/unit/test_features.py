@@ -10,7 +10,7 @@ from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.feature_solids import solid
 from digiclay.core.surface.features import Feature, Finding, find, summary, table
 from digiclay.core.surface.formed import Formed
-from digiclay.core.surface.surface_grid import fit_skin
+from digiclay.core.surface.skin_grid import fit_skin
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 LEVEL = 0.04

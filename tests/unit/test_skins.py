@@ -8,8 +8,8 @@ import scipy.sparse
 from digiclay.core.base.spline import monotone
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.formed import Formed
+from digiclay.core.surface.skin_grid import SurfaceGrid, fit_skin
 from digiclay.core.surface.skins import SKINS
-from digiclay.core.surface.surface_grid import SurfaceGrid, fit_skin
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay

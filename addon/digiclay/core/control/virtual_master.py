@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import any_true, constants, count_true
 from ..base.modes import Mode
-from ..model.interfaces import Measurement, Commands
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster

@@ -14,9 +14,9 @@ from ..surface.feature_solids import solid as feature_solid
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
 from ..surface.pins_solid import pins_solid
+from ..surface.skin_grid import SurfaceGrid, fit_skin
 from ..surface.skin_mesh import BASE_THICKNESS, base_level, solid
 from ..surface.skins import SKINS
-from ..surface.surface_grid import SurfaceGrid, fit_skin
 
 __all__ = ["KINDS", "Model", "bodies", "features", "sheet"]
 

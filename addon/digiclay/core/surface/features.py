@@ -13,7 +13,7 @@ from .crests import ridges
 from .feature_parts import FeaturePart, nearest, parts
 from .pin_lattice import Lattice
 from .regions import Region, components, cut, divided
-from .surface_grid import SurfaceGrid
+from .skin_grid import SurfaceGrid
 
 __all__ = ["Feature", "Finding", "find", "summary", "table"]
 
