@@ -19,7 +19,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement, Commands
+from ..model.interfaces import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from ..model.set_point import SetPoint
 from .blister import Blister
