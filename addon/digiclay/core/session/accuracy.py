@@ -47,8 +47,10 @@ Floats = NDArray[np.float64]
 #: an error of second order, which is what remains of a higher one across a kink. What comes out is an
 #: estimate, no bound, and is said as "about".
 SHARE = 4.0 / 3.0
-#: Control periods of a live session's stretch, and from the end of one to the start of the next.
-STRETCH, PAUSE = 20, 180
+#: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
+#: the reference costs three of the session: only one is done in so many of the session's, so that no tick is
+#: slow.
+STRETCH, PAUSE, SPREAD = 20, 180, 4
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorMonitor:
-    """Reference solution beside a live session, over a stretch at intervals.
+    """Reference solution of a live session, over a stretch at intervals; it lags behind the session.
 
     Attributes
     ----------
@@ -85,13 +87,20 @@ class ErrorMonitor:
         The session's, with the `reference_settings`.
     state : State or None
         The reference's; None between two stretches.
-    left : int
-        Control periods left of the stretch, or of the time to the next one.
+    age : int
+        Control periods of the session since the stretch began.
+    waiting : tuple of (State, ndarray (2, f, 7))
+        Periods of the stretch that the reference has still to do: the session after each, of which only the
+        active cells are as they were then, and the finger at both ends of it.
+    reached : ndarray (2, n) or None
+        Heights, m, and forces, N, of the session at the end of the stretch.
     """
 
     system: System
     state: State | None = None
-    left: int = 0
+    age: int = 0
+    waiting: tuple[tuple[State, Floats], ...] = ()
+    reached: Floats | None = None
 
 
 def has_every_command(scene: Scene) -> bool:
@@ -175,7 +184,7 @@ def start(scene: Scene) -> ErrorMonitor | None:
 
 def reset(monitor: ErrorMonitor) -> ErrorMonitor:
     """Return the monitor of a session that has just become another one."""
-    return replace(monitor, state=None, left=0)
+    return ErrorMonitor(monitor.system)
 
 
 def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
@@ -187,15 +196,16 @@ def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
     state : State
         The session's, before a control period.
     """
-    if monitor.state is not None or monitor.left > 0:
+    if monitor.state is not None or 0 < monitor.age < STRETCH + PAUSE:
         return monitor
-    return replace(monitor, state=state.copy(), left=STRETCH)
+    return ErrorMonitor(monitor.system, state.copy())
 
 
 def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMonitor, Errors | None]:
-    """Integrate the control period a session has just done; return the errors where a stretch ends.
+    """Note the control period a session has just done; return the errors where the reference ends a stretch.
 
-    A reference that diverges tells nothing, and the monitor starts anew.
+    The reference integrates one of the noted periods in every `SPREAD` of the session's. One that diverges
+    tells nothing, and the monitor starts anew.
 
     Parameters
     ----------
@@ -206,15 +216,30 @@ def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMoni
     path : ndarray (2, f, 7)
         The finger at both ends of the period; see `live_periods.simulate_path`.
     """
-    if monitor.state is None:
-        return begin_stretch(replace(monitor, left=monitor.left - 1), after), None
-    system = monitor.system
-    finger = trace_fingers(system, interpolate_poses(path, system.instants / system.period))[0]
-    state = repeat_period(system, monitor.state, finger, after)
+    monitor = replace(monitor, age=monitor.age + 1)
+    before = monitor.state
+    if before is None:
+        return begin_stretch(monitor, after), None
+    if monitor.age <= STRETCH:
+        monitor = _note_period(monitor, after, path)
+    if monitor.age % SPREAD:
+        return monitor, None
+    (leader, way), *waiting = monitor.waiting
+    system, force = monitor.system, monitor.system.rows.force
+    finger = trace_fingers(system, interpolate_poses(way, system.instants / system.period))[0]
+    state = repeat_period(system, before, finger, leader)
     if not np.isfinite(state.active.block).all():
         return begin_stretch(reset(monitor), after), None
-    if monitor.left > 1:
-        return replace(monitor, state=state, left=monitor.left - 1), None
-    force = system.rows.force
-    found = compare(state.row(0), state.row(force), after.row(0), after.row(force))
-    return replace(monitor, state=None, left=PAUSE), Errors.estimate(found)
+    if waiting or monitor.reached is None:
+        return replace(monitor, state=state, waiting=tuple(waiting)), None
+    found = compare(state.row(0), state.row(force), *monitor.reached)
+    return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(found)
+
+
+def _note_period(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
+    """Return the monitor with one more period that the reference has still to do."""
+    kept = after._replace(active=replace(after.active, block=after.active.block.copy()))
+    waiting, reached = (*monitor.waiting, (kept, path)), None
+    if monitor.age == STRETCH:
+        reached = np.stack([after.row(0), after.row(monitor.system.rows.force)])
+    return replace(monitor, waiting=waiting, reached=reached)

@@ -1,0 +1,114 @@
+"""The reference solution beside a live session: what it finds, and when it is integrated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import State
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import accuracy, recent_trace, snapshot
+from digiclay.core.session.accuracy import PAUSE, SPREAD, STRETCH, Errors
+from digiclay.core.session.live_periods import interpolate_path, simulate_path
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
+SYSTEM = assemble(SCENE)
+
+
+def pose(x: float = 0.0, z: float = 0.05) -> Floats:
+    """Return a level finger's pose, m, as that of the only one."""
+    return np.array([[x, 0.0, z, *LEVEL]])
+
+
+def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
+    """Return the errors a session's monitor finds."""
+    table = {"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}}
+    scene = resolve(table)
+    system, monitor, found = assemble(scene), accuracy.start(scene), []
+    assert monitor is not None
+    start = begin(system)
+    monitor = accuracy.begin_stretch(monitor, start)
+    for index, state in enumerate(simulate_path(system, start, finger)):
+        monitor, errors = accuracy.follow(monitor, state, finger[index : index + 2])
+        found += [errors] if errors else []
+    assert index == count - 1
+    return found
+
+
+def go_on(finger: Floats) -> Floats:
+    """Return a finger's path that moves on, quite differently, while the reference lags behind."""
+    return np.concatenate([finger, interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)])
+
+
+def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done: list[int] = []
+    repeat = accuracy.repeat_period
+
+    def counted(*arguments: Any) -> State:
+        done.append(period)
+        return repeat(*arguments)
+
+    monkeypatch.setattr(accuracy, "repeat_period", counted)
+    monitor, start = accuracy.start(SCENE), begin(SYSTEM)
+    assert monitor is not None
+    monitor, finger = accuracy.begin_stretch(monitor, start), interpolate_path(pose(), pose(z=0.038), 400)
+    for period, state in enumerate(simulate_path(SYSTEM, start, finger)):
+        monitor, _ = accuracy.follow(monitor, state, finger[period : period + 2])
+    assert len(done) == 2 * STRETCH
+    assert np.diff(done).min() >= SPREAD
+
+
+def test_a_monitor_follows_for_a_stretch_now_and_then() -> None:
+    count = 2 * (STRETCH + PAUSE) + STRETCH * SPREAD
+    assert len(monitored(count, interpolate_path(pose(), pose(z=0.05), count))) == 3
+
+
+def test_the_monitor_finds_the_error_of_a_stretch() -> None:
+    # The truth: the same periods at a twentieth of the step. The commands differ by what the errors
+    # before them changed, so it is no more than the right size that is asked for.
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    (found,) = monitored(STRETCH * SPREAD, go_on(finger))
+    fine = assemble(
+        resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "0.05 ms"}})
+    )
+    coarse = assemble(
+        resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": "1 ms"}})
+    )
+    *_, exact = simulate_path(fine, begin(fine), finger)
+    *_, state = simulate_path(coarse, begin(coarse), finger)
+    error = np.abs(exact.row(0) - state.row(0)).max()
+    assert 0.3 * error < found.height < 3.0 * error
+    assert error > 1e-9
+
+
+def test_a_finer_step_has_smaller_errors() -> None:
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH)
+    coarse, fine = (monitored(STRETCH * SPREAD, go_on(finger), step)[0] for step in ("1 ms", "0.25 ms"))
+    # Second order: a quarter of the step has a sixteenth of the error, contact events aside.
+    assert fine.height < coarse.height / 8
+    assert fine.force < coarse.force / 8
+
+
+def test_a_monitor_leaves_the_session_alone() -> None:
+    finger = interpolate_path(pose(z=0.0395), pose(0.004, 0.0375), STRETCH * SPREAD)
+    *_, alone = simulate_path(SYSTEM, begin(SYSTEM), finger)
+    monitor, start = accuracy.start(SCENE), begin(SYSTEM)
+    assert monitor is not None
+    monitor = accuracy.begin_stretch(monitor, start)
+    for index, state in enumerate(simulate_path(SYSTEM, start, finger)):
+        monitor, _ = accuracy.follow(monitor, state, finger[index : index + 2])
+    assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
+    assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
+
+
+def test_a_step_that_cannot_be_halved_has_no_monitor() -> None:
+    table = {"simulation": {"control_period": "1 s", "physics_step": "1 ms"}, "control": "absent"}
+    assert accuracy.start(resolve(table)) is None
