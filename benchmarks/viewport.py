@@ -12,6 +12,7 @@ from digiclay.commands.tables import table
 from .report import add_kind, kept, made_with, progress
 
 if TYPE_CHECKING:  # Blender is imported when it is needed
+    from .skin_cost import SkinCost
     from .viewport_cost import Cost
 
 __all__ = ["BEDS", "add"]
@@ -36,19 +37,23 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_without_blender()
     from digiclay.compat import bpy
 
+    from .skin_cost import SHOWN, measure_skin
     from .viewport_cost import PARTS, measured
 
     ticks = QUICK if arguments.quick else FULL
-    costs = []
+    costs, skins = [], []
     with progress(arguments, "viewport", len(BEDS)) as bar:
         for rows, columns, _ in BEDS:
             costs.append(measured(rows, columns, ticks))
+            skins.append(measure_skin(rows, columns, ticks))
             bar(f"{rows * columns} pins")
-    text = "\n".join(_text(costs, PARTS, bpy.app.version_string))
+    text = "\n".join([*_text(costs, PARTS, bpy.app.version_string), *_skin_text(skins, SHOWN)])
     print(text)
     head = ("pins", *(f"{name}_s" for name in PARTS), "tick_s", "tick_95_s", "growth_bytes")
+    head = (*head, *(f"{shown}_{kind}_s" for shown, kind in SHOWN))
     figures = [
-        [one.pins, *(one.parts[name] for name in PARTS), one.whole, one.worst, one.growth] for one in costs
+        [one.pins, *(one.parts[name] for name in PARTS), one.whole, one.worst, one.growth, *skin.evaluate]
+        for one, skin in zip(costs, skins, strict=True)
     ]
     kept(arguments.out, "viewport", text, head, figures)
     return 0
@@ -68,4 +73,12 @@ def _text(costs: list[Cost], parts: tuple[str, ...], version: str) -> Iterator[s
         ]
         for one, (_, _, goal) in zip(costs, BEDS, strict=True)
     ]  # fmt: skip
+    yield from table(head, rows, left=0)
+
+
+def _skin_text(costs: list[SkinCost], shown: tuple[tuple[str, str], ...]) -> Iterator[str]:
+    """Give the lines about the live skin."""
+    yield "\nAll pins moved, forms by turns: processor time of the geometry nodes, medians, ms.\n"
+    head = ("pins", *("pins alone" if form == "pins" else f"{form}, {kind}" for form, kind in shown))
+    rows = [[f"{one.pins}", *(f"{1e3 * spent:.2f}" for spent in one.evaluate)] for one in costs]
     yield from table(head, rows, left=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from . import command_line, operators, panels, preferences
-from .device import display, unit_watch
+from .device import detail, display, unit_watch
 from .exchange import image_reader
 from .live import handlers
 from .press import tool
@@ -24,6 +24,7 @@ MODULES: tuple[ModuleType, ...] = (
     tool,
     command_line,
     unit_watch,
+    detail,
     handlers,  # the last to come and the first to go: it ends what runs
 )
 

@@ -16,7 +16,7 @@ from ..core.session.recent_trace import PICKED, SPAN
 from ..live import bed_state, running
 from ..overlay import views
 from ..settings import properties
-from . import heat, view
+from . import form, heat, view
 from .node_tree import LENGTH
 
 __all__ = ["Display", "pick_pins", "picked_pins", "register", "unregister"]
@@ -24,6 +24,16 @@ __all__ = ["Display", "pick_pins", "picked_pins", "register", "unregister"]
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
     ("force", "Force", "Color the pins by the force on them"),
+)
+FORMS = (
+    ("automatic", "Automatic", "Pins, and the skin instead where they are smaller than about 3 pixels"),
+    ("pins", "Pins", "Pins alone"),
+    ("skin", "Skin", "The surface of the pins as a skin, without the pins"),
+    ("both", "Both", "Pins under a clear skin"),
+)
+SKINS = (
+    ("smooth", "Smooth", "Smooth through the tops of the pins, and never beyond them"),
+    ("membrane", "Membrane", "Stretched over the flat ends of the pins"),
 )
 #: Marks a place no pin is picked for.
 NONE = -1
@@ -72,6 +82,24 @@ def _rewrite(bed: Any) -> None:
         except DigiclayError:
             # The settings have changed since the state was kept: what was last drawn stays.
             return
+
+
+def _form(display: Any) -> int:
+    return form.FORMS.index(form.read_form(display.id_data))
+
+
+def _set_form(display: Any, code: int) -> None:
+    if form.can_show_skin(display.id_data):
+        form.set_form(display.id_data, FORMS[code][0])
+
+
+def _skin(display: Any) -> int:
+    return form.KINDS.index(form.read_kind(display.id_data))
+
+
+def _set_skin(display: Any, code: int) -> None:
+    if form.can_show_skin(display.id_data):
+        form.set_kind(display.id_data, SKINS[code][0])
 
 
 def _color(display: Any) -> int:
@@ -125,6 +153,20 @@ def _take_overlay(display: Any, context: Any) -> None:
 class Display(bpy.types.PropertyGroup):
     """Display properties of a bed."""
 
+    form: bpy.props.EnumProperty(
+        name="Show",
+        description="What is seen of the bed, also in renders: pins, or the surface they form as a skin",
+        items=FORMS,
+        get=_form,
+        set=_set_form,
+    )
+    skin: bpy.props.EnumProperty(
+        name="Skin",
+        description="How the skin runs between the pins",
+        items=SKINS,
+        get=_skin,
+        set=_set_skin,
+    )
     color: bpy.props.EnumProperty(
         name="Color",
         description="Quantity shown by the color of a pin",

@@ -9,10 +9,12 @@ from ..core.base.modes import Mode
 from . import heat
 from .nodes import attribute, node, number, socket, switch
 from .parts import Sources
+from .skin_lattice import KINDS
+from .skin_nodes import skin_nodes
 
 __all__ = [
-    "ARROWS", "ARROW_LENGTH", "CASE", "COLOR_BY_FORCE", "LEAST", "LENGTH", "SOURCES", "TOP_FORCE",
-    "bed_nodes",
+    "ARROWS", "ARROW_LENGTH", "CASE", "COLOR_BY_FORCE", "FAR", "FORM", "LEAST", "LENGTH", "MEMBRANE",
+    "SOURCES", "TOP_FORCE", "bed_nodes",
 ]  # fmt: skip
 
 #: Names of the nodes that have the housing and the collection of all that is drawn.
@@ -23,6 +25,9 @@ LEAST_STRETCH = 0.02
 #: Names of the settings: colors by force, and arrows.
 COLOR_BY_FORCE, TOP_FORCE = "Color by Force", "Top Color at (N)"
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
+#: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, and whether the pins
+#: are too small in the views for "automatic" to draw them.
+FORM, MEMBRANE, FAR = "Form", "Membrane", "Far"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
 #: Smaller forces get no arrow, N: a millinewton is what the pulp of a finger just feels.
@@ -64,12 +69,16 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     tree.links.new(choice.outputs["Instances"], instances.inputs["Instance"])
     tree.links.new(index, instances.inputs["Instance Index"])
     tree.links.new(_stretch(tree, deck, length), instances.inputs["Scale"])
-    drawn = _arrows_on_points(tree, sources.arrow, settings, instances.outputs["Instances"], unit, 7)
+    pins_on, skin_on, both_on = _form_switches(tree, settings, 16)
+    pins = switch(tree, "GEOMETRY", 6, 1, pins_on, None, instances.outputs["Instances"])
+    drawn = _arrows_on_points(tree, sources.arrow, settings, pins, unit, 7)
+    skin = _skin(tree, sources, settings, both_on, 20)
     case = node(tree, "GeometryNodeObjectInfo", 7, 1)
     case.name, case.inputs["Object"].default_value = CASE, sources.housing
     both = node(tree, "GeometryNodeJoinGeometry", 8, 0)
     tree.links.new(case.outputs["Geometry"], both.inputs["Geometry"])
     tree.links.new(drawn, both.inputs["Geometry"])
+    tree.links.new(switch(tree, "GEOMETRY", 7.5, 2, skin_on, None, skin), both.inputs["Geometry"])
     tree.links.new(both.outputs["Geometry"], result.inputs["Geometry"])
     return tree
 
@@ -80,6 +89,71 @@ def _add_settings(tree: Any) -> None:
     socket(tree, TOP_FORCE, "NodeSocketFloat", heat.TOP, "Force of the last color, in N")
     socket(tree, ARROWS, "NodeSocketBool", False, "Draw the force on each pin as an arrow onto its top")
     socket(tree, ARROW_LENGTH, "NodeSocketFloat", LENGTH, "Length of the arrow of 1 N, in mm of the device")
+    socket(
+        tree,
+        FORM,
+        "NodeSocketInt",
+        0,
+        "0: pins, a skin where they are too small; 1: pins; 2: skin; 3: both",
+    )
+    socket(tree, MEMBRANE, "NodeSocketBool", False, "Stretch the skin over the flat ends of the pins")
+    socket(tree, FAR, "NodeSocketBool", False, "Pins are too small in the views; set by the extension")
+
+
+def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]:
+    """Add the nodes that tell whether pins, skin, and both are drawn.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    settings : bpy.types.Node
+        The tree's input node.
+    row : float
+        Where in the tree they stand.
+    """
+    form = settings.outputs[FORM]
+    automatic, pins, skin, both = (
+        number(tree, "COMPARE", 0, row + step, form, float(step), 0.5) for step in range(4)
+    )
+    # A picture has as many samples as it needs: there "automatic" means pins.
+    in_view = node(tree, "GeometryNodeIsViewport", 0, row + 4).outputs["Is Viewport"]
+    far = number(tree, "MULTIPLY", 1, row + 4, settings.outputs[FAR], in_view)
+    near = number(tree, "SUBTRACT", 2, row + 4, 1.0, far)
+    instead = number(tree, "MULTIPLY", 3, row, automatic, far)
+    pins = number(tree, "ADD", 4, row + 1, pins, number(tree, "MULTIPLY", 3, row + 1, automatic, near))
+    skin = number(tree, "ADD", 4, row + 2, skin, instead)
+    return number(tree, "ADD", 5, row + 1, pins, both), number(tree, "ADD", 5, row + 2, skin, both), both
+
+
+def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> Any:
+    """Add the nodes of the skin, clear where pins are drawn under it; return its geometry.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    sources : Sources
+    settings : bpy.types.Node
+        The tree's input node.
+    both : bpy.types.NodeSocket
+        Whether pins and skin are drawn.
+    row : float
+        Where in the tree they stand.
+    """
+    names = []
+    for step, name in enumerate(KINDS):
+        names.append(node(tree, "FunctionNodeInputString", -3, row + step))
+        names[-1].string = name
+    smooth, membrane = (name.outputs["String"] for name in names)
+    kind = switch(tree, "STRING", -2, row, settings.outputs[MEMBRANE], smooth, membrane)
+    skin = skin_nodes(tree, sources.skin, settings.outputs["Geometry"], kind, row)
+    clear = node(tree, "GeometryNodeSetMaterial", 19, row)
+    clear.inputs["Material"].default_value = sources.clear
+    tree.links.new(skin, clear.inputs["Geometry"])
+    chosen = switch(tree, "GEOMETRY", 20, row, both, skin, clear.outputs["Geometry"])
+    # An instance is joined with the housing without a copy of its points and their attributes.
+    whole = node(tree, "GeometryNodeGeometryToInstance", 21, row)
+    tree.links.new(chosen, whole.inputs["Geometry"])
+    return whole.outputs["Instances"]
 
 
 def _stretch(tree: Any, deck: float, length: float) -> Any:

@@ -13,6 +13,8 @@ from ..core.base.modes import COLORS, Mode
 from . import heat, primitives
 from .instant import Instant
 from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
+from .skin_lattice import choose_parts, make_lattice
+from .skin_nodes import SkinMeshes, make_meshes
 
 __all__ = [
     "Sources", "ellipsoid", "finger_material", "is_linked", "make_fingertip", "make_sources", "marked",
@@ -23,8 +25,9 @@ __all__ = [
 SKIN = (0.91, 0.60, 0.47)
 CASE = (0.13, 0.14, 0.16)
 ARROW = (0.80, 0.05, 0.05)
-#: How much of the fingertip is left when one looks through it for the arrows.
-CLEAR = 0.25
+CLAY = (0.76, 0.70, 0.63)
+#: How much of the fingertip is left when one looks through it for the arrows, and of the skin for the pins.
+CLEAR, CLEAR_CLAY = 0.25, 0.6
 #: Space between the outermost pins and the wall, and the wall's thickness, in pitches.
 GAP, WALL = 0.85, 1.7
 #: Above this many pins they are drawn with fewer faces.
@@ -85,11 +88,17 @@ class Sources(NamedTuple):
     arrow : bpy.types.Object
         An arrow of length 1 that points down and ends at the origin.
     housing : bpy.types.Object
+    skin : SkinMeshes
+        Objects of the live skin.
+    clear : bpy.types.Material
+        Of a skin over pins that are drawn.
     """
 
     collection: Any
     arrow: Any
     housing: Any
+    skin: SkinMeshes
+    clear: Any
 
 
 def make_sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
@@ -115,7 +124,14 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
         pin.material_slots[0].material = material(look, color, roughness=0.45)
     arrow = marked(_arrow(instant.pitch), f"{len(looks)} force arrow", PIN, collection)
     case = marked(_housing(instant, deck, rim), f"{len(looks) + 1} housing", PIN, collection)
-    return Sources(collection, arrow, case)
+    clay = material("skin", CLAY, roughness=0.6)
+    meshes = make_meshes(make_lattice(instant, choose_parts(len(instant.height))), deck, clay)
+    skin = [
+        marked(mesh, f"{code} {mesh.name}", PIN, collection)
+        for code, mesh in enumerate(meshes, len(looks) + 2)
+    ]
+    clear = material("skin_clear", CLAY, roughness=0.6, alpha=CLEAR_CLAY)
+    return Sources(collection, arrow, case, SkinMeshes(*skin), clear)
 
 
 def _arrow(pitch: float) -> Any:

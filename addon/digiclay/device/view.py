@@ -22,6 +22,7 @@ from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
 from . import parts
+from .bed_modifier import find_modifier, require_modifier
 from .instant import Instant
 from .node_tree import ARROW_LENGTH, ARROWS, CASE, COLOR_BY_FORCE, SOURCES, TOP_FORCE, bed_nodes
 from .parts import is_linked, material
@@ -89,7 +90,7 @@ def add_modifier(bed: Any, instant: Instant) -> None:
     instant : Instant
         For the sizes of the housing and the pins.
     """
-    _modifier(bed).node_group = _make_tree(instant, 0.0)
+    require_modifier(bed).node_group = _make_tree(instant, 0.0)
 
 
 def hold_parts(bed: Any) -> None:
@@ -147,17 +148,17 @@ def color_by(bed: Any, what: str) -> None:
     """
     if what not in COLORINGS:
         raise DigiclayError(f"view.color_by must be one of {', '.join(COLORINGS)} (got {what!r}).")
-    set_node_setting(_modifier(bed), COLOR_BY_FORCE, what == "force")
+    set_node_setting(require_modifier(bed), COLOR_BY_FORCE, what == "force")
 
 
 def color_source(bed: Any) -> str:
     """Return the quantity shown by the color of the pins: "mode" or "force"."""
-    return "force" if node_setting(_modifier(bed), COLOR_BY_FORCE) else "mode"
+    return "force" if node_setting(require_modifier(bed), COLOR_BY_FORCE) else "mode"
 
 
 def top_color(bed: Any) -> float:
     """Return the force from which on a pin has the last color, N."""
-    return float(node_setting(_modifier(bed), TOP_FORCE))
+    return float(node_setting(require_modifier(bed), TOP_FORCE))
 
 
 def shows_force(bed: Any) -> bool:
@@ -174,7 +175,7 @@ def scale_colors(bed: Any, top: float) -> None:
     top : float
         N.
     """
-    set_node_setting(_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
+    set_node_setting(require_modifier(bed), TOP_FORCE, _positive("top color", top, "N"))
 
 
 def show_arrows(bed: Any, on: bool) -> None:
@@ -185,7 +186,7 @@ def show_arrows(bed: Any, on: bool) -> None:
     bed : bpy.types.Object
     on : bool
     """
-    set_node_setting(_modifier(bed), ARROWS, bool(on))
+    set_node_setting(require_modifier(bed), ARROWS, bool(on))
     tip = fingertip_of(bed)
     ball = parts.ellipsoid(tip) if tip is not None else None
     if ball is not None:
@@ -194,12 +195,12 @@ def show_arrows(bed: Any, on: bool) -> None:
 
 def shows_arrows(bed: Any) -> bool:
     """Return whether the bed's forces are drawn as arrows."""
-    return bool(node_setting(_modifier(bed), ARROWS))
+    return bool(node_setting(require_modifier(bed), ARROWS))
 
 
 def arrow_length(bed: Any) -> float:
     """Return the length of the arrow of 1 N, m of the device."""
-    return float(node_setting(_modifier(bed), ARROW_LENGTH)) * 1e-3
+    return float(node_setting(require_modifier(bed), ARROW_LENGTH)) * 1e-3
 
 
 def scale_arrows(bed: Any, length: float) -> None:
@@ -211,7 +212,7 @@ def scale_arrows(bed: Any, length: float) -> None:
     length : float
         m.
     """
-    set_node_setting(_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
+    set_node_setting(require_modifier(bed), ARROW_LENGTH, _positive("arrow length", length, "m") * 1e3)
 
 
 def wants_force(bed: Any) -> bool:
@@ -221,7 +222,7 @@ def wants_force(bed: Any) -> bool:
 
 def is_drawn(bed: Any) -> bool:
     """Return whether the bed still has the modifier that draws its pins."""
-    return _modifier_of(bed) is not None
+    return find_modifier(bed) is not None
 
 
 def is_bed(thing: Any) -> bool:
@@ -247,7 +248,7 @@ def fingertip_of(bed: Any) -> Any | None:
 
 def housing_of(bed: Any) -> Any | None:
     """Return the object that has the shape of a bed's housing, in the bed's space; None without."""
-    modifier = _modifier_of(bed)
+    modifier = find_modifier(bed)
     case = modifier.node_group.nodes.get(CASE) if modifier else None
     if case is not None:
         return case.inputs["Object"].default_value
@@ -256,7 +257,7 @@ def housing_of(bed: Any) -> Any | None:
 
 def sources_of(bed: Any) -> Any | None:
     """Return the collection of all a bed is drawn with; None in older files, or without its nodes."""
-    modifier = _modifier_of(bed)
+    modifier = find_modifier(bed)
     drawn = modifier.node_group.nodes.get(SOURCES) if modifier else None
     return None if drawn is None else drawn.inputs["Collection"].default_value
 
@@ -272,24 +273,6 @@ def _place_fingertip(bed: Any, instant: Instant) -> None:
     tip = fingertip_of(bed)
     if tip is not None:
         bridge.place_fingertip(tip, instant.fingertip, instant.finger)
-
-
-def _modifier_of(bed: Any) -> Any | None:
-    """Return the modifier that draws the pins, or None when the user has removed or changed it."""
-    for modifier in bed.modifiers:
-        tree = modifier.node_group if modifier.type == "NODES" else None
-        if tree is not None and ARROWS in tree.interface.items_tree:
-            return modifier
-    return None
-
-
-def _modifier(bed: Any) -> Any:
-    """Return the modifier that draws the pins, or refuse a bed without."""
-    found = _modifier_of(bed)
-    if found is None:
-        rule = "must have the geometry nodes modifier that draws its pins (got none)"
-        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
-    return found
 
 
 def _positive(name: str, value: float, unit: str) -> float:

@@ -22,14 +22,17 @@ STALE = 2
 STOPPED = "was stopped; the bed keeps its state"
 #: Blender's keymaps: their names and the editors they are of.
 VIEW, WINDOW = ("3D View", "VIEW_3D"), ("Window", "EMPTY")
-#: Keymap, operator, key, and whether Shift is held: None, whatever is held. Without a session the operators
-#: decline, and the key does what it always does.
-KEYS = (
-    (VIEW, "digiclay.session_pause", "P", False),
-    (VIEW, "digiclay.session_step", "P", True),
-    (VIEW, "digiclay.session_rewind", "BACK_SPACE", False),
-    (VIEW, "digiclay.session_reset", "BACK_SPACE", True),
-    (WINDOW, "digiclay.session_escape", "ESC", None),
+#: The keymap in which Alt S clears the scale: its keys precede those of the view.
+OBJECT = ("Object Mode", "EMPTY")
+#: Keymap, operator, key, and what else is held. Without a session, or a bed, the operators decline, and the
+#: key does what it always does.
+KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
+    (VIEW, "digiclay.session_pause", "P", {}),
+    (VIEW, "digiclay.session_step", "P", {"shift": True}),
+    (VIEW, "digiclay.session_rewind", "BACK_SPACE", {}),
+    (VIEW, "digiclay.session_reset", "BACK_SPACE", {"shift": True}),
+    (WINDOW, "digiclay.session_escape", "ESC", {"any": True}),
+    (OBJECT, "digiclay.skin_toggle", "S", {"alt": True}),
 )
 _ADDED: list[tuple[Any, Any]] = []
 
@@ -143,10 +146,9 @@ def _add_keys() -> None:
     configuration = bpy.context.window_manager.keyconfigs.addon
     if configuration is None:
         return
-    for (name, space), operator, key, shift in KEYS:
+    for (name, space), operator, key, held in KEYS:
         keymap = configuration.keymaps.new(name=name, space_type=space)
-        held = {"any": True} if shift is None else {"shift": shift}
-        item = keymap.keymap_items.new(operator, key, "PRESS", **held)
+        item = keymap.keymap_items.new(operator, key, "PRESS", head=True, **held)
         if operator == "digiclay.session_reset":
             item.properties.running_only = True
         _ADDED.append((keymap, item))

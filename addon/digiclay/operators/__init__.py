@@ -24,6 +24,7 @@ from . import (
     shape_keep,
     take_actions,
     take_replay,
+    toggle_skin,
 )
 
 __all__ = ["register", "unregister"]
@@ -35,6 +36,7 @@ CLASSES: tuple[type, ...] = (
     presets.SavePreset,
     presets.RemovePreset,
     add_bed.Rebuild,
+    toggle_skin.ToggleSkin,
     pick_pins.PickPins,
     pick_pins.ClearPins,
     press_stroke.Press,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..device import form
 from ..device.view import bed_of
 from ..live import running
 from ..live.waiting import active_session, blocking_reason
@@ -14,7 +15,7 @@ from ..recorded import takes
 from ..recorded.bake import is_baked
 
 __all__ = [
-    "baked", "edited", "linked", "no_bed", "no_session", "no_surface", "no_take", "session_runs",
+    "baked", "edited", "linked", "no_bed", "no_session", "no_skin", "no_surface", "no_take", "session_runs",
     "session_waits",
 ]  # fmt: skip
 
@@ -88,6 +89,12 @@ def no_surface(context: Any) -> str:
     return no_bed(context, "Select a bed of Digital Clay, or its fingertip") or (
         few if len(bed_of(context).data.vertices) < 4 else ""
     )
+
+
+def no_skin(context: Any) -> str:
+    """The bed's geometry nodes have no skin: removed, or of an older file."""
+    has = form.can_show_skin(bed_of(context))
+    return "" if has else "The bed is of an older file and has no skin: rebuild it in the panel Device"
 
 
 def no_session(context: Any) -> str:

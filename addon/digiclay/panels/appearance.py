@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..device import display, view
+from ..device import display, form, view
 from .base import Panel, bed_of
 
 __all__ = ["CLASSES", "Display"]
@@ -28,6 +28,12 @@ class Display(Panel, bpy.types.Panel):
             layout.label(text="The bed's geometry nodes were removed", icon="ERROR")
         column = layout.column()
         column.enabled = drawn
+        skin = column.column()
+        skin.enabled = form.can_show_skin(bed)
+        skin.row().prop(shown, "form")
+        row = skin.row()
+        row.active = shown.form != "pins"
+        row.prop(shown, "skin", expand=True)
         column.row().prop(shown, "color", expand=True)
         row = column.row()
         row.active = shown.color == "force"

@@ -1,0 +1,122 @@
+"""Level of detail: whether the pins of a bed are too small in the 3D views to be drawn one by one.
+
+Below a few pixels a pitch the rows of pins make moire. A bed shown as "automatic" is then drawn as a skin,
+until its pins are clearly larger again in any view.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compat import bpy
+from . import form, view
+
+__all__ = ["LARGE", "SMALL", "choose_far", "follow", "measure_pitch", "register", "unregister"]
+
+Floats = NDArray[np.float64]
+
+#: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
+SMALL, LARGE = 3.0, 4.0
+#: The draw handler that looks for changed views; without a window there is none.
+_HANDLES: list[Any] = []
+
+
+def choose_far(pitch: float, far: bool) -> bool:
+    """Return whether pins are too small to be drawn.
+
+    Parameters
+    ----------
+    pitch : float
+        In the view that shows them largest, pixels; 0 where no view shows them.
+    far : bool
+        Whether they were too small before.
+    """
+    return 0.0 < pitch < (LARGE if far else SMALL)
+
+
+def measure_pitch(to_clip: Floats, to_view: Floats, pitch: float, height: float) -> float:
+    """Return the size of a pitch at the middle of a bed, seen from the front, pixels; 0 behind the eye.
+
+    Parameters
+    ----------
+    to_clip : ndarray (4, 4)
+        From the bed's space to that of the picture.
+    to_view : ndarray (4, 4)
+        The window matrix: from the space of the eye to that of the picture.
+    pitch : float
+        In the world, Blender units.
+    height : float
+        Of the region, pixels.
+    """
+    depth = float(to_clip[3, 3])
+    return pitch * float(to_view[1, 1]) * height / 2.0 / depth if depth > 0.0 else 0.0
+
+
+def follow() -> None:
+    """Have every bed of the scenes in view drawn as its size in the views asks for."""
+    for bed, pitch in _sizes():
+        if choose_far(pitch, form.is_far(bed)) != form.is_far(bed):
+            form.set_far(bed, not form.is_far(bed))
+
+
+def _sizes() -> Iterator[tuple[Any, float]]:
+    """Give the beds shown as "automatic", with the pitch in the view that shows them largest, pixels."""
+    sizes: dict[Any, float] = {}
+    scale = bpy.context.preferences.system.ui_scale
+    for window in bpy.context.window_manager.windows:
+        beds = [thing for thing in window.scene.objects if view.is_bed(thing) and _is_automatic(thing)]
+        for region, looking in _regions(window) if beds else ():
+            lens = np.array(looking.window_matrix)
+            for bed in beds:
+                to_clip = np.array(looking.perspective_matrix @ bed.matrix_world)
+                pitch = _pitch(bed) * bed.matrix_world.median_scale
+                size = measure_pitch(to_clip, lens, pitch, region.height) / scale
+                sizes[bed] = max(size, sizes.get(bed, 0.0))
+    yield from sizes.items()
+
+
+def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
+    """Give the regions of a window's 3D views, with where each looks from."""
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D":
+            region = next(one for one in area.regions if one.type == "WINDOW")
+            yield region, area.spaces.active.region_3d
+
+
+def _is_automatic(bed: Any) -> bool:
+    """Return whether a bed's size in the views decides what is drawn of it."""
+    return bed.library is None and form.can_show_skin(bed) and form.read_form(bed) == "automatic"
+
+
+def _pitch(bed: Any) -> float:
+    """Return the distance of the first two pins of a bed, Blender units."""
+    vertices = bed.data.vertices
+    if len(vertices) < 2:
+        return 0.0
+    apart = vertices[1].co.xy - vertices[0].co.xy
+    return float(apart.length)
+
+
+def _look() -> None:
+    """Have the beds follow once the drawing under way is done: while Blender draws, data must not change."""
+    changes = any(choose_far(pitch, form.is_far(bed)) != form.is_far(bed) for bed, pitch in _sizes())
+    if changes and not bpy.app.timers.is_registered(follow):
+        bpy.app.timers.register(follow, first_interval=0.0)
+
+
+def register() -> None:
+    """Look at every view that is drawn from now on."""
+    if not bpy.app.background:
+        _HANDLES.append(bpy.types.SpaceView3D.draw_handler_add(_look, (), "WINDOW", "POST_PIXEL"))
+
+
+def unregister() -> None:
+    """Stop looking."""
+    while _HANDLES:
+        bpy.types.SpaceView3D.draw_handler_remove(_HANDLES.pop(), "WINDOW")
+    if bpy.app.timers.is_registered(follow):
+        bpy.app.timers.unregister(follow)

@@ -1,0 +1,220 @@
+"""Points of the live skin, and their weights: heights of the skin from heights of the pins; no Blender.
+
+The skin is interpolated along the rows of pins, then across them. For each of the two passes the points
+and their weights are prepared once. What remains for a new state is, at every point, a weighted sum of
+heights and slopes of two neighbours.
+
+*smooth* is the monotone cubic of Fritsch and Butland, as in `core.surface.skins`: through every pin, and
+nowhere above or below the two pins it stands between. *membrane* is level over the flat ends of the pins,
+and straight between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .instant import Instant
+
+__all__ = ["KINDS", "MOST_POINTS", "SkinLattice", "Weights", "choose_parts", "interpolate", "make_lattice"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+#: Skins by name.
+KINDS = ("smooth", "membrane")
+#: Points of a skin at most, as long as the pins are fewer: what a tick has time for.
+MOST_POINTS = 41_000
+#: Points a pitch; more are not seen at the size of a pin.
+PARTS = (4, 2, 1)
+#: Flat part of a pin's end, of a pitch, at most: a skin needs room to come down between two pins.
+WIDEST = 0.45
+#: Rounding of a position, in pitches.
+SLACK = 1e-6
+
+
+class Weights(NamedTuple):
+    """Weights of (height, slope) of the two neighbours of every point, (m, 2) each."""
+
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """Interpolation along one direction.
+
+    Attributes
+    ----------
+    previous, following : ndarray of int (k,)
+        Neighbours of each of the k values that are interpolated, for its slope; itself at an end.
+    low, high : ndarray of int (m,)
+        The two values each of the m points is between.
+    weights : dict of str to Weights
+        By the names of `KINDS`.
+    """
+
+    previous: Indices
+    following: Indices
+    low: Indices
+    high: Indices
+    weights: dict[str, Weights]
+
+
+@dataclass(frozen=True, eq=False)
+class SkinLattice:
+    """Skin of a bed.
+
+    Attributes
+    ----------
+    along, across : Pass
+        From pins to points on the rows of pins, and from these to the points of the skin.
+    place : ndarray (m, 2)
+        Points of the skin in plan, m.
+    sunk : ndarray of bool (m,)
+        Lower edge of the skin's sides.
+    faces : ndarray of int (f, 4)
+        Counter-clockwise from outside.
+    """
+
+    along: Pass
+    across: Pass
+    place: Floats
+    sunk: NDArray[np.bool_]
+    faces: Indices
+
+
+def choose_parts(count: int) -> int:
+    """Return the number of points a pitch for a number of pins."""
+    return next((parts for parts in PARTS if parts**2 * count <= MOST_POINTS), PARTS[-1])
+
+
+def make_lattice(instant: Instant, parts: int) -> SkinLattice:
+    """Return the points and weights of a skin over a bed, with sides down to the floor.
+
+    Parameters
+    ----------
+    instant : Instant
+        For the positions and the size of the pins.
+    parts : int
+        Points a pitch.
+    """
+    x, y = instant.position.T
+    columns = _count_columns(y)
+    rows = len(y) // columns
+    starts, spacing = x[::columns], float(y[columns] - y[0]) if rows > 1 else instant.pitch
+    fine_x = _divide(x.min(), x.max(), instant.pitch, parts)
+    fine_y = _divide(y.min(), y.max(), spacing, parts)
+    cap = instant.actuator.bore / 2
+
+    cell = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    low, share = _find_cells((fine_x - starts[:, None]) / instant.pitch, columns)
+    first = cell[:, :1]
+    along = Pass(
+        *_neighbours(cell, 1),
+        (first + low).ravel(),
+        (first + np.minimum(low + 1, columns - 1)).ravel(),
+        _weigh(share.ravel(), cap / instant.pitch),
+    )
+    point = np.arange(rows * fine_x.size, dtype=np.int32).reshape(rows, -1)
+    low, share = _find_cells((fine_y - y[0]) / spacing, rows)
+    surface = np.arange(fine_y.size * fine_x.size, dtype=np.int32).reshape(fine_y.size, -1)
+    edge = np.concatenate([surface[0, :-1], surface[:-1, -1], surface[-1, :0:-1], surface[:0:-1, 0]])
+    of = np.concatenate([surface.ravel(), edge, edge])
+    sunk = np.arange(of.size) >= surface.size + edge.size
+    spread = np.repeat(share, fine_x.size)[of]
+    across = Pass(
+        *_neighbours(point, 0),
+        point[low].ravel()[of],
+        point[np.minimum(low + 1, rows - 1)].ravel()[of],
+        {name: _drop(pair, sunk) for name, pair in _weigh(spread, cap / spacing).items()},
+    )
+    place = np.stack(np.meshgrid(fine_x, fine_y), axis=-1).reshape(-1, 2)[of]
+    return SkinLattice(along, across, place, sunk, _join(surface, edge.size))
+
+
+def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
+    """Return the heights of a skin, as the geometry nodes of a bed work them out, m.
+
+    Parameters
+    ----------
+    lattice : SkinLattice
+    height : ndarray (n,)
+        Of the pins, m.
+    kind : str
+        One of `KINDS`.
+
+    Returns
+    -------
+    ndarray (m,)
+        0 at the lower edge.
+    """
+    for step in (lattice.along, lattice.across):
+        before, after = height - height[step.previous], height[step.following] - height
+        product, total = np.maximum(before * after, 0.0), before + after
+        slope = np.divide(2.0 * product, total, out=np.zeros_like(total), where=total != 0.0)
+        value, weights = np.column_stack([height, slope]), step.weights[kind]
+        height = (value[step.low] * weights.low + value[step.high] * weights.high).sum(axis=1)
+    return height
+
+
+def _count_columns(y: Floats) -> int:
+    """Return how many pins the first row has."""
+    other = np.flatnonzero(np.abs(y - y[0]) > SLACK * float(np.ptp(y)))
+    return int(other[0]) if other.size else len(y)
+
+
+def _divide(first: float, last: float, step: float, parts: int) -> Floats:
+    """Return even points from half a step before the first pin to half a step after the last one."""
+    margin = parts // 2
+    count = int(np.rint((last - first) / step * parts)) + 2 * margin + 1
+    return first + (np.arange(count) - margin) * (step / parts)
+
+
+def _find_cells(place: Floats, count: int) -> tuple[Indices, Floats]:
+    """Return the value before each place, and the share of the way to the next one; level beyond the ends."""
+    low = np.clip(np.floor(place + SLACK), 0, max(count - 2, 0)).astype(np.int32)
+    return low, np.clip(place - low, 0.0, 1.0)
+
+
+def _neighbours(index: Indices, axis: int) -> tuple[Indices, Indices]:
+    """Return the neighbours of every value along an axis; the end values are their own."""
+    last = index.shape[axis] - 1
+    step = np.arange(last + 1)
+    before = np.take(index, np.maximum(step - 1, 0), axis)
+    after = np.take(index, np.minimum(step + 1, last), axis)
+    return before.ravel(), after.ravel()
+
+
+def _weigh(share: Floats, cap: float) -> dict[str, Weights]:
+    """Return the weights at shares of the way between two pins, whose flat ends have a radius in pitches."""
+    square, cube = share**2, share**3
+    rise = 3.0 * square - 2.0 * cube
+    smooth = Weights(
+        np.column_stack([1.0 - rise, cube - 2.0 * square + share]), np.column_stack([rise, cube - square])
+    )
+    cap = min(cap, WIDEST)
+    line, none = np.clip((share - cap) / (1.0 - 2.0 * cap), 0.0, 1.0), np.zeros_like(share)
+    return {
+        "smooth": smooth,
+        "membrane": Weights(np.column_stack([1.0 - line, none]), np.column_stack([line, none])),
+    }
+
+
+def _drop(weights: Weights, which: NDArray[np.bool_]) -> Weights:
+    """Return weights that are 0 at some points."""
+    return Weights(*(np.where(which[:, None], 0.0, part) for part in weights))
+
+
+def _join(surface: Indices, edge: int) -> Indices:
+    """Return the faces of a surface and of its sides, which have points of their own: a crease."""
+    a, b, c, d = surface[:-1, :-1], surface[:-1, 1:], surface[1:, 1:], surface[1:, :-1]
+    top = np.stack([a, b, c, d], axis=-1).reshape(-1, 4)
+    upper = surface.size + np.arange(edge, dtype=np.int32)
+    lower = upper + np.int32(edge)
+    sides = np.column_stack([lower, np.roll(lower, -1), np.roll(upper, -1), upper])
+    faces: Indices = np.concatenate([top, sides]).astype(np.int32)
+    return faces

@@ -1,0 +1,207 @@
+"""Geometry nodes of the live skin: weighted sums of the heights of the pins, in Blender's own code.
+
+The skin follows whatever moves the pins: a session, a bake, undo. It needs no data of its own in a tick.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..bridge import SCALE
+from ..compat import bpy
+from .nodes import attribute, node, number
+from .skin_lattice import Pass, SkinLattice
+
+__all__ = ["SkinMeshes", "make_meshes", "skin_nodes"]
+
+#: Attributes of the meshes: neighbours for the slope, neighbours for the sum, and what is stored on the way.
+PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
+#: Attributes of the weights: their first half; the other is the name of the skin.
+WEIGHTS = ("weight low ", "weight high ")
+
+
+class SkinMeshes(NamedTuple):
+    """Meshes of the skin: points of the pins and of the rows, and the skin itself, flat."""
+
+    pins: Any
+    rows: Any
+    skin: Any
+
+
+def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
+    """Make the meshes of a skin.
+
+    Parameters
+    ----------
+    lattice : SkinLattice
+    deck : float
+        Height of the lower edge of its sides, m.
+    material : bpy.types.Material
+    """
+    pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
+    _write_neighbours(pins, lattice.along)
+    rows = _points("Digital Clay Skin Rows", lattice.across.previous.size)
+    _write_neighbours(rows, lattice.across)
+    _write_weights(rows, lattice.along)
+    count = len(lattice.place)
+    skin = _points("Digital Clay Skin", count)
+    flat = np.column_stack([lattice.place, np.where(lattice.sunk, deck, 0.0)]) * SCALE
+    skin.vertices.foreach_set("co", flat.astype(np.float32).ravel())
+    skin.loops.add(lattice.faces.size)
+    skin.loops.foreach_set("vertex_index", lattice.faces.ravel())
+    skin.polygons.add(len(lattice.faces))
+    skin.polygons.foreach_set("loop_start", np.arange(0, lattice.faces.size, 4, dtype=np.int32))
+    skin.update(calc_edges=True)
+    _write_weights(skin, lattice.across)
+    skin.materials.append(material)
+    return SkinMeshes(pins, rows, skin)
+
+
+def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
+    """Add the nodes that stretch a skin over pins; return its geometry.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    sources : SkinMeshes
+        Objects of the meshes.
+    pins : bpy.types.NodeSocket
+        Points of the pins.
+    kind : bpy.types.NodeSocket
+        Name of the skin.
+    row : float
+        Where in the tree they stand.
+    """
+    names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
+    height = _separate_height(tree, row + 3)
+    index = node(tree, "GeometryNodeInputIndex", 1, row + 2).outputs["Index"]
+    points = _geometry(tree, sources.pins, 1, row)
+    value = _sample(tree, pins, height, "FLOAT", index, 2, row)
+    pair = _store_pair(tree, _store(tree, points, VALUE, "FLOAT", value, 3, row), 4, row)
+    lines = _geometry(tree, sources.rows, 6, row + 2)
+    value = _sum(tree, pair, names, 6, row)
+    pair = _store_pair(tree, _store(tree, lines, VALUE, "FLOAT", value, 10, row), 11, row)
+    up = node(tree, "ShaderNodeCombineXYZ", 17, row + 1)
+    tree.links.new(_sum(tree, pair, names, 13, row), up.inputs["Z"])
+    raised = node(tree, "GeometryNodeSetPosition", 18, row)
+    tree.links.new(_geometry(tree, sources.skin, 16, row), raised.inputs["Geometry"])
+    tree.links.new(up.outputs["Vector"], raised.inputs["Offset"])
+    return raised.outputs["Geometry"]
+
+
+def _points(name: str, count: int) -> Any:
+    """Make a mesh of loose vertices."""
+    made = bpy.data.meshes.new(name)
+    made.vertices.add(count)
+    return made
+
+
+def _write_neighbours(mesh: Any, step: Pass) -> None:
+    """Write the neighbours that the slopes of a pass need."""
+    for name, values in ((PREVIOUS, step.previous), (FOLLOWING, step.following)):
+        mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
+
+
+def _write_weights(mesh: Any, step: Pass) -> None:
+    """Write the neighbours that a pass adds up, and their weights."""
+    for name, values in ((LOW, step.low), (HIGH, step.high)):
+        mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
+    for kind, weights in step.weights.items():
+        for name, share in zip(WEIGHTS, weights, strict=True):
+            made = mesh.attributes.new(name + kind, "FLOAT2", "POINT")
+            made.data.foreach_set("vector", share.astype(np.float32).ravel())
+
+
+def _geometry(tree: Any, thing: Any, column: float, row: float) -> Any:
+    """Add the node that reads an object's mesh."""
+    made = node(tree, "GeometryNodeObjectInfo", column, row)
+    made.inputs["Object"].default_value = thing
+    return made.outputs["Geometry"]
+
+
+def _prefixed(tree: Any, words: str, kind: Any, row: float) -> Any:
+    """Add the nodes that put words before a name."""
+    joined = node(tree, "GeometryNodeStringJoin", 0, row)
+    first = node(tree, "FunctionNodeInputString", -1, row)
+    first.string = words
+    # What is linked first stands last.
+    tree.links.new(kind, joined.inputs["Strings"])
+    tree.links.new(first.outputs["String"], joined.inputs["Strings"])
+    return joined.outputs["String"]
+
+
+def _separate_height(tree: Any, row: float) -> Any:
+    """Add the nodes that read the height of a vertex."""
+    place = node(tree, "GeometryNodeInputPosition", 0, row)
+    parts = node(tree, "ShaderNodeSeparateXYZ", 1, row)
+    tree.links.new(place.outputs["Position"], parts.inputs["Vector"])
+    return parts.outputs["Z"]
+
+
+def _sample(tree: Any, table: Any, value: Any, kind: str, index: Any, column: float, row: float) -> Any:
+    """Add the node that reads a value of other vertices."""
+    made = node(tree, "GeometryNodeSampleIndex", column, row)
+    made.data_type, made.domain = kind, "POINT"
+    tree.links.new(table, made.inputs["Geometry"])
+    tree.links.new(value, _enabled(made.inputs, "Value"))
+    tree.links.new(index, made.inputs["Index"])
+    return _enabled(made.outputs, "Value")
+
+
+def _store(tree: Any, table: Any, name: str, kind: str, value: Any, column: float, row: float) -> Any:
+    """Add the node that stores a value at every vertex."""
+    made = node(tree, "GeometryNodeStoreNamedAttribute", column, row)
+    made.data_type, made.domain = kind, "POINT"
+    made.inputs["Name"].default_value = name
+    tree.links.new(table, made.inputs["Geometry"])
+    tree.links.new(value, _enabled(made.inputs, "Value"))
+    return made.outputs["Geometry"]
+
+
+def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
+    """Add the nodes that store height and slope: the harmonic mean of the slopes on both sides, or 0."""
+    here = attribute(tree, VALUE, "FLOAT", column, row + 1)
+    sides = []
+    for step, name in enumerate((PREVIOUS, FOLLOWING), 2):
+        found = node(tree, "GeometryNodeFieldAtIndex", column + 0.5, row + step)
+        found.data_type, found.domain = "FLOAT", "POINT"
+        tree.links.new(here, _enabled(found.inputs, "Value"))
+        tree.links.new(attribute(tree, name, "INT", column, row + step), found.inputs["Index"])
+        sides.append(_enabled(found.outputs, "Value"))
+    before = number(tree, "SUBTRACT", column + 1, row + 2, here, sides[0])
+    after = number(tree, "SUBTRACT", column + 1, row + 3, sides[1], here)
+    product = number(tree, "MULTIPLY", column + 1, row + 4, before, after)
+    same_way = number(tree, "MAXIMUM", column + 1, row + 5, product, 0.0)
+    twice = number(tree, "MULTIPLY", column + 1, row + 6, same_way, 2.0)
+    total = number(tree, "ADD", column + 1, row + 7, before, after)
+    slope = number(tree, "DIVIDE", column + 1, row + 8, twice, total)  # Blender divides by 0 to 0
+    pair = node(tree, "ShaderNodeCombineXYZ", column + 1.5, row + 1)
+    tree.links.new(here, pair.inputs["X"])
+    tree.links.new(slope, pair.inputs["Y"])
+    return _store(tree, table, PAIR, "FLOAT_VECTOR", pair.outputs["Vector"], column + 1.7, row)
+
+
+def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> Any:
+    """Add the nodes that add up heights and slopes of two neighbours."""
+    pair = attribute(tree, PAIR, "FLOAT_VECTOR", column, row + 5)
+    parts = []
+    for step, (side, name) in enumerate(zip((LOW, HIGH), names, strict=True)):
+        at = attribute(tree, side, "INT", column, row + 6 + step)
+        weight = node(tree, "GeometryNodeInputNamedAttribute", column, row + 8 + step)
+        weight.data_type = "FLOAT_VECTOR"
+        tree.links.new(name, weight.inputs["Name"])
+        dot = node(tree, "ShaderNodeVectorMath", column + 2, row + 5 + step)
+        dot.operation = "DOT_PRODUCT"
+        tree.links.new(
+            _sample(tree, table, pair, "FLOAT_VECTOR", at, column + 1, row + 5 + step), dot.inputs[0]
+        )
+        tree.links.new(_enabled(weight.outputs, "Attribute"), dot.inputs[1])
+        parts.append(dot.outputs["Value"])
+    return number(tree, "ADD", column + 3, row + 5, *parts)
+
+
+def _enabled(sockets: Any, name: str) -> Any:
+    """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
+    return next(one for one in sockets if one.name == name and one.enabled)

@@ -1,0 +1,196 @@
+"""The live skin is drawn by the bed's nodes: it follows the pins whatever moves them, each bed's its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.core.base.errors import DigiclayError
+from digiclay.device import form, view
+from digiclay.device.instant import Instant
+from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
+from digiclay.settings import properties
+
+from tests.blender.at_hand import done
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: Attributes and sums are float32: 24 bits of at most 0.1 m, a few operations each.
+FLOAT32 = 4 * 0.1 * 2.0**-23
+
+
+@pytest.fixture
+def bed() -> Any:
+    """A bed of 8 x 9 hexagonal pins from the Add menu, every pin at a height of its own."""
+    bpy.ops.mesh.digital_clay_add(rows=8, columns=9, arrangement="hexagonal")
+    bed = bpy.context.object
+    shape(bed, 1)
+    return bed
+
+
+def shape(bed: Any, seed: int) -> None:
+    """Put the pins to other heights."""
+    cells = bridge.read_cells(bed.data)
+    count = len(cells["height"])
+    height = 0.04 + 0.004 * np.random.default_rng(seed).standard_normal(count)
+    bridge.write_cells(bed.data, cells["position"], height)
+
+
+def drawn(bed: Any) -> tuple[np.ndarray, int]:
+    """Return the points of the skin that is drawn, m, and how many pins are drawn."""
+    points, pins = np.empty((0, 3)), 0
+    for item in bpy.context.evaluated_depsgraph_get().object_instances:
+        if not item.is_instance or item.parent.original != bed:
+            continue
+        roles = [material.get(view.ROLE) for material in item.object.data.materials if material]
+        if not {"skin", "skin_clear"}.intersection(roles):
+            pins += 1
+            continue
+        points = np.array([vertex.co for vertex in item.object.data.vertices]) / bridge.SCALE
+    return points, pins
+
+
+def baked_heights(bed: Any) -> np.ndarray:
+    """Return the heights at which a bake's pins are drawn, m."""
+    shown, bed.digiclay_display.form = bed.digiclay_display.form, "pins"
+    graph = bpy.context.evaluated_depsgraph_get()
+    floor = bed.matrix_world.translation.z
+    tops = [
+        item.matrix_world.translation.z
+        for item in graph.object_instances
+        if item.is_instance and item.parent.original == bed
+    ]
+    bed.digiclay_display.form = shown
+    return (np.array(tops) - floor) / bridge.SCALE
+
+
+def expected(bed: Any, kind: str, height: np.ndarray | None = None) -> np.ndarray:
+    """Return the points of a bed's skin but those of its lower edge, m, as numpy works them out."""
+    scene = properties.scene_of(bed)
+    instant = Instant.at_rest(scene.layout, scene.actuator)
+    lattice = make_lattice(instant, choose_parts(len(instant.height)))
+    known = bridge.read_cells(bed.data)["height"] if height is None else height
+    points = np.column_stack([lattice.place, interpolate(lattice, known, kind)])
+    return points[~lattice.sunk]
+
+
+def assert_skin(bed: Any, wanted: np.ndarray) -> None:
+    """Compare the skin that is drawn, but its lower edge."""
+    points, _ = drawn(bed)
+    np.testing.assert_allclose(points[: len(wanted)], wanted, rtol=0, atol=FLOAT32)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_blender_draws_the_skin_that_numpy_works_out(bed: Any, kind: str) -> None:
+    bed.digiclay_display.form, bed.digiclay_display.skin = "skin", kind
+    assert_skin(bed, expected(bed, kind))
+    shape(bed, 2)
+    assert_skin(bed, expected(bed, kind))
+
+
+@pytest.mark.parametrize(
+    ("shown", "pins", "skin"),
+    [("pins", 72, False), ("skin", 0, True), ("both", 72, True), ("automatic", 72, False)],
+)
+def test_what_is_not_to_be_seen_is_not_drawn(bed: Any, shown: str, pins: int, skin: bool) -> None:
+    bed.digiclay_display.form = shown
+    points, count = drawn(bed)
+    assert count == pins
+    assert bool(len(points)) == skin
+
+
+def test_automatic_draws_the_skin_for_pins_that_are_too_small(bed: Any) -> None:
+    assert bed.digiclay_display.form == "automatic"
+    form.set_far(bed, True)
+    assert form.is_skin_shown(bed)
+    points, count = drawn(bed)
+    assert count == 0
+    assert len(points)
+
+
+def test_the_key_shows_the_skin_and_the_pins_again_as_undo_steps(bed: Any) -> None:
+    done("Bed")
+    shown = []
+    for _ in range(2):
+        bpy.ops.digiclay.skin_toggle()
+        done("Toggle Skin")
+        shown.append(bpy.context.object.digiclay_display.form)
+    assert shown == ["skin", "pins"]
+    bpy.ops.ed.undo()
+    assert bpy.context.object.digiclay_display.form == "skin"
+    assert_skin(bpy.context.object, expected(bpy.context.object, "smooth"))
+    bpy.ops.ed.undo()
+    assert bpy.context.object.digiclay_display.form == "automatic"
+
+
+def test_a_copy_of_a_bed_has_a_choice_of_its_own(bed: Any) -> None:
+    bed.digiclay_display.form = "skin"
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    assert copy != bed
+    copy.digiclay_display.form = "pins"
+    shape(copy, 3)
+    assert form.read_form(bed) == "skin"
+    assert_skin(bed, expected(bed, "smooth"))
+    assert drawn(copy)[1] == 72
+
+
+def test_a_file_keeps_the_skin_and_an_append_brings_it(bed: Any, tmp_path: Path) -> None:
+    bed.digiclay_display.form, bed.digiclay_display.skin = "skin", "membrane"
+    path = tmp_path / "bed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    found = next(thing for thing in bpy.data.objects if view.is_bed(thing))
+    assert found.digiclay_display.form == "skin"
+    assert_skin(found, expected(found, "membrane"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(path)) as (inside, wanted):
+        wanted.objects = [name for name in inside.objects if name == "Digital Clay"]
+    (appended,) = wanted.objects
+    bpy.context.scene.collection.objects.link(appended)
+    bpy.context.view_layer.update()
+    assert_skin(appended, expected(appended, "membrane"))
+
+
+def test_a_rebuilt_bed_has_the_skin_of_its_new_pins(bed: Any) -> None:
+    bed.digiclay_display.form = "skin"
+    bed.digiclay.layout.rows = 5
+    bpy.ops.digiclay.rebuild()
+    shape(bed, 4)
+    assert bed.digiclay_display.form == "skin"
+    assert_skin(bed, expected(bed, "smooth"))
+
+
+def test_a_bake_plays_with_the_skin(bed: Any) -> None:
+    tip = view.fingertip_of(bed)
+    tip.keyframe_insert("location", frame=1)
+    tip.location.z -= 0.15
+    tip.keyframe_insert("location", frame=6)
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=6) == {"FINISHED"}
+    bed.digiclay_display.form = "skin"
+    depths = []
+    for frame in (1, 5):
+        bpy.context.scene.frame_set(frame)
+        assert_skin(bed, expected(bed, "smooth", baked_heights(bed)))
+        depths.append(drawn(bed)[0][:, 2].max() - expected(bed, "smooth", baked_heights(bed))[:, 2].min())
+    assert depths[1] > depths[0] + 1e-4
+
+
+def test_a_bed_without_a_skin_says_so(bed: Any) -> None:
+    tree = bed.modifiers[0].node_group
+    tree.interface.remove(tree.interface.items_tree["Form"])
+    assert not form.can_show_skin(bed)
+    assert not bpy.ops.digiclay.skin_toggle.poll()
+    with pytest.raises(DigiclayError, match=r"has no skin\. Rebuild it in the panel Device"):
+        form.set_form(bed, "skin")
+    assert bed.digiclay_display.form == "pins"
+
+
+@pytest.mark.parametrize("word", ["", "Skin", "nan"])
+def test_another_word_is_refused(bed: Any, word: str) -> None:
+    with pytest.raises(DigiclayError, match=r"Display\.form must be one of automatic, pins, skin, both"):
+        form.set_form(bed, word)
