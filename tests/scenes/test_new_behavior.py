@@ -45,7 +45,7 @@ class SpongeControl(CellwiseControl):
     rows = 1
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let pressed cells sink, and the others swell; see `control_interface.Controller`."""
+        """Let pressed cells sink, and the others swell; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         pressed = seen.force >= known.felt_force
         seen.own[0] = np.where(pressed, seen.own[0] + 1.0, 0.0)

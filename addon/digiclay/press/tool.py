@@ -9,7 +9,7 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..core.model.layout import Grid
-from ..core.surface.pointing import patch
+from ..core.surface.pointing import find_contact_outline
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
@@ -40,7 +40,7 @@ def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: f
         How deep it would be pressed, m.
     """
     tip = view.fingertip_of(bed)
-    rim = place[:2] + patch(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
+    rim = place[:2] + find_contact_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
     return np.column_stack([rim, height[cells.at(rim[:, 0], rim[:, 1])]])
 
 
@@ -77,7 +77,7 @@ def _trail(found: aim.Target) -> list[Floats]:
     if session is None or not session.strokes:
         return []
     finger, pose = find_ellipsoid(session.scene), session.pose
-    rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
+    rim = pose[:2] + find_contact_outline(finger, pose[3:], float(found.height.max()) - pose[2])
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
     return [

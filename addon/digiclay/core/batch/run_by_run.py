@@ -1,4 +1,4 @@
-"""Controllers of a batch as one controller, which is again a `control_interface.Controller`.
+"""Controllers of a batch as one controller, which is again a `Controller`.
 
 Its memory is a list, one memory a run; instead of a disc it gives a list of discs, or None where no run
 asks for one.

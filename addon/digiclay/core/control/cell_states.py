@@ -150,7 +150,7 @@ class CellStatesControl:
         return Patch()
 
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
-        """Find where the finger presses, and how far its blister can reach; see `control_interface.Controller`."""
+        """Find where the finger presses, and how far its blister can reach; see `Controller`."""
         pressed = touched.force > self._least(touched.mode)
         if not any_true(pressed):
             return memory, None
@@ -167,7 +167,7 @@ class CellStatesControl:
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
-        """Apply the transitions of every cell, then the control of its mode; see `control_interface.Controller`."""
+        """Apply the transitions of every cell, then the control of its mode; see `Controller`."""
         seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
         mode = follow_arrows(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)

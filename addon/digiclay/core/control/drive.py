@@ -145,7 +145,7 @@ class CellwiseControl(BatchControl):
         """Nothing to remember but the cells' own rows."""
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
-        """Request the cells near the fingertip and those in motion only; see `control_interface.Controller`."""
+        """Request the cells near the fingertip and those in motion only; see `Controller`."""
         return memory, None
 
 

@@ -42,7 +42,7 @@ class ElasticControl(CellwiseControl):
     name = "elastic"
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let pressed cells give way, and the others spring back; see `control_interface.Controller`."""
+        """Let pressed cells give way, and the others spring back; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
         pressed = seen.force >= known.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)

@@ -67,7 +67,7 @@ class ForceDisplayControl(CellwiseControl):
     rows = 1
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Control the force of touched cells and the height of the others; see `control_interface.Controller`."""
+        """Control the force of touched cells and the height of the others; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         asked = take_cells(self.field, seen.cells)
         pressed = seen.force >= known.felt_force

@@ -49,7 +49,7 @@ class PlasticControl(CellwiseControl):
     name = "plastic"
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let cells give way that are pressed beyond yield, hold the others; see `control_interface.Controller`."""
+        """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
         known = self.parameters
         pressed = seen.force >= known.felt_force
         yielding = seen.force > known.yield_force

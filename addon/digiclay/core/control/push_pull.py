@@ -95,7 +95,7 @@ class PushPullControl:
     def locate(
         self, memory: Listening, touched: Measurement
     ) -> tuple[Listening, tuple[float, float, float] | None]:
-        """Listen where a hand may be; see `control_interface.Controller`.
+        """Listen where a hand may be; see `Controller`.
 
         The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
         they are left out.
@@ -109,7 +109,7 @@ class PushPullControl:
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
 
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
-        """Drag commanded heights along, and move every pin up or down; see `control_interface.Controller`."""
+        """Drag commanded heights along, and move every pin up or down; see `Controller`."""
         known, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit

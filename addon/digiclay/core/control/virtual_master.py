@@ -67,7 +67,7 @@ class VirtualMasterControl(MasterControl):
         return Master()
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
-        """Locate the finger and move the master; see `control_interface.Controller`."""
+        """Locate the finger and move the master; see `Controller`."""
         sums = self._sum_forces(memory, touched)
         if self._noisy:
             memory = self.follow(memory, *sums)
@@ -107,7 +107,7 @@ class VirtualMasterControl(MasterControl):
         return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), basis)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Create the blister, freeze what is left behind, command every cell; see `control_interface.Controller`."""
+        """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
         *limits, rest, band = constants(self._limits, target.shape)
         off = target - rest

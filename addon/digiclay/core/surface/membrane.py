@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .formed import Formed
-from .skin_mesh import skin
+from .skin_mesh import make_skin
 
-__all__ = ["membrane"]
+__all__ = ["relax_membrane"]
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ STILL = 1e-9
 ROUNDS = 1000
 
 
-def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: float) -> Floats:
+def relax_membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: float) -> Floats:
     """Return the heights of the skin, m, shape (rows, columns) of its points.
 
     Finite elements on the triangles of the skin; the points on a pin's end keep its height.
@@ -27,7 +27,7 @@ def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: floa
     ----------
     formed : Formed
         The pins.
-    place : ndarray (rows, columns, 2)
+    position : ndarray (rows, columns, 2)
         The skin's points, m.
     start : ndarray (rows, columns)
         Heights to begin with, m, those of the pins at the pins.
@@ -38,23 +38,23 @@ def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: floa
     """
     flat = place.reshape(-1, 2)
     height, free = _laid(formed, place, start, parts, cap)
-    faces = skin(flat, np.zeros(len(flat)), *start.shape)
+    faces = make_skin(flat, np.zeros(len(flat)), *start.shape)
     stiffness = _Stiffness(flat, faces)
     # Conjugate gradients on the free points, with the diagonal taken out.
     weight = np.where(free, 1.0 / stiffness.diagonal, 0.0)
     rest = -stiffness(height) * free
     step = weight * rest
-    way, power = step, float(rest @ step)
+    direction, power = step, float(rest @ step)
     for _ in range(ROUNDS):
         if np.abs(step).max() <= STILL:
             break
-        pull = stiffness(way) * free
-        length = power / float(way @ pull)
-        height = height + length * way
+        pull = stiffness(direction) * free
+        length = power / float(direction @ pull)
+        height = height + length * direction
         rest = rest - length * pull
         step = weight * rest
         power, former = float(rest @ step), power
-        way = step + power / former * way
+        direction = step + power / former * direction
     return height.reshape(start.shape)
 
 
