@@ -6,7 +6,7 @@ import numpy as np
 
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
-from ..core.surface.pointing import patch
+from ..core.surface.pointing import find_contact_outline
 from ..live.stroke import DEEPEST, SHALLOWEST
 from ..press import aim, brush
 from ..settings import finger_size
@@ -51,7 +51,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
         """Return the widest section of the finger, and what of it touches."""
         share = value / (2.0 * finger.width)
         scaled = Fingertip(finger.length * share, finger.width * share, finger.height * share)
-        return [patch(scaled, turn, np.inf), patch(scaled, turn, depth)]
+        return [find_contact_outline(scaled, turn, np.inf), find_contact_outline(scaled, turn, depth)]
 
 
 class AdjustDepth(AdjustMixin, bpy.types.Operator):
@@ -80,7 +80,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return what of the finger touches at the depth."""
-        return [patch(finger, turn, value)]
+        return [find_contact_outline(finger, turn, value)]
 
 
 class AdjustStrength(AdjustMixin, bpy.types.Operator):
@@ -113,7 +113,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return what of the finger touches at the whole depth, and at the share of it."""
-        return [patch(finger, turn, depth), patch(finger, turn, depth * value)]
+        return [find_contact_outline(finger, turn, depth), find_contact_outline(finger, turn, depth * value)]
 
 
 class ScaleSize(Action, bpy.types.Operator):

@@ -45,11 +45,26 @@ class AdjustMixin(Polled):
         return no_tool(context)
 
     def read(self, bed: Any, settings: Any) -> float:
-        """Return the number now, from the bed or from the settings of the tool."""
+        """Return the number now, from the bed or from the settings of the tool.
+
+        Parameters
+        ----------
+        bed : bpy.types.Object
+        settings : bpy.types.PropertyGroup
+            Of the tool.
+        """
         raise NotImplementedError
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the number."""
+        """Set the number.
+
+        Parameters
+        ----------
+        bed : bpy.types.Object
+        settings : bpy.types.PropertyGroup
+            Of the tool.
+        value : float
+        """
         raise NotImplementedError
 
     def parse(self, text: str) -> float:
@@ -57,7 +72,13 @@ class AdjustMixin(Polled):
         return float(bpy.utils.units.to_value("METRIC", "LENGTH", text, str_ref_unit="mm"))
 
     def rate(self, context: Any, bed: Any) -> float:
-        """Return the change of the number for a pixel."""
+        """Return the change of the number for a pixel.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        bed : bpy.types.Object
+        """
         raise NotImplementedError
 
     def say(self, value: float) -> str:
@@ -65,7 +86,16 @@ class AdjustMixin(Polled):
         raise NotImplementedError
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
-        """Return outlines (k, 2) about the place pointed at that show the number, m."""
+        """Return outlines (k, 2) about the place pointed at that show the number, m.
+
+        Parameters
+        ----------
+        finger : Fingertip
+        turn : sequence of float
+            Quaternion wxyz.
+        depth, value : float
+            m; the number.
+        """
         raise NotImplementedError
 
     def invoke(self, context: Any, event: Any) -> set[str]:

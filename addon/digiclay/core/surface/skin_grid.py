@@ -95,9 +95,9 @@ def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceG
     cap : float
         Radius of a pin's flat end, m; of use to the membrane only.
     """
-    place = place_points(formed, parts)
-    rows, columns = place.shape[:2]
+    position = place_points(formed, parts)
+    rows, columns = position.shape[:2]
     now, before = (
         interpolate_skin(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former)
     )
-    return SurfaceGrid(formed, parts, place.reshape(-1, 2), now, before, rows, columns)
+    return SurfaceGrid(formed, parts, position.reshape(-1, 2), now, before, rows, columns)
