@@ -22,11 +22,14 @@ class Choices:
         Control periods a tick simulates, at most: what a slow machine does not manage is dropped.
     palette : str
         A key of `palettes.PALETTES`.
+    take_press_tool : bool
+        Whether the start of a session takes the Press tool in hand.
     """
 
     redraw_rate: int = 30
     most_periods: int = 20
     palette: str = palettes.DEFAULT
+    take_press_tool: bool = True
 
 
 def take_palette(preferences: Any, context: Any) -> None:
@@ -73,6 +76,12 @@ class Preferences(bpy.types.AddonPreferences):
         update=take_palette,
     )
 
+    take_press_tool: bpy.props.BoolProperty(
+        name="Take the Press Tool",
+        description="The start of a session takes the Press tool in hand",
+        default=Choices.take_press_tool,
+    )
+
     def draw(self, context: Any) -> None:
         """Draw the preferences."""
         column = self.layout.column()
@@ -80,6 +89,7 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "redraw_rate")
         column.prop(self, "most_periods")
         column.prop(self, "palette")
+        column.prop(self, "take_press_tool")
 
 
 def get(context: Any) -> Any:

@@ -86,6 +86,15 @@ def test_every_panel_stands_in_the_tab_in_an_order_of_its_own() -> None:
     assert len(set(orders)) == len(orders)
 
 
+def test_the_tab_begins_with_what_is_used_first_and_the_technical_panels_are_closed_at_its_end() -> None:
+    drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
+    roots = sorted((kind for kind in drawn if not hasattr(kind, "bl_parent_id")), key=lambda k: k.bl_order)
+    names = "Digital Clay,Session,Finger,Display,Shapes,Takes,Export,Device,Control"
+    assert [kind.bl_label for kind in roots] == names.split(",")
+    closed = {kind.bl_label for kind in roots if "DEFAULT_CLOSED" in getattr(kind, "bl_options", ())}
+    assert closed == {"Shapes", "Takes", "Export", "Device", "Control"}
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_blister_is_shown_where_the_method_forms_one(method: str, bed: Any) -> None:
     bed.digiclay.method = method

@@ -57,6 +57,13 @@ def in_the_view(bed: Any) -> Iterator[Any]:
         yield bpy.context
 
 
+def test_blender_reads_the_icon_of_the_tool() -> None:
+    # As Blender's toolbar does: the name with the ending of its format.
+    handle = bpy.app.icons.new_triangles_from_file(f"{tool.PressTool.bl_icon}.dat")
+    assert handle > 0
+    bpy.app.icons.release(handle)
+
+
 def test_the_tool_comes_and_goes_with_the_extension() -> None:
     assert tools() == []
     for _ in range(2):

@@ -113,6 +113,33 @@ def test_a_deleted_bed_takes_its_fingertip_along_and_undo_brings_both_back_in_on
     assert whole(*beds())
 
 
+def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone() -> None:
+    bed, other = added(), added(1.0)
+    tip = view.fingertip_of(bed)
+    select(tip[BALL])
+    done("Select")
+    assert bpy.context.view_layer.objects.active == tip
+    assert set(bpy.context.selected_objects) == {tip, tip[BALL]}
+    assert not view.fingertip_of(other).select_get()
+    before = bridge.pose(tip)
+    bpy.ops.transform.translate(value=(0.1, 0.0, 0.0))
+    done("Move")
+    # A millimeter of the device is a centimeter in Blender; its matrices are of 32 bits.
+    np.testing.assert_allclose(bridge.pose(tip)[:3] - before[:3], (0.01, 0.0, 0.0), rtol=0, atol=1e-7)
+    undone()
+    tip = view.fingertip_of(bed)
+    np.testing.assert_allclose(bridge.pose(tip), before, rtol=0, atol=1e-7)
+    assert tip.select_get()
+
+
+def test_the_ball_of_an_older_file_can_be_clicked_on() -> None:
+    ball = view.fingertip_of(added())[BALL]
+    ball.hide_select, ball.lock_location = True, (False, False, False)
+    done("Older")
+    assert not ball.hide_select
+    assert all(ball.lock_location)
+
+
 def test_one_of_two_beds_deleted_leaves_the_other_as_it_is() -> None:
     first, second = added(), added(1.0)
     # Not by an operator: what the outliner and scripts do is looked after as well.

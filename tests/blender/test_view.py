@@ -143,7 +143,7 @@ def test_the_fingertip_is_an_empty_and_the_ellipsoid_in_it_cannot_be_picked_by_m
     tip = view.fingertip_of(bed)
     (ball,) = tip.children
     assert (tip.type, tip.hide_select) == ("EMPTY", False)
-    assert (ball.type, ball.hide_select) == ("MESH", True)
+    assert (ball.type, ball.hide_select, all(ball.lock_location)) == ("MESH", False, True)
     finger = Fingertip()
     wanted = np.array([finger.length, finger.width, finger.height]) * bridge.SCALE
     np.testing.assert_allclose(ball.scale, wanted, rtol=2.0**-23)

@@ -11,8 +11,8 @@ import bpy
 #: Panels unfolded in one picture, so that each is seen whole in a window of 800 pixels.
 PICTURES = {
     "device": ("DIGICLAY_PT_device", "layout actuator supply fluid valve"),
-    "device_rest": ("DIGICLAY_PT_device", "conduit valve_lag delay"),
-    "finger": ("DIGICLAY_PT_finger", "fingertip contact relaxation"),
+    "device_rest": ("DIGICLAY_PT_device", "conduit valve_lag delay contact relaxation"),
+    "finger": ("DIGICLAY_PT_finger", "fingertip"),
     "control": ("DIGICLAY_PT_control", "control blister"),
     "control_rest": ("DIGICLAY_PT_control", "sensors simulation recorder"),
 }

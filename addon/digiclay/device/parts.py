@@ -17,8 +17,8 @@ from .skin_lattice import choose_parts, make_lattice
 from .skin_nodes import SkinMeshes, make_meshes
 
 __all__ = [
-    "Sources", "ellipsoid", "finger_material", "is_linked", "make_fingertip", "make_sources", "marked",
-    "material",
+    "Sources", "ellipsoid", "finger_material", "is_linked", "lock_in_place", "make_fingertip",
+    "make_sources", "marked", "material",
 ]  # fmt: skip
 
 #: sRGB of what is no pin.
@@ -154,7 +154,7 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
 
 
 def make_fingertip(collection: Any, bed: Any) -> Any:
-    """Make the fingertip: an empty to take hold of, and in it an ellipsoid to look at.
+    """Make the fingertip: an empty that is moved, and in it an ellipsoid to see and to click on.
 
     The empty carries the pose alone. Its scale is locked: the finger's size is a parameter
     of the device, kept in the ellipsoid's scale.
@@ -175,10 +175,16 @@ def make_fingertip(collection: Any, bed: Any) -> Any:
     ball = marked(mesh, mesh.name, ELLIPSOID, collection, parent=made)
     made[BALL] = ball
     made[OWNED] = ball[OWNED] = True
-    ball.hide_select = True
+    lock_in_place(ball)
     ball.material_slots[0].link = "OBJECT"
     ball.material_slots[0].material = finger_material(clear=False)
     return made
+
+
+def lock_in_place(ball: Any) -> None:
+    """Have an ellipsoid selected by a click, and moved by its fingertip alone."""
+    ball.hide_select = False
+    ball.lock_location = ball.lock_rotation = ball.lock_scale = (True, True, True)
 
 
 def ellipsoid(tip: Any) -> Any | None:

@@ -2,7 +2,7 @@
 
 The skin is interpolated along the rows of pins, then across them. For each of the two passes the points
 and their weights are prepared once. What remains for a new state is, at every point, a weighted sum of
-heights and slopes of two neighbours.
+heights and slopes of two neighbors.
 
 *smooth* is the monotone cubic of Fritsch and Butland, as in `core.surface.skins`: through every pin, and
 nowhere above or below the two pins it stands between. *membrane* is level over the flat ends of the pins,
@@ -37,7 +37,7 @@ SLACK = 1e-6
 
 
 class Weights(NamedTuple):
-    """Weights of (height, slope) of the two neighbours of every point, (m, 2) each."""
+    """Weights of (height, slope) of the two neighbors of every point, (m, 2) each."""
 
     low: Floats
     high: Floats
@@ -50,7 +50,7 @@ class Pass:
     Attributes
     ----------
     previous, following : ndarray of int (k,)
-        Neighbours of each of the k values that are interpolated, for its slope; itself at an end.
+        Neighbors of each of the k values that are interpolated, for its slope; itself at an end.
     low, high : ndarray of int (m,)
         The two values each of the m points is between.
     weights : dict of str to Weights
@@ -114,7 +114,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     low, share = _find_cells((fine_x - starts[:, None]) / instant.pitch, columns)
     first = cell[:, :1]
     along = Pass(
-        *_neighbours(cell, 1),
+        *_neighbors(cell, 1),
         (first + low).ravel(),
         (first + np.minimum(low + 1, columns - 1)).ravel(),
         _weigh(share.ravel(), cap / instant.pitch),
@@ -127,7 +127,7 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     sunk = np.arange(of.size) >= surface.size + edge.size
     spread = np.repeat(share, fine_x.size)[of]
     across = Pass(
-        *_neighbours(point, 0),
+        *_neighbors(point, 0),
         point[low].ravel()[of],
         point[np.minimum(low + 1, rows - 1)].ravel()[of],
         {name: _drop(pair, sunk) for name, pair in _weigh(spread, cap / spacing).items()},
@@ -180,8 +180,8 @@ def _find_cells(place: Floats, count: int) -> tuple[Indices, Floats]:
     return low, np.clip(place - low, 0.0, 1.0)
 
 
-def _neighbours(index: Indices, axis: int) -> tuple[Indices, Indices]:
-    """Return the neighbours of every value along an axis; the end values are their own."""
+def _neighbors(index: Indices, axis: int) -> tuple[Indices, Indices]:
+    """Return the neighbors of every value along an axis; the end values are their own."""
     last = index.shape[axis] - 1
     step = np.arange(last + 1)
     before = np.take(index, np.maximum(step - 1, 0), axis)

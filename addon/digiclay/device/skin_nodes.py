@@ -16,7 +16,7 @@ from .skin_lattice import Pass, SkinLattice
 
 __all__ = ["SkinMeshes", "make_meshes", "skin_nodes"]
 
-#: Attributes of the meshes: neighbours for the slope, neighbours for the sum, and what is stored on the way.
+#: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
 PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
 #: Attributes of the weights: their first half; the other is the name of the skin.
 WEIGHTS = ("weight low ", "weight high ")
@@ -41,9 +41,9 @@ def make_meshes(lattice: SkinLattice, deck: float, material: Any) -> SkinMeshes:
     material : bpy.types.Material
     """
     pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
-    _write_neighbours(pins, lattice.along)
+    _write_neighbors(pins, lattice.along)
     rows = _points("Digital Clay Skin Rows", lattice.across.previous.size)
-    _write_neighbours(rows, lattice.across)
+    _write_neighbors(rows, lattice.across)
     _write_weights(rows, lattice.along)
     count = len(lattice.place)
     skin = _points("Digital Clay Skin", count)
@@ -98,14 +98,14 @@ def _points(name: str, count: int) -> Any:
     return made
 
 
-def _write_neighbours(mesh: Any, step: Pass) -> None:
-    """Write the neighbours that the slopes of a pass need."""
+def _write_neighbors(mesh: Any, step: Pass) -> None:
+    """Write the neighbors that the slopes of a pass need."""
     for name, values in ((PREVIOUS, step.previous), (FOLLOWING, step.following)):
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
 
 
 def _write_weights(mesh: Any, step: Pass) -> None:
-    """Write the neighbours that a pass adds up, and their weights."""
+    """Write the neighbors that a pass adds up, and their weights."""
     for name, values in ((LOW, step.low), (HIGH, step.high)):
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
     for kind, weights in step.weights.items():
@@ -184,7 +184,7 @@ def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
 
 
 def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> Any:
-    """Add the nodes that add up heights and slopes of two neighbours."""
+    """Add the nodes that add up heights and slopes of two neighbors."""
     pair = attribute(tree, PAIR, "FLOAT_VECTOR", column, row + 5)
     parts = []
     for step, (side, name) in enumerate(zip((LOW, HIGH), names, strict=True)):

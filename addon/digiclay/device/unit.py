@@ -19,7 +19,15 @@ from . import parts, view
 from .instant import Instant, find_ellipsoid
 from .roles import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
 
-__all__ = ["Faults", "find_faults", "follow_visibility", "give_fingertip", "mark_parts", "repair"]
+__all__ = [
+    "Faults",
+    "find_faults",
+    "follow_selection",
+    "follow_visibility",
+    "give_fingertip",
+    "mark_parts",
+    "repair",
+]
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
@@ -58,6 +66,8 @@ def mark_parts() -> frozenset[int]:
         ball = parts.ellipsoid(tip)
         if ball is not None and tip.get(BALL) != ball:
             tip[BALL] = ball
+        if ball is not None and not any(ball.lock_location):  # an older file: it could not be clicked on
+            parts.lock_in_place(ball)
         cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
         for part in filter(None, (tip, ball, *cases)):
             if not part.get(OWNED):
@@ -81,7 +91,8 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     tips = (thing for thing in bpy.data.objects if thing.get(ROLE) == FINGERTIP and not thing.library)
     bare += [tip for tip in tips if parts.is_linked(tip) and _lacks_part(tip, BALL, known, mended)]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
-    left = [thing for thing in mine if parts.is_linked(thing) and _is_orphan(thing)]
+    # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
+    left = [thing for thing in mine if not thing.users or (parts.is_linked(thing) and _is_orphan(thing))]
     shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
     strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
     return Faults(bare, left, strewn)
@@ -133,6 +144,22 @@ def follow_visibility() -> None:
         ball = parts.ellipsoid(tip)
         if ball is not None:
             _hide_along(tip, ball)
+
+
+def follow_selection() -> None:
+    """Have a fingertip selected where its ellipsoid is, and active: a click on the ball takes hold of it."""
+    layers = [layer for scene in bpy.data.scenes for layer in scene.view_layers]
+    for tip in filter(None, map(view.fingertip_of, _beds())):
+        ball = parts.ellipsoid(tip)
+        if ball is None:
+            continue
+        for layer in layers:
+            if not (_is_in_layer(layer, tip) and _is_in_layer(layer, ball)):
+                continue
+            if ball.select_get(view_layer=layer):
+                tip.select_set(True, view_layer=layer)
+            if layer.objects.active == ball:
+                layer.objects.active = tip
 
 
 def _beds() -> list[Any]:

@@ -51,6 +51,7 @@ def repair_beds() -> None:
             bpy.ops.ed.undo_push(message="Complete Beds")
     _KNOWN[0] = unit.mark_parts()
     unit.follow_visibility()
+    unit.follow_selection()
 
 
 def _repair(found: unit.Faults) -> None:

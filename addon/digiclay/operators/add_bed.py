@@ -11,6 +11,7 @@ from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, rebuild, view
 from ..device.instant import Instant, find_ellipsoid
+from ..device.roles import BALL
 from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.declared import title
@@ -20,7 +21,7 @@ from ..settings.shown_units import SHOWN, to_si
 from .action import Action
 from .poll_messages import baked, edited, no_bed, session_runs
 
-__all__ = ["AddBed", "Rebuild", "add", "add_shown", "entry", "place_at_cursor", "select_only"]
+__all__ = ["AddBed", "Rebuild", "add", "add_shown", "entry", "frame", "place_at_cursor", "select_only"]
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -98,6 +99,19 @@ class AddBed(Action, bpy.types.Operator):
     def poll_message(cls, context: Any) -> str:
         """A bed is an object: it cannot be added inside another object's edit mode."""
         return edited(context, "Leave Edit Mode first: the device is an object of its own")
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Add it, and show all of it; the redo panel leaves the view as it is then.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+        event : bpy.types.Event
+        """
+        done = self.execute(context)
+        if done == {"FINISHED"}:
+            frame(context, bed_of(context))
+        return done
 
     def perform(self, context: Any) -> None:
         """Build the device at the 3D cursor."""
@@ -189,6 +203,30 @@ def select_only(context: Any, bed: Any) -> None:
         other.select_set(False)
     bed.select_set(True)
     context.view_layer.objects.active = bed
+
+
+def frame(context: Any, bed: Any) -> None:
+    """Turn to a bed and its fingertip with the 3D view, which shows all of them then.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
+    window = context.window
+    areas = [context.area, *(window.screen.areas if window is not None else ())]
+    area = next((one for one in areas if one is not None and one.type == "VIEW_3D"), None)
+    if area is None:
+        return
+    tip = view.fingertip_of(bed)
+    parts = [part for part in (tip, tip and tip[BALL]) if part is not None]
+    for part in parts:
+        part.select_set(True)
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view3d.view_selected()
+    for part in parts:
+        part.select_set(False)
 
 
 def entry(menu: Any, context: Any) -> None:

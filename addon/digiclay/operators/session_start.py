@@ -2,15 +2,42 @@
 
 from typing import Any
 
+from .. import preferences
 from ..compat import bpy
 from ..device.view import bed_of
 from ..live import handlers, loop, tick
 from ..overlay import views
+from ..press import tool
 from .action import Action
-from .poll_messages import baked, edited, linked, no_bed, session_runs
+from .poll_messages import baked, linked, no_bed, session_runs
 from .session_loop import LoopMixin
 
-__all__ = ["Session"]
+__all__ = ["LeaveMode", "Session"]
+
+
+def leave_mode(context: Any) -> None:
+    """Leave the active object's mode, for instance that of the Sculpting workspace, for Object Mode."""
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+class LeaveMode(Action, bpy.types.Operator):
+    """Leave this mode for Object Mode, in which beds are sculpted, with the Press tool in hand"""
+
+    bl_idname = "digiclay.leave_mode"
+    bl_label = "Back to Object Mode"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll_message(cls, context: Any) -> str:
+        """A bed is needed, in another mode."""
+        return no_bed(context) or ("" if context.mode != "OBJECT" else "This is Object Mode already")
+
+    def perform(self, context: Any) -> None:
+        """Leave it."""
+        leave_mode(context)
+        if context.window is not None:
+            tool.take_up(context)
 
 
 class Session(LoopMixin, Action, bpy.types.Operator):
@@ -21,12 +48,11 @@ class Session(LoopMixin, Action, bpy.types.Operator):
 
     @classmethod
     def poll_message(cls, context: Any) -> str:
-        """A bed in object mode is needed, with no session yet, and a window."""
+        """A bed is needed, with no session yet, and a window; the mode is left for Object Mode."""
         in_window = not bpy.app.background and context.window is not None
         return (
             no_bed(context)
             or session_runs(context, "A session runs on this bed already: Esc stops it")
-            or edited(context)
             or linked(context)
             or baked(context)
             or ("" if in_window else "A live session needs a window; takes can be baked without")
@@ -39,10 +65,13 @@ class Session(LoopMixin, Action, bpy.types.Operator):
     def perform(self, context: Any) -> set[str] | None:
         """Start the session, and the loop unless another session's drives this one as well."""
         bed = bed_of(context)
+        leave_mode(context)
         notes = tick.start(context, bed)
         self.tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
         handlers.watch()
         views.follow()
+        if preferences.get(context).take_press_tool:
+            tool.take_up(context)
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.is_running():

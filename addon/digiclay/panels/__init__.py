@@ -7,8 +7,8 @@ from . import appearance, live_session, parameters, shape_exchange
 
 __all__ = ["register", "unregister"]
 
-#: In the order they are drawn, each with a `bl_order` of its own: device 10, finger 20, control 30,
-#: session 40, display 50, shapes 60, takes 70, export 80.
+#: In the order they are drawn, each with a `bl_order` of its own: session 10, finger 20, display 30,
+#: shapes 40, takes 50, export 60; then what is technical, device 70 and control 80.
 CLASSES: tuple[type, ...] = (
     *parameters.CLASSES,
     *live_session.CLASSES,

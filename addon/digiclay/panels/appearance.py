@@ -6,7 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..device import display, form, view
-from .base import Panel, bed_of
+from .base import Panel, bed_of, draw_number
 
 __all__ = ["CLASSES", "Display"]
 
@@ -16,7 +16,7 @@ class Display(Panel, bpy.types.Panel):
 
     bl_label = "Display"
     bl_idname = "DIGICLAY_PT_display"
-    bl_order = 50
+    bl_order = 30
 
     def draw(self, context: Any) -> None:
         """Draw the panel."""
@@ -37,15 +37,15 @@ class Display(Panel, bpy.types.Panel):
         column.row().prop(shown, "color", expand=True)
         row = column.row()
         row.active = shown.color == "force"
-        row.prop(shown, "top_force")
+        draw_number(row, shown, "top_force")
         column.prop(shown, "arrows")
         row = column.row()
         row.active = shown.arrows
-        row.prop(shown, "arrow_length")
+        draw_number(row, shown, "arrow_length")
         layout.prop(shown, "overlay")
         column = layout.column()
         column.active = shown.overlay
-        column.prop(shown, "seconds")
+        draw_number(column, shown, "seconds")
         pins = ", ".join(str(pin) for pin in display.picked_pins(bed))
         column.label(text=f"Picked pins: {pins or 'none'}")
         row = column.row(align=True)

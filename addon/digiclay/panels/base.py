@@ -7,7 +7,7 @@ from typing import Any
 
 from ..device.view import bed_of
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_number"]
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.
@@ -45,3 +45,18 @@ def draw_lines(layout: Any, words: str, icon: str) -> None:
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(words, LINE)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+def draw_number(layout: Any, owner: Any, name: str) -> None:
+    """Draw a number with its label in the field: beside it the sidebar would cut off the unit.
+
+    Parameters
+    ----------
+    layout : bpy.types.UILayout
+    owner : bpy.types.bpy_struct
+    name : str
+        Of its property.
+    """
+    place = layout.row(align=True)
+    place.use_property_split = False
+    place.prop(owner, name)

@@ -19,7 +19,7 @@ class Session(Panel, bpy.types.Panel):
 
     bl_idname = "DIGICLAY_PT_session"
     bl_label = "Session"
-    bl_order = 40
+    bl_order = 10
 
     def draw(self, context: Any) -> None:
         """Draw what can be done, and how it goes."""
@@ -33,6 +33,10 @@ class Session(Panel, bpy.types.Panel):
             row.operator("digiclay.session", text=words, icon="PLAY")
             column.operator("digiclay.session_reset", icon="LOOP_BACK")
         else:
+            if context.mode != "OBJECT":
+                row = column.row()
+                row.scale_y = 1.4
+                row.operator("digiclay.leave_mode", icon="LOOP_BACK")
             _buttons(column, session)
             _numbers(self.layout, session)
         said = (
@@ -70,7 +74,7 @@ def _numbers(layout: Any, session: Running) -> None:
         slow = session.factor < 0.9
         words = f"Speed: {session.factor:.2f} × real time"
         column.label(text=words, icon="ERROR" if slow else "NONE")
-    column.label(text=error_line(session))
+    draw_lines(column, error_line(session), "NONE")
     if session.path is not None:
         column.label(text=f"Recording: {(len(session.path) - 1) * period:.1f} s", icon="REC")
 
@@ -86,7 +90,7 @@ class Takes(Panel, bpy.types.Panel):
 
     bl_label = "Takes"
     bl_idname = "DIGICLAY_PT_takes"
-    bl_order = 70
+    bl_order = 50
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:

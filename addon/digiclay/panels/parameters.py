@@ -64,7 +64,7 @@ class Device(Panel, bpy.types.Panel):
 
     bl_idname = "DIGICLAY_PT_device"
     bl_label = "Device"
-    bl_order = 10
+    bl_order = 70
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
@@ -89,7 +89,6 @@ class Finger(Panel, bpy.types.Panel):
     bl_idname = "DIGICLAY_PT_finger"
     bl_label = "Finger"
     bl_order = 20
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
         """Draw a hint if there is none."""
@@ -102,7 +101,7 @@ class Control(Panel, bpy.types.Panel):
 
     bl_idname = "DIGICLAY_PT_control"
     bl_label = "Control"
-    bl_order = 30
+    bl_order = 80
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
@@ -113,7 +112,7 @@ class Control(Panel, bpy.types.Panel):
         row.prop(settings, "method")
 
 
-def section_panel(section: str, parent: str, order: int, words: str = "") -> type:
+def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
     """Make the sub-panel of a part.
 
     Parameters
@@ -126,6 +125,8 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
         Place among the others.
     words : str, optional
         Its heading, where that is not the section's name.
+    closed : bool, optional
+        Whether it is closed until somebody opens it.
     """
 
     class Section(Panel, bpy.types.Panel):
@@ -133,7 +134,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
         bl_label = words or title(section)
         bl_parent_id = parent
         bl_order = order
-        bl_options = {"DEFAULT_CLOSED"}
+        bl_options = {"DEFAULT_CLOSED"} if closed else set()
 
         @classmethod
         def poll(cls, context: Any) -> bool:
@@ -178,16 +179,25 @@ def in_use(settings: Any, section: str) -> bool:
 
 
 #: Parts that the panel Device shows.
-PARTS = ("layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay")
+PARTS = (
+    "layout",
+    "actuator",
+    "supply",
+    "fluid",
+    "valve",
+    "conduit",
+    "valve_lag",
+    "delay",
+    "contact",
+    "relaxation",
+)
 CLASSES = (
     Presets,
     Start,
     Device,
     *(section_panel(section, Device.bl_idname, order) for order, section in enumerate(PARTS)),
     Finger,
-    section_panel("fingertip", Finger.bl_idname, 0, words="Size"),
-    section_panel("contact", Finger.bl_idname, 1),
-    section_panel("relaxation", Finger.bl_idname, 2),
+    section_panel("fingertip", Finger.bl_idname, 0, words="Size", closed=False),
     Control,
     section_panel("control", Control.bl_idname, 0, words="Gains and Thresholds"),
     section_panel("blister", Control.bl_idname, 1),

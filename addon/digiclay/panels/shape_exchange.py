@@ -21,7 +21,7 @@ class Shapes(Panel, bpy.types.Panel):
 
     bl_idname = "DIGICLAY_PT_shapes"
     bl_label = "Shapes"
-    bl_order = 60
+    bl_order = 40
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
@@ -59,7 +59,7 @@ class Export(Panel, bpy.types.Panel):
 
     bl_idname = "DIGICLAY_PT_export"
     bl_label = "Export"
-    bl_order = 80
+    bl_order = 60
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,19 +10,21 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..core.model.layout import Grid
-from ..core.surface.pointing import find_contact_outline
+from ..core.surface.pointing import patch
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
 from ..live.stroke import SYMMETRIES
-from ..settings import finger_size
-from . import aim, marks
-from .brush import ADJUSTING, OPERATOR, TOOL, bed_in_use, describe_brush
-from .fingers import find_kind
+from ..overlay.picture import Line, Words
+from . import aim
+from .brush import OPERATOR, TOOL, describe_brush
 
-__all__ = ["PressTool", "register", "touch_outline", "unregister"]
+__all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: Colors of the patch: a light line on a dark one is seen on everything.
+DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 
 
 def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
@@ -40,7 +43,7 @@ def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: f
         How deep it would be pressed, m.
     """
     tip = view.fingertip_of(bed)
-    rim = place[:2] + find_contact_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
+    rim = place[:2] + patch(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
     return np.column_stack([rim, height[cells.at(rim[:, 0], rim[:, 1])]])
 
 
@@ -50,8 +53,6 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
 
     region = context.region
     if region is None or region.type != "WINDOW" or context.mode != "OBJECT":
-        return
-    if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
     found = aim.find_target(context, (xy[0] - region.x, xy[1] - region.y))
     if found is None or view.fingertip_of(found.bed) is None:
@@ -68,7 +69,26 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), depth, settings.strength)
-    cursor(marks.edge_lines(shown, width), marks.label(text, xy, context.preferences.system.ui_scale))
+    cursor(
+        [Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown],
+        label(text, xy, context.preferences.system.ui_scale),
+    )
+
+
+def label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
+    """Return text beside the cursor, light on a dark edge.
+
+    Parameters
+    ----------
+    text : str
+    xy : (float, float)
+        Of the cursor, pixels of the window.
+    scale : float
+        Of Blender's interface.
+    """
+    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
+    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [*edge, Words(x, y, size, LIGHT, text)]
 
 
 def _trail(found: aim.Target) -> list[Floats]:
@@ -77,7 +97,7 @@ def _trail(found: aim.Target) -> list[Floats]:
     if session is None or not session.strokes:
         return []
     finger, pose = find_ellipsoid(session.scene), session.pose
-    rim = pose[:2] + find_contact_outline(finger, pose[3:], float(found.height.max()) - pose[2])
+    rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
     return [
@@ -85,12 +105,6 @@ def _trail(found: aim.Target) -> list[Floats]:
         for way in ways
         if len(way) > 1
     ]
-
-
-def _scale_key(key: str, scalar: float) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Return the entry of the keymap by which a key scales the fingertip."""
-    event = {"type": key, "value": "PRESS", "repeat": True}
-    return "digiclay.press_scale", event, {"properties": [("scalar", scalar)]}
 
 
 class PressTool(bpy.types.WorkSpaceTool):
@@ -102,17 +116,12 @@ class PressTool(bpy.types.WorkSpaceTool):
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; F, Shift F and Ctrl F set size, depth and strength; a pen presses by itself"
+        "Drag to sculpt; Ctrl and the wheel, or Ctrl and drag, set how deep; a pen presses by itself"
     )
-    bl_icon = "ops.transform.push_pull"
+    bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
-        ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
-        ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
-        ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
-        _scale_key("LEFT_BRACKET", 1.0 / 1.1),
-        _scale_key("RIGHT_BRACKET", 1.1),
     )
     draw_cursor = staticmethod(_draw_cursor)
 
@@ -127,13 +136,6 @@ class PressTool(bpy.types.WorkSpaceTool):
         tool : bpy.types.WorkSpaceTool
         """
         settings = tool.operator_properties(OPERATOR)
-        bed = bed_in_use(context)
-        if bed is not None:
-            row = layout.row(align=True)
-            kind = find_kind(finger_size.read_finger(bed.digiclay))
-            row.menu("DIGICLAY_MT_fingers", text=kind.label if kind else "Finger")
-            row.prop(bed.digiclay, "size")
-            row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
         layout.prop(settings, "depth")
         layout.prop(settings, "strength")
         layout.prop(settings, "use_pressure")
@@ -149,6 +151,16 @@ def unregister() -> None:
     """Take the tool away; whoever has it in hand gets the first one."""
     _put_down()
     bpy.utils.unregister_tool(PressTool)
+
+
+def take_up(context: Any) -> None:
+    """Take the tool in hand in the 3D views of the context's workspace."""
+    window = context.window
+    views = [area for area in (context.area, *window.screen.areas) if area and area.type == "VIEW_3D"]
+    if views:
+        region = next(region for region in views[0].regions if region.type == "WINDOW")
+        with context.temp_override(window=window, area=views[0], region=region):
+            bpy.ops.wm.tool_set_by_id(name=PressTool.bl_idname, space_type="VIEW_3D")
 
 
 def _put_down() -> None:
