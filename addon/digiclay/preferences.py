@@ -6,6 +6,7 @@ from typing import Any
 
 from .compat import bpy
 from .device import palettes
+from .overlay.placement import CORNERS
 
 __all__ = ["Choices", "Preferences", "get", "register", "unregister"]
 
@@ -24,12 +25,15 @@ class Choices:
         A key of `palettes.PALETTES`.
     take_press_tool : bool
         Whether the start of a session takes the Press tool in hand.
+    overlay_corner : str
+        A key of `overlay.placement.CORNERS`.
     """
 
     redraw_rate: int = 30
     most_periods: int = 20
     palette: str = palettes.DEFAULT
     take_press_tool: bool = True
+    overlay_corner: str = "top_left"
 
 
 def take_palette(preferences: Any, context: Any) -> None:
@@ -41,6 +45,19 @@ def take_palette(preferences: Any, context: Any) -> None:
     context : bpy.types.Context
     """
     palettes.set_palette(preferences.palette)
+
+
+def redraw_views(preferences: Any, context: Any) -> None:
+    """Draw the 3D views anew.
+
+    Parameters
+    ----------
+    preferences : bpy.types.AddonPreferences
+    context : bpy.types.Context
+    """
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            area.tag_redraw()
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -81,6 +98,13 @@ class Preferences(bpy.types.AddonPreferences):
         description="The start of a session takes the Press tool in hand",
         default=Choices.take_press_tool,
     )
+    overlay_corner: bpy.props.EnumProperty(
+        name="Overlay Corner",
+        description="Corner of the 3D view with the overlay of a session",
+        items=[(name, name.replace("_", " ").title(), "") for name in CORNERS],
+        default=Choices.overlay_corner,
+        update=redraw_views,
+    )
 
     def draw(self, context: Any) -> None:
         """Draw the preferences."""
@@ -90,6 +114,7 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "most_periods")
         column.prop(self, "palette")
         column.prop(self, "take_press_tool")
+        column.prop(self, "overlay_corner")
 
 
 def get(context: Any) -> Any:

@@ -10,7 +10,7 @@ from digiclay.core.base.modes import COLORS, Mode
 from digiclay.device import heat
 from digiclay.overlay.look import LETTERS, LINES, choose_colors, contrast
 from digiclay.overlay.picture import Box, Picture, round_axis, scale_curve
-from digiclay.overlay.placement import find_room, lay_out
+from digiclay.overlay.placement import COMPACT, CORNERS, FULL, Content, find_room, lay_out
 from digiclay.overlay.sections import Readings
 from hypothesis import given
 from hypothesis import strategies as st
@@ -28,6 +28,7 @@ def session(**changes: object) -> Readings:
         name="Digital Clay",
         method="virtual_master",
         paused=False,
+        waiting=False,
         factor=0.97,
         errors=(2.1e-6, 4.6e-4),
         set_point=0.4,
@@ -141,6 +142,32 @@ def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
     assert low.boxes[0].height <= 240.0
     assert lay_out(session(), colors, (0.0, 0.0, 250.0, 700.0), 1.0) == Picture()
     assert lay_out(session(), colors, (0.0, 0.0, 900.0, 40.0), 1.0) == Picture()
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+@pytest.mark.parametrize("content", [COMPACT, FULL])
+def test_it_stands_in_the_corner_that_was_chosen(corner: str, content: Content) -> None:
+    picture = lay_out(session(), choose_colors(DARK, LIGHT), ROOM, 1.0, content, corner)
+    box, (left, bottom, right, top) = picture.boxes[0], ROOM
+    gap = box.x - left if corner.endswith("left") else right - box.x - box.width
+    assert gap == 12.0
+    gap = top - box.y - box.height if corner.startswith("top") else box.y - bottom
+    assert gap == 12.0 + CORNERS[corner]
+
+
+@pytest.mark.parametrize(
+    ("changes", "rows"),
+    [
+        ({}, "0.35 N | of 0.40 N | 10.0 s | 0.97 x real time"),
+        ({"paused": True}, "0.35 N | of 0.40 N | 10.0 s | paused"),
+        ({"waiting": True, "set_point": None}, "0.35 N | 10.0 s | waiting"),
+        ({"time": np.empty(0), "force": np.empty(0)}, "no force yet | of 0.40 N | 0.0 s | 0.97 x real time"),
+    ],
+)
+def test_in_short_it_has_two_rows(changes: dict[str, object], rows: str) -> None:
+    picture = lay_out(session(**changes), choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
+    assert said(picture) == rows
+    assert picture.boxes[0].height < 60.0
 
 
 def test_panels_over_the_view_are_kept_clear_of() -> None:

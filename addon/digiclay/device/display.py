@@ -205,8 +205,13 @@ class Display(bpy.types.PropertyGroup):
     )
     overlay: bpy.props.BoolProperty(
         name="Overlay",
-        description="While a session runs, show force, heights of picked pins, modes, speed and solver error",
+        description="While a session runs, show force and state in a corner of the 3D view",
         default=True,
+        update=_take_overlay,
+    )
+    overlay_full: bpy.props.BoolProperty(
+        name="Overlay Details",
+        description="Show curves, heights of picked pins and modes in the overlay, not force and state alone",
         update=_take_overlay,
     )
     seconds: bpy.props.FloatProperty(

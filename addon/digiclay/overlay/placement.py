@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+from .brief import BRIEF
 from .look import Look
 from .picture import Box, Picture
 from .sections import SECTIONS, Pen, Readings
 
-__all__ = ["find_room", "lay_out"]
+__all__ = ["COMPACT", "CORNERS", "FULL", "Content", "find_room", "lay_out"]
 
+
+class Content(NamedTuple):
+    """Sections of the overlay, and their width at a UI scale of 1, pixels."""
+
+    sections: tuple[Any, ...]
+    width: float
+
+
+COMPACT, FULL = Content(BRIEF, 190.0), Content(SECTIONS, 290.0)
+#: Corners, and the height that Blender's own text and gizmos take there at a UI scale of 1, pixels.
+CORNERS = {"top_left": 54.0, "top_right": 220.0, "bottom_left": 0.0, "bottom_right": 0.0}
 #: Sizes at a UI scale of 1, pixels.
-WIDTH, MARGIN, PADDING = 290.0, 12.0, 10.0
+MARGIN, PADDING = 12.0, 10.0
 #: Opacity of the box behind it all: the bed shines through a little.
 BACK_ALPHA = 0.95
 #: Most of the room's height that is taken: the bed is what one looks at.
@@ -35,8 +49,15 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def lay_out(told: Readings, look: Look, room: Room, scale: float) -> Picture:
-    """Lay the overlay out in the lower right corner of the room there is.
+def lay_out(
+    told: Readings,
+    look: Look,
+    room: Room,
+    scale: float,
+    content: Content = FULL,
+    corner: str = "bottom_right",
+) -> Picture:
+    """Lay the overlay out in a corner of the room there is.
 
     Where the view is low, sections there is no room for are left away; where it is narrow, all.
 
@@ -47,11 +68,16 @@ def lay_out(told: Readings, look: Look, room: Room, scale: float) -> Picture:
     room : Room
     scale : float
         The UI scale: pixels for each of the sizes.
+    content : Content, optional
+    corner : str, optional
+        A key of `CORNERS`.
     """
     left, bottom, right, top = room
-    width, margin, padding = WIDTH * scale, MARGIN * scale, PADDING * scale
+    at_top, at_left = corner.startswith("top"), corner.endswith("left")
+    top -= CORNERS[corner] * scale
+    width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
     space, sections = SHARE * (top - bottom) - 2 * padding, []
-    for height_of, draw in SECTIONS:
+    for height_of, draw in content.sections:
         height = height_of(told) * scale
         if 0.0 < height <= space:
             sections.append((height, draw))
@@ -60,7 +86,8 @@ def lay_out(told: Readings, look: Look, room: Room, scale: float) -> Picture:
     if not sections or right - left < width + 2 * margin:
         return picture
     tall = sum(height for height, _ in sections) + 2 * padding
-    x, y = right - margin - width, bottom + margin
+    x = left + margin if at_left else right - margin - width
+    y = top - margin - tall if at_top else bottom + margin
     picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
     pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
     y += tall - padding

@@ -17,7 +17,7 @@ from ..device import heat
 from .look import Color, Look
 from .picture import Box, Dot, Floats, Line, Picture, Words, round_axis, scale_curve
 
-__all__ = ["SECTIONS", "Pen", "Readings", "error_message"]
+__all__ = ["ROW", "SECTIONS", "Pen", "Readings", "describe_state", "error_message", "force_message"]
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
@@ -38,6 +38,7 @@ class Readings:
     name, method : str
         Of the bed and of its control method; an empty method means no control.
     paused : bool
+    waiting : bool
     factor : float or None
         Simulated over real time of the last second; None before there is one.
     errors : tuple of float or None
@@ -63,6 +64,7 @@ class Readings:
     name: str
     method: str
     paused: bool
+    waiting: bool
     factor: float | None
     errors: tuple[float, float] | None
     set_point: float | None
@@ -165,6 +167,13 @@ def force_message(force: float) -> str:
     return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
 
 
+def describe_state(told: Readings) -> str:
+    """Return whether a session is paused or waits, and else its speed."""
+    if told.paused or told.waiting:
+        return "paused" if told.paused else "waiting"
+    return "" if told.factor is None else f"{told.factor:.2f} x real time"
+
+
 def _head_height(told: Readings) -> float:
     """Return the height of the head, pixels at a UI scale of 1."""
     return 3 * ROW + GAP
@@ -172,8 +181,7 @@ def _head_height(told: Readings) -> float:
 
 def _draw_head(told: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
-    speed = "" if told.factor is None else f"{told.factor:.2f} x real time"
-    top = pen.row(top, told.name, "paused" if told.paused else speed)
+    top = pen.row(top, told.name, describe_state(told))
     top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
     pen.row(top, error_message(told.errors), small=True)
 

@@ -20,7 +20,7 @@ from ..live import running
 from ..press.aim import project
 from .look import Look, choose_colors
 from .picture import Dot, Picture
-from .placement import Room, find_room, lay_out
+from .placement import COMPACT, FULL, Room, find_room, lay_out
 from .sections import Readings
 
 __all__ = ["follow", "read_session", "redraw", "shown", "stop"]
@@ -87,6 +87,7 @@ def read_session(
         name=bed.name,
         method=scene.method if scene.control else "",
         paused=session.paused,
+        waiting=bool(session.blocking_reason),
         factor=session.factor or None,
         errors=None if errors is None else (errors.height, errors.force),
         set_point=wanted if math.isfinite(wanted) else None,
@@ -149,7 +150,7 @@ def _draw() -> None:
     context = bpy.context
     bed = _choose_bed(context) if context.space_data.overlay.show_overlays else None
     session = running.find(bed)
-    if session is None:
+    if bed is None or session is None:
         return
     settings = context.preferences
     theme = settings.themes[0].user_interface.wcol_menu_back
@@ -159,7 +160,12 @@ def _draw() -> None:
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
         picture = lay_out(
-            read_session(bed, session, colors), chosen, _room(context.area, context.region), scale
+            read_session(bed, session, colors),
+            chosen,
+            _room(context.area, context.region),
+            scale,
+            FULL if bed.digiclay_display.overlay_full else COMPACT,
+            preferences.get(context).overlay_corner,
         )
     picture.dots += _marks(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)

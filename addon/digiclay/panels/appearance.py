@@ -45,7 +45,10 @@ class Display(Panel, bpy.types.Panel):
         layout.prop(shown, "overlay")
         column = layout.column()
         column.active = shown.overlay
-        draw_number(column, shown, "seconds")
+        column.prop(shown, "overlay_full")
+        row = column.row()
+        row.active = shown.overlay_full
+        draw_number(row, shown, "seconds")
         pins = ", ".join(str(pin) for pin in display.picked_pins(bed))
         column.label(text=f"Picked pins: {pins or 'none'}")
         row = column.row(align=True)

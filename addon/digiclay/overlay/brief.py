@@ -1,0 +1,24 @@
+"""Brief section of the overlay: force, set point, time and state in two rows; no Blender."""
+
+from __future__ import annotations
+
+from .sections import ROW, Pen, Readings, describe_state, force_message
+
+__all__ = ["BRIEF"]
+
+
+def _brief_height(told: Readings) -> float:
+    """Return the height of the brief section, pixels at a UI scale of 1."""
+    return 2 * ROW
+
+
+def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
+    """Write force, set point, simulated time and state in two rows."""
+    now = force_message(float(told.force[-1])) if told.force.size else "no force yet"
+    asked = "" if told.set_point is None else f"of {told.set_point:.2f} N"
+    top = pen.row(top, now, asked)
+    pen.row(top, f"{float(told.time[-1]) if told.time.size else 0.0:.1f} s", describe_state(told))
+
+
+#: How tall the section is, and how it is drawn.
+BRIEF = ((_brief_height, _draw_brief),)
