@@ -7,7 +7,7 @@ import argparse
 from digiclay.commands.arguments import Help
 from digiclay.commands.parser import Parser
 
-from . import bed_size, mesh_export, precision, runs_together, session_parts, stiff, terms, viewport
+from . import bed_size, mesh_export, precision, runs_together, session_parts, stiff, terms, ticks, viewport
 
 __all__ = ["parser"]
 
@@ -21,6 +21,7 @@ examples:
   python -m benchmarks stack          sessions a second, alone and in a batch
   python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
+  python -m benchmarks ticks          how the time of a tick is distributed
 """
 
 
@@ -34,6 +35,8 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
-    for kind in (session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, runs_together):
+    for kind in (
+        session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together,
+    ):  # fmt: skip
         kind.add(kinds)
     return top

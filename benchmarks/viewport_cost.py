@@ -23,7 +23,7 @@ from digiclay.operators.add_bed import add, select_only
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 
-__all__ = ["PARTS", "TICK", "Cost", "measured"]
+__all__ = ["PARTS", "TICK", "Cost", "measured", "settings"]
 
 #: Time of the wall between two ticks, s.
 TICK = 33e-3
@@ -86,7 +86,7 @@ def measured(rows: int, columns: int, ticks: int) -> Cost:
 @contextmanager
 def _session(rows: int, columns: int) -> Iterator[Any]:
     """Give a bed with a session in the open file, and take both away again."""
-    with _settings(), scratch():
+    with settings(), scratch():
         bed = add(bpy.context, make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master"))
         select_only(bpy.context, bed)
         tick.start(bpy.context, bed)
@@ -97,7 +97,7 @@ def _session(rows: int, columns: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _settings() -> Iterator[None]:
+def settings() -> Iterator[None]:
     """Let beds have settings: for the while, where the extension is not enabled anyway."""
     if hasattr(bpy.types.Object, "digiclay"):
         yield

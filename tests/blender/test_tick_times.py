@@ -1,0 +1,56 @@
+"""The benchmark of ticks: every tick of every bed is timed, part by part."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.live import bed_state, running, sculpting
+
+from benchmarks import ticks
+from benchmarks.__main__ import main
+from benchmarks.tick_times import DEPTH, PARTS, measure
+
+
+def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
+    before = sculpting.advance, bed_state.write
+    found = measure(11, 11, 3e-3, 2e-3, ticks=12)
+    assert (sculpting.advance, bed_state.write) == before
+    assert running.list_sessions() == ()
+    assert found.spent.shape == found.elapsed.shape == (12,)
+    assert tuple(found.parts) == PARTS
+    for name in ("read", "simulate", "pack", "finger", "store", "show", "evaluate"):
+        assert (found.parts[name] > 0.0).all(), name
+    # Garbage is collected within any of the parts.
+    inside = sum(found.parts[name] for name in PARTS if name != "garbage")
+    assert (inside <= found.spent).all()
+
+
+def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    lowest = []
+    advance = sculpting.advance
+
+    def watched(*arguments: object) -> running.Running:
+        session = advance(*arguments)  # type: ignore[arg-type]
+        lowest.append(float(session.state.row(0).min()))
+        return session
+
+    monkeypatch.setattr(sculpting, "advance", watched)
+    measure(11, 11, 3e-3, 2e-3, ticks=6)
+    assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
+
+
+def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(ticks, "BEDS", ((11, 11, 3e-3, 2e-3, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
+    monkeypatch.setattr(ticks, "QUICK", 5)
+    monkeypatch.setattr(ticks, "keep_to_one_core", lambda: None)  # other tests go on in this process
+    assert main(["ticks", "--quick", "--quiet", "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "11 x 11 at 3 mm, 5 ticks" in told
+    assert "20 x 21 at 1.5 mm, 5 ticks" in told
+    rows = np.loadtxt(tmp_path / "ticks.csv", delimiter=",", skiprows=1)
+    assert rows.shape == (10, 6 + len(PARTS))
+    assert (tmp_path / "ticks.png").stat().st_size > 10_000
