@@ -45,7 +45,7 @@ def check_memory(scene: Scene, rows: Rows) -> None:
 
 
 def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
-    """Return about how much memory a session takes; tests/unit/test_memory.py compares what it does take.
+    """Return about how much memory a session takes; compared in tests/unit/test_memory_limit.py.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import pytest
 from digiclay.core.batch.packing import find_reason
 
 from tests.assemble import sample
-from tests.scenes.test_stack import assert_as_alone, moved, together
+from tests.scenes.test_run_together import assert_as_alone, moved, together
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states", "elastic"])

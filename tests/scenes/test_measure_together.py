@@ -16,8 +16,8 @@ from digiclay.core.session.run_scene import run
 
 from tests.assemble import STACKABLE, sample
 
-#: Sums in another order. By unit: heights agree to 1e-12 m and forces to 1e-10 N (test_stack.py), lags are
-#: rounded to 1e-12 m; a volume adds up some hundred heights, each over 1e-5 m².
+#: Sums in another order. By unit: heights agree to 1e-12 m and forces to 1e-10 N (test_run_together.py), lags
+#: are rounded to 1e-12 m; a volume adds up some hundred heights, each over 1e-5 m².
 RELATIVE, ABSOLUTE = 1e-9, {"m": 1e-12, "N": 1e-10, "m3": 1e-15, "s": 1e-12, "1": 1e-12}
 
 
