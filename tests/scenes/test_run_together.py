@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DivergenceError, ParameterError
-from digiclay.core.batch.packing import BATCHED, find_reason, structure
+from digiclay.core.batch.packing import BATCHED, describe_structure, find_reason
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.trajectory import Waypoint
@@ -33,7 +33,7 @@ def moved(known: Scene, x: float, z: float) -> Scene:
 
 def together(scenes: Sequence[Scene]) -> list[Any]:
     """Run scenes in a stack; return what each came to."""
-    assert len({structure(one) for one in scenes}) == 1
+    assert len({describe_structure(one) for one in scenes}) == 1
     done: dict[int, Any] = {}
     for number, result in run_together(scenes):
         history = getattr(result, "history", None)
@@ -268,4 +268,4 @@ def test_every_method_stands_in_stacks_or_says_why_not() -> None:
     ],
 )
 def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
-    assert structure(sample("tap", setting)) != structure(sample("tap"))
+    assert describe_structure(sample("tap", setting)) != describe_structure(sample("tap"))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import pytest
-from digiclay.core.batch.packing import BATCHED, structure
+from digiclay.core.batch.packing import BATCHED, describe_structure
 from digiclay.core.batch.run_together import measure_together
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
@@ -21,7 +21,7 @@ RELATIVE, ABSOLUTE = 1e-9, {"height": 1e-15, "force": 1e-12, "total_force": 1e-1
 
 def judged(scenes: Sequence[Scene]) -> list[Result]:
     """Run scenes in a stack with their errors."""
-    assert len({structure(make_reference(one)) for one in scenes}) == 1
+    assert len({describe_structure(make_reference(one)) for one in scenes}) == 1
     done = dict(measure_together(scenes, errors=True))
     results = [done[number] for number in range(len(scenes))]
     return [one for one in results if isinstance(one, Result)]

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.batch.advance import advance, begin
-from digiclay.core.batch.broadcasting import kind, merge_parts
-from digiclay.core.batch.fingers import fingers
+from digiclay.core.batch.broadcasting import classify, merge_parts
+from digiclay.core.batch.finger_paths import make_fingers
 from digiclay.core.batch.packing import make_batch
-from digiclay.core.batch.padding import reach
+from digiclay.core.batch.padding import compute_reach
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.supply import Supply
 from digiclay.core.model.touch import trace_finger
@@ -64,9 +64,9 @@ def test_the_formulas_of_a_part_hold_for_many_runs() -> None:
 
 
 def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
-    assert kind(Contact(stiffness=100.0)) == kind(Contact())
+    assert classify(Contact(stiffness=100.0)) == classify(Contact())
     scene = load(find("tap"))
-    assert kind(scene.layout) != kind(load(find("tap"), [Setting("layout.rows", "15")]).layout)
+    assert classify(scene.layout) != classify(load(find("tap"), [Setting("layout.rows", "15")]).layout)
 
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
@@ -76,7 +76,7 @@ def test_the_reach_of_many_fingers_is_that_of_each() -> None:
     poses = np.zeros((3, 2, 7))
     poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])
     windows = [one.window for one in trace_finger(Fingertip(), poses)]
-    _, _, found = reach(np.array(windows).T, np.full(3, 0.04))
+    _, _, found = compute_reach(np.array(windows).T, np.full(3, 0.04))
     expected = [alone(base, tilt, bend, 0.04) + spread for _, _, spread, base, tilt, bend in windows]
     np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-12)
     assert found[2] < 0.0  # the last one is far above the bed
@@ -93,7 +93,7 @@ def calls(count: int) -> list[int]:
     def count_one(frame: Any, event: str, argument: Any) -> None:
         made[0] += event == "c_call"
 
-    coming = fingers(systems, ways, 0, 100)
+    coming = make_fingers(systems, ways, 0, 100)
     for _ in range(100):
         made[0] = 0
         sys.setprofile(count_one)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.batch.packing import structure
+from digiclay.core.batch.packing import describe_structure
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import LEAST, make_bundles
@@ -24,7 +24,7 @@ def test_the_runs_of_a_study_differ_and_stand_together(name: str) -> None:
     values = np.array([getattr(scene.section(section), key) for scene in scenes])
     assert np.all(np.diff(values) > 0.0)
     assert low * usual < values[0] < values[-1] < high * usual
-    assert len({structure(scene) for scene in scenes}) == 1
+    assert len({describe_structure(scene) for scene in scenes}) == 1
     assert make_bundles([Point(i, (), scene) for i, scene in enumerate(scenes)]).alone == ()
 
 

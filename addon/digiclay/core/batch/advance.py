@@ -13,8 +13,8 @@ from ..base.errors import DivergenceError
 from ..engine.simulation import find_divergence, simulate_period
 from ..engine.state import State, at_rest
 from ..engine.system import System
-from .broadcasting import numbers
-from .fingers import Fingers
+from .broadcasting import list_numbers
+from .finger_paths import Fingers
 
 __all__ = ["Batch", "advance", "begin", "find_diverged", "make_divergence_error", "select_runs"]
 
@@ -35,7 +35,7 @@ class Batch(System):
 def begin(batch: Batch) -> State:
     """Return the state before the sessions."""
     memory = [system.controller.begin() if system.controller else None for system in batch.systems]
-    heights = numbers([system.cell.actuator.rest_height for system in batch.systems])
+    heights = list_numbers([system.cell.actuator.rest_height for system in batch.systems])
     return at_rest(batch.rows, batch.grid.count, heights, memory)
 
 

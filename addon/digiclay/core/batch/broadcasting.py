@@ -10,13 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "kind", "merge_parts", "numbers"]
+__all__ = ["Floats", "classify", "list_numbers", "merge_parts"]
 
 Part = TypeVar("Part")
 Floats = NDArray[np.float64]
 
 
-def kind(value: Any) -> Any:
+def classify(value: Any) -> Any:
     """Return all of a part but its numbers: parts of one kind can be merged.
 
     Parameters
@@ -25,9 +25,9 @@ def kind(value: Any) -> Any:
         A dataclass, and in its fields dataclasses, numbers, tuples, texts or None.
     """
     if is_dataclass(value) and not isinstance(value, type):
-        return type(value), *(kind(getattr(value, field.name)) for field in fields(value))
+        return type(value), *(classify(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, tuple):
-        return tuple(kind(one) for one in value)
+        return tuple(classify(one) for one in value)
     return float if isinstance(value, float) else value
 
 
@@ -37,7 +37,7 @@ def merge_parts(parts: Sequence[Part]) -> Part:
     Parameters
     ----------
     parts : sequence of dataclass
-        Of one `kind`. What is the same in all of them stays as it is; a number that is not becomes an
+        Of one `classify`. What is the same in all of them stays as it is; a number that is not becomes an
         array (b,), and arrays get one axis more, the last; parts within the parts likewise. The rules of
         parameters are not checked again.
     """
@@ -63,9 +63,9 @@ def _one(values: list[Any]) -> Any:
     if isinstance(first, tuple):
         own = tuple(_one(list(several)) for several in zip(*values, strict=True))
         return first if all(map(operator.is_, own, first)) else own
-    return first if all(value is first or value == first for value in values) else numbers(values)
+    return first if all(value is first or value == first for value in values) else list_numbers(values)
 
 
-def numbers(values: Sequence[float]) -> Floats:
+def list_numbers(values: Sequence[float]) -> Floats:
     """Return a number of each run, shape (b,)."""
     return np.array(values, dtype=np.float64)

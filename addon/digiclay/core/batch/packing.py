@@ -13,12 +13,12 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Batch
-from .broadcasting import kind, merge_parts, numbers
+from .broadcasting import classify, list_numbers, merge_parts
 from .movement import BatchStepper
 from .padding import PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["BATCHED", "find_reason", "make_batch", "structure"]
+__all__ = ["BATCHED", "describe_structure", "find_reason", "make_batch"]
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
@@ -39,7 +39,7 @@ def find_reason(scene: Scene) -> str:
     return ""
 
 
-def structure(scene: Scene) -> Any:
+def describe_structure(scene: Scene) -> Any:
     """Return what scenes must have in common to stand in one batch; see also `find_reason`.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
@@ -57,7 +57,7 @@ def structure(scene: Scene) -> Any:
         scene.layout,
         scene.method if scene.control else None,
         scene.shape is None,
-        *(kind(part) for part in (fingertips, scene.control, scene.blister, scene.sensors)),
+        *(classify(part) for part in (fingertips, scene.control, scene.blister, scene.sensors)),
         rounds,
         scene.recorder,
         scene.simulation.stepper,
@@ -68,7 +68,7 @@ def structure(scene: Scene) -> Any:
     steps = tuple(
         (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(system)
     )
-    return (*common, kind(physics), system.rows, steps, system.instants.size)
+    return (*common, classify(physics), system.rows, steps, system.instants.size)
 
 
 def _plans(system: System) -> tuple[BernoulliPlan, ...]:
@@ -84,8 +84,8 @@ def _plans(system: System) -> tuple[BernoulliPlan, ...]:
 def make_batch(systems: Sequence[System]) -> Batch:
     """Return the batch of systems of one structure."""
     first, cell = systems[0], merge_parts([system.cell for system in systems])
-    period = numbers([system.period for system in systems])
-    fastest = numbers([system.fastest for system in systems])
+    period = list_numbers([system.period for system in systems])
+    fastest = list_numbers([system.fastest for system in systems])
     plan = merge_parts([system.plan for system in systems])
     # Of its stepper a control period uses `prepare` alone.
     stepper = cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start))

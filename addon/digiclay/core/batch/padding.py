@@ -17,7 +17,7 @@ from ..engine.state import State
 from ..model.layout import Grid
 from .broadcasting import Floats
 
-__all__ = ["NO_DISC", "PaddedSelection", "join_discs", "reach"]
+__all__ = ["NO_DISC", "PaddedSelection", "compute_reach", "join_discs"]
 
 Flags = NDArray[np.bool_]
 Cells = NDArray[np.intp]
@@ -28,7 +28,7 @@ NO_DISC: Disc = (np.zeros(1), np.zeros(1), np.full(1, -1.0))
 MARGIN = 0.5
 
 
-def reach(window: Floats, peak: Floats) -> Disc:
+def compute_reach(window: Floats, peak: Floats) -> Disc:
     """Return the discs beyond which no finger touches a pin.
 
     Parameters
@@ -63,7 +63,7 @@ class PaddedSelection(Selection):
             Disc x, y, radius that each controller will command, m.
         """
         held, grid, discs = state.active, self.grid, join_discs(control)
-        near = NO_DISC if finger is None else reach(finger.window, held.peak)
+        near = NO_DISC if finger is None else compute_reach(finger.window, held.peak)
         if state.period < held.until and _inside(near, held.reach) and _inside(discs, held.control):
             return state
         wanted = np.zeros(state.modes.shape, np.bool_)
@@ -71,7 +71,7 @@ class PaddedSelection(Selection):
         top = state.rows[0].max(axis=0)
         peak = np.minimum(top + KEPT * (self.period * self.fastest), self.cell.actuator.stroke)
         margin = MARGIN * grid.layout.pitch
-        near = _wider(NO_DISC if finger is None else reach(finger.window, peak), margin)
+        near = _wider(NO_DISC if finger is None else compute_reach(finger.window, peak), margin)
         discs = _wider(discs, margin)
         wanted |= _cells(grid, discs)
         cells, count = _ordered(np.broadcast_to(_cells(grid, near), wanted.shape), wanted)

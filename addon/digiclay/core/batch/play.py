@@ -16,7 +16,7 @@ from ..model.trajectory import Trajectory
 from ..scene.schema import Scene
 from ..session.run_result import Ended, count_losses
 from .advance import Batch, advance, begin, find_diverged, select_runs
-from .fingers import Fingers, extend_fingers
+from .finger_paths import Fingers, extend_fingers
 from .packing import make_batch
 
 __all__ = ["Instant", "Play", "begin_play", "keep_runs", "locate_fingers", "play_all"]

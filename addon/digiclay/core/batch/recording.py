@@ -16,7 +16,7 @@ from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.run_result import Result, evaluate, report
 from .broadcasting import Floats
-from .fingers import Way, way_over
+from .finger_paths import SampledPath, make_path
 from .play import Instant, Play
 
 __all__ = ["Histories", "Sums"]
@@ -110,7 +110,7 @@ class Sums:
         self._first = play.state.row(0)
         self._sums = np.zeros((count, 5, len(play.runs)))
         self._following = np.zeros((count, len(play.runs)), np.intp)
-        self._ways: dict[Any, Way] = {}
+        self._ways: dict[Any, SampledPath] = {}
 
     def observe(self, now: Instant) -> None:
         """Sum a control period up."""
@@ -147,7 +147,7 @@ class Sums:
         same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
         if same not in self._ways:
             moments = np.minimum(np.arange(count) * self._every, period) * time
-            self._ways[same] = way_over(grid, play.ways[run], moments)
+            self._ways[same] = make_path(grid, play.ways[run], moments)
         way = self._ways[same]
         found = compute_metrics_from_sums(
             sums, way.time, way.fingertip, grid.positions, scene.set_point, way.cells

@@ -117,7 +117,7 @@ def run_together(
     Parameters
     ----------
     scenes : sequence of Scene
-        Of one `packing.structure`.
+        Of one `packing.describe_structure`.
     stopped : callable, optional
         Asked after each control period; when it says True, the runs that are not done are given up.
 
@@ -140,7 +140,7 @@ def measure_together(
     Parameters
     ----------
     scenes : sequence of Scene
-        Of one `packing.structure`, with a recorder.
+        Of one `packing.describe_structure`, with a recorder.
     errors : bool, optional
         Estimate their errors too, where `accuracy.has_every_command`; their references, see
         `accuracy.make_reference`, must be of one structure as well.

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import nearest
-from ..batch.packing import find_reason, structure
+from ..batch.packing import describe_structure, find_reason
 from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
 from ..scene.schema import Scene
@@ -123,11 +123,11 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             why.update([reason] if reason else [])
             continue
         try:
-            judge = structure(make_reference(point.scene)) if errors else None
+            judge = describe_structure(make_reference(point.scene)) if errors else None
         except ParameterError:  # it is told when the point is run
             alone.append(point)
             continue
-        alike.setdefault((structure(point.scene), judge), []).append(point)
+        alike.setdefault((describe_structure(point.scene), judge), []).append(point)
     batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)

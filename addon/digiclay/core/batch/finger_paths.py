@@ -17,7 +17,15 @@ from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
 from .broadcasting import Floats
 
-__all__ = ["Fingers", "FingersPeriod", "Way", "extend_fingers", "fingers", "undersides", "way_over"]
+__all__ = [
+    "Fingers",
+    "FingersPeriod",
+    "SampledPath",
+    "compute_undersides",
+    "extend_fingers",
+    "make_fingers",
+    "make_path",
+]  # fmt: skip
 
 #: Control periods that are worked out at a time.
 CHUNK = 256
@@ -49,7 +57,7 @@ class Fingers:
 
 
 class FingersPeriod(NamedTuple):
-    """The fingers in one control period of their ways; see `touch.FingerPeriod`."""
+    """The fingers in one control period of their paths; see `touch.FingerPeriod`."""
 
     coming: Fingers
     period: int
@@ -62,29 +70,29 @@ class FingersPeriod(NamedTuple):
 
     def under(self, basis: Floats) -> Floats:
         """Return their undersides over some places (6, k, b), shape (p, k, b), m."""
-        return undersides(self.coming, self.period, basis)
+        return compute_undersides(self.coming, self.period, basis)
 
 
-def fingers(systems: Sequence[System], ways: Sequence[Trajectory], first: int, count: int) -> Fingers:
+def make_fingers(systems: Sequence[System], paths: Sequence[Trajectory], first: int, count: int) -> Fingers:
     """Work out how the fingers come.
 
     Parameters
     ----------
     systems : sequence of System
         With a fingertip.
-    ways : sequence of Trajectory
+    paths : sequence of Trajectory
         Each run's.
     first, count : int
         Control periods.
     """
-    runs = list(zip(systems, ways, strict=True))
+    runs = list(zip(systems, paths, strict=True))
     alike = all(_same(run, runs[0]) for run in runs)
-    known = [_trace_finger(system, way, first, count) for system, way in (runs[:1] if alike else runs)]
+    known = [_trace_finger(system, path, first, count) for system, path in (runs[:1] if alike else runs)]
     return Fingers(first, *(np.stack(parts, axis=-1) for parts in zip(*known, strict=True)))
 
 
 def extend_fingers(
-    coming: Fingers | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+    coming: Fingers | None, systems: Sequence[System], paths: Sequence[Trajectory], period: int
 ) -> Fingers | None:
     """Return how the fingers come in a period and some more: what is known, or worked out anew.
 
@@ -93,41 +101,41 @@ def extend_fingers(
     coming : Fingers or None
         What is known.
     systems : sequence of System
-    ways : sequence of Trajectory
+    paths : sequence of Trajectory
     period : int
     """
     if systems[0].cell.touch is None or (coming and period < coming.first + len(coming.forms)):
         return coming
-    return fingers(systems, ways, period, CHUNK)
+    return make_fingers(systems, paths, period, CHUNK)
 
 
 def _same(one: tuple[System, Trajectory], other: tuple[System, Trajectory]) -> bool:
     """Return whether two runs have the same finger at the same times."""
-    (system, way), (first, its) = one, other
+    (system, path), (first, its) = one, other
     assert system.cell.touch is not None
     assert first.cell.touch is not None
     return (
         system.cell.touch.fingertip == first.cell.touch.fingertip
-        and way.interpolation == its.interpolation
+        and path.interpolation == its.interpolation
         and system.period == first.period
         and np.array_equal(system.instants, first.instants)
         and all(
-            np.array_equal(getattr(way, name), getattr(its, name))
+            np.array_equal(getattr(path, name), getattr(its, name))
             for name in ("times", "positions", "orientations")
         )
     )
 
 
-def _trace_finger(system: System, way: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
+def _trace_finger(system: System, path: Trajectory, first: int, count: int) -> tuple[Floats, ...]:
     """Work out how one finger comes: the arrays of `Fingers`, without their last axis."""
     assert system.cell.touch is not None
     starts = (first + np.arange(count)) * system.period
-    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
+    poses = path.poses((starts[:, None] + system.instants).ravel()).reshape(count, -1, 7)
     coming = trace_finger(system.cell.touch.fingertip, poses)[0].coming
     return coming.forms, coming.join, np.array(coming.windows)
 
 
-def undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
+def compute_undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
     """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.underside`.
 
     Parameters
@@ -143,8 +151,8 @@ def undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """A finger's way over a bed, at some times.
+class SampledPath:
+    """Fingertip path over a bed, at some times.
 
     Attributes
     ----------
@@ -161,8 +169,8 @@ class Way:
     cells: NDArray[np.intp]
 
 
-def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
-    """Work out a finger's way at times (t,), s.
+def make_path(grid: Grid, trajectory: Trajectory, time: Floats) -> SampledPath:
+    """Compute a fingertip path at times (t,), s.
 
     Parameters
     ----------
@@ -174,4 +182,4 @@ def way_over(grid: Grid, trajectory: Trajectory, time: Floats) -> Way:
     tip = trajectory.poses(time)
     places = np.unique(tip[:, :2], axis=0)
     nearest = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
-    return Way(time, tip, np.unique(nearest))
+    return SampledPath(time, tip, np.unique(nearest))
