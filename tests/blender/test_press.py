@@ -14,6 +14,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.layout import grid
 from digiclay.device import view
 from digiclay.press import aim, tool
+from digiclay.press.drape import drape
 from digiclay.settings import properties
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
@@ -149,7 +150,7 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim[:, :2], axis=0) / 2
     np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)
-    np.testing.assert_array_equal(rim[:, 2], height[cells.at(rim[:, 0], rim[:, 1])])
+    np.testing.assert_array_equal(rim, drape(cells, height, rim[:, :2]))
 
 
 @pytest.mark.usefixtures("extension")

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..overlay import views
-from . import loop, recovery, running, tick
+from . import loop, recovery, running, selection, tick
 from .running import Running
 from .stroke_queue import drop_strokes
 
@@ -97,6 +97,7 @@ def end(how: str, *sessions: Running) -> None:
     sessions = sessions or running.list_sessions()
     words = [f"The session of {', '.join(session.name for session in sessions)} {how}"]
     words += filter(None, [tick.stop(session.uid) for session in sessions])
+    selection.select_active(frozenset(session.uid for session in sessions))
     if sessions:
         running.set_message(". ".join(words))
     if not running.list_sessions():

@@ -8,7 +8,7 @@ from typing import Any
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..device import view
-from ..live import running, tick
+from ..live import running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, deepen, draw
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..press import aim, brush
@@ -87,6 +87,7 @@ class Press(Polled, bpy.types.Operator):
             return {"CANCELLED"}
         if session.paused:
             self.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
+        selection.deselect(found.bed)
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
         self.uid, self.grid, self.height = session.uid, found.grid, found.height.copy()
         self.region, self.began, self.before = context.region, time.perf_counter(), event.mouse_y

@@ -5,7 +5,7 @@ from typing import Any
 from .. import preferences
 from ..compat import bpy
 from ..device.view import bed_of
-from ..live import handlers, loop, tick
+from ..live import handlers, loop, selection, tick
 from ..overlay import views
 from ..press import tool
 from .action import Action
@@ -72,6 +72,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         views.follow()
         if preferences.get(context).take_press_tool:
             tool.take_up(context)
+        selection.deselect(bed)
         # The state stands in the bed by now, so that undoing the first gesture finds it.
         bpy.ops.ed.undo_push(message="Start Session")
         if loop.is_running():

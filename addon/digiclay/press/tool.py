@@ -18,6 +18,7 @@ from ..live.stroke import SYMMETRIES
 from ..overlay.picture import Line, Words
 from . import aim
 from .brush import OPERATOR, TOOL, describe_brush
+from .drape import drape
 
 __all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
 
@@ -44,7 +45,7 @@ def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: f
     """
     tip = view.fingertip_of(bed)
     rim = place[:2] + patch(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
-    return np.column_stack([rim, height[cells.at(rim[:, 0], rim[:, 1])]])
+    return drape(cells, height, rim)
 
 
 def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
@@ -100,11 +101,7 @@ def _trail(found: aim.Target) -> list[Floats]:
     rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
-    return [
-        np.column_stack([way, found.height[found.grid.at(way[:, 0], way[:, 1])]])
-        for way in ways
-        if len(way) > 1
-    ]
+    return [drape(found.grid, found.height, way) for way in ways if len(way) > 1]
 
 
 class PressTool(bpy.types.WorkSpaceTool):

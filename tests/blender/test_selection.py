@@ -1,0 +1,54 @@
+"""A bed with a session is not selected, so that its pins have no outline; it is again after the session."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import pytest
+from digiclay.device import view
+from digiclay.live import selection
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture
+def bed() -> Any:
+    """A bed from the Add menu, selected and active."""
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    return bpy.context.object
+
+
+def test_a_bed_taken_out_of_the_selection_is_active_still(bed: Any) -> None:
+    selection.deselect(bed)
+    assert not bed.select_get()
+    assert bpy.context.object == bed
+
+
+def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
+    for collection in bed.users_collection:
+        collection.objects.unlink(bed)
+    selection.deselect(bed)  # Blender raises an error for an object the view layer does not have
+    assert bed.name in bpy.data.objects
+
+
+def test_after_the_session_the_active_bed_is_selected_again(bed: Any) -> None:
+    selection.deselect(bed)
+    selection.select_active(frozenset({bed.session_uid}))
+    assert bed.select_get()
+
+
+def test_what_was_selected_meanwhile_stays_the_selection(bed: Any) -> None:
+    selection.deselect(bed)
+    tip = view.fingertip_of(bed)
+    tip.select_set(True)
+    selection.select_active(frozenset({bed.session_uid}))
+    assert bpy.context.selected_objects == [tip]
+
+
+def test_another_object_that_is_active_is_not_selected(bed: Any) -> None:
+    cube = bpy.data.objects["Cube"]
+    selection.deselect(bed)
+    bpy.context.view_layer.objects.active = cube
+    selection.select_active(frozenset({bed.session_uid}))
+    assert bpy.context.selected_objects == []
