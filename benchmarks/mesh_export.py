@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.tables import table
-from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.features import Finding
@@ -82,7 +82,7 @@ def measured(side: int, kind: str, file: str) -> Export:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"bed{suffix(file)}"
         started = time.perf_counter()
-        made = bodies(bed, Model(kind=kind), finding)
+        made = make_bodies(bed, Model(kind=kind), finding)
         moment = time.perf_counter()
         write(made, path, kind=file)
         done = time.perf_counter()
@@ -90,7 +90,7 @@ def measured(side: int, kind: str, file: str) -> Export:
         del made
         tracemalloc.start()
         try:
-            write(bodies(bed, Model(kind=kind), finding), path, kind=file)
+            write(make_bodies(bed, Model(kind=kind), finding), path, kind=file)
             peak = tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()

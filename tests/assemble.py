@@ -16,10 +16,10 @@ from digiclay.core.engine.state import State
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.contact import Contact
+from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.delay import Delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, underside
 from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.interfaces import Commands, Measurement
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation

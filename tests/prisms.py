@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from digiclay.core.surface.skin_mesh import base_level, skin
+from digiclay.core.surface.skin_mesh import find_base_level, make_skin
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -15,8 +15,8 @@ def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: f
     Exact: the sum over the triangles of area in plan times mean height above the base, which is
     that of `solid` unless it is given, m.
     """
-    faces = skin(place, height, rows, columns)
+    faces = make_skin(place, height, rows, columns)
     (ax, ay), (bx, by), (cx, cy) = (place[faces[:, corner]].T for corner in range(3))
     area = 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
-    level = base_level(height) if base is None else base
+    level = find_base_level(height) if base is None else base
     return float(np.sum(area * (height[faces].mean(axis=1) - level)))

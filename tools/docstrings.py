@@ -1,27 +1,20 @@
 """Check of docstrings: every public function of two or more parameters describes them.
 
-usage: python tools/docstrings.py [--write]
+usage: python tools/docstrings.py
 
-Its docstring needs numpydoc's section *Parameters*, with its parameters and no others. docstrings.txt beside
-this file lists the functions that still lack it, a line a file. The list may only shrink: it is an error when
-a function lacks the section and is not listed, and when a listed one lacks it no longer. --write takes the
-latter out and follows functions whose file was renamed; it never adds one.
+Its docstring needs numpydoc's section *Parameters*, with its parameters and no others.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
 import re
 import sys
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("addon/digiclay", "benchmarks", "digiclay_paper")
-LIST = Path(__file__).with_suffix(".txt")
-HEAD = "# Functions without a section Parameters, by file; kept by tools/docstrings.py --write."
 #: Methods that Blender calls, with the parameters it gives them.
 BLENDERS = dict.fromkeys(("invoke", "modal"), ("context", "event"))
 
@@ -86,71 +79,12 @@ def lacking(root: Path = ROOT) -> set[tuple[str, str]]:
     }
 
 
-def read(listed: Path) -> set[tuple[str, str]]:
-    """Return file and name of each listed function."""
-    lines = [line.split() for line in listed.read_text(encoding="utf-8").splitlines() if line[:1] not in "#"]
-    return {(file, name) for file, *names in lines for name in names}
-
-
-def write(listed: Path, functions: set[tuple[str, str]]) -> None:
-    """Write the list, a line a file.
-
-    Parameters
-    ----------
-    listed : Path
-    functions : set of (str, str)
-        File and name of each.
-    """
-    files: dict[str, list[str]] = {}
-    for file, name in sorted(functions):
-        files.setdefault(file, []).append(name)
-    lines = [" ".join([file, *names]) for file, names in files.items()]
-    listed.write_text("\n".join([HEAD, *lines, ""]), encoding="utf-8")
-
-
-def kept(found: set[tuple[str, str]], known: set[tuple[str, str]]) -> set[tuple[str, str]]:
-    """Return what stays on the list: listed functions, also under the new name of their file.
-
-    Parameters
-    ----------
-    found : set of (str, str)
-        File and name of each function that lacks the section.
-    known : set of (str, str)
-        Those that are listed.
-    """
-    moved = Counter(name for _, name in known - found)
-    stay = found & known
-    for one in sorted(found - known):
-        if moved[one[1]] > 0:
-            moved[one[1]] -= 1
-            stay.add(one)
-    return stay
-
-
-def main(argv: Sequence[str] | None = None, root: Path = ROOT, listed: Path = LIST) -> int:
-    """Check, and print a line for each function that is wrong; the exit code is 1 if there is one.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The arguments; by default those of the process.
-    root : Path
-        The checkout.
-    listed : Path
-        The list.
-    """
-    parser = argparse.ArgumentParser(description="Check that docstrings have their parameters.")
-    parser.add_argument("--write", action="store_true", help="take out of the list what is documented now")
-    found, known = lacking(root), read(listed)
-    if parser.parse_args(argv).write:
-        known = kept(found, known)
-        write(listed, known)
-    for file, name in sorted(found - known):
+def main(root: Path = ROOT) -> int:
+    """Print a line for each function that is wrong; return the exit code, 1 if there is one."""
+    found = sorted(lacking(root))
+    for file, name in found:
         print(f"{file}: {name}: its docstring has no section Parameters with all of its parameters.")
-    for file, name in sorted(known - found):
-        print(f"{file}: {name}: it is documented, or gone: run 'python tools/docstrings.py --write'.")
-    print(f"{len(found)} public functions of two or more parameters have no section Parameters yet.")
-    return int(found != known)
+    return int(bool(found))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.surface.skin_mesh import solid
+from digiclay.core.surface.skin_mesh import make_solid
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -38,7 +38,7 @@ def bed(rows: int, columns: int, arrangement: str):
 
 def made(layout: Layout, height: np.ndarray) -> trimesh.Trimesh:
     """The solid as trimesh sees it, vertices and faces untouched."""
-    vertices, faces = solid(grid(layout).positions, height, layout.rows, layout.columns)
+    vertices, faces = make_solid(grid(layout).positions, height, layout.rows, layout.columns)
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
@@ -85,7 +85,7 @@ def test_a_bed_mirrored_in_x_has_the_same_volume(case):
     # The mirror image of a shifted layout is no layout, so the positions are mirrored with the heights.
     layout, height = case
     place = grid(layout).positions
-    vertices, faces = solid(place * (-1.0, 1.0), height, layout.rows, layout.columns)
+    vertices, faces = make_solid(place * (-1.0, 1.0), height, layout.rows, layout.columns)
     mirrored = trimesh.Trimesh(vertices, faces, process=False)
     assert mirrored.volume == pytest.approx(volume(layout, height), rel=ROUNDING)
     assert mirrored.is_winding_consistent

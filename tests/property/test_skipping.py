@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.model.interfaces import Commands, Controller, Measurement
+from digiclay.core.model.control_interface import Commands, Controller, Measurement
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import level
 from hypothesis import example, given, settings

@@ -10,7 +10,7 @@ from digiclay.core.scene.scene_source import find as sample
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session.run_scene import run
 from digiclay.core.surface.features import Feature, find
-from digiclay.core.surface.formed import of_history
+from digiclay.core.surface.formed import make_formed
 from digiclay.core.surface.skin_grid import fit_skin
 
 
@@ -25,7 +25,7 @@ def history() -> dict[str, Any]:
 def features(history: dict[str, Any], time: float, former: float) -> list[Feature]:
     """Return what was formed between two times, s."""
     row, before = (int(np.argmin(np.abs(history["time"] - moment))) for moment in (time, former))
-    return find(fit_skin(of_history(history, row, before), "bilinear", 1, 1e-3))
+    return find(fit_skin(make_formed(history, row, before), "bilinear", 1, 1e-3))
 
 
 def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley(history):

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Measurement, Commands
+from ..model.control_interface import Measurement, Commands
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
 
@@ -45,7 +45,7 @@ class SpongeControl(CellwiseControl):
     rows = 1
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let pressed cells sink, and the others swell; see `interfaces.Controller`."""
+        """Let pressed cells sink, and the others swell; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         pressed = seen.force >= known.felt_force
         seen.own[0] = np.where(pressed, seen.own[0] + 1.0, 0.0)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.interfaces import Commands, Measurement
+from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 

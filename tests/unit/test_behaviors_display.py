@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.named_shapes import SHAPES
-from digiclay.core.model.interfaces import Measurement
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve

@@ -12,7 +12,7 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.control.cell_states import CellStates, CellStatesControl, Patch
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.interfaces import Commands, Measurement
+from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Grid, Layout, grid
 
 REST = 40e-3

@@ -1,4 +1,4 @@
-"""The lint rule for docstrings: which functions it takes, what it asks for, its list that only shrinks."""
+"""The lint rule for docstrings: which functions it takes, and what it asks for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.docstrings import documented, kept, lacking, main, read, write
+from tools.docstrings import documented, lacking, main
 
 GOOD = '"""Turn.\n\n    Parameters\n    ----------\n    angle, speed : float\n        rad, rad/s.\n    """'
 SHORT = '"""Turn.\n\n    Parameters\n    ----------\n    angle : float\n        rad.\n    """'
@@ -67,24 +67,11 @@ def test_a_class_that_is_no_base_declares_nothing(tmp_path: Path) -> None:
     assert lacking(checkout(tmp_path, other + own)) == {("benchmarks/wheel.py", "Wheel.turn")}
 
 
-def test_the_list_follows_a_file_and_takes_no_new_function() -> None:
-    known = {("a.py", "turn"), ("a.py", "stop"), ("c.py", "turn")}
-    found = {("b.py", "turn"), ("c.py", "turn"), ("d.py", "turn"), ("d.py", "go")}
-    assert kept(found, known) == {("b.py", "turn"), ("c.py", "turn")}
-
-
-@pytest.mark.parametrize("gone", [{("benchmarks/wheel.py", "stop")}, set()])
-def test_the_check_fails_for_a_list_that_is_too_long_or_too_short(
-    gone: set[tuple[str, str]], tmp_path: Path
+def test_the_check_fails_for_a_function_without_the_section(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    root, listed = checkout(tmp_path, "def turn(angle, speed):\n    pass\n"), tmp_path / "listed.txt"
-    write(listed, gone | {("benchmarks/wheel.py", "turn")})
-    assert main([], root, listed) == bool(gone)
-    write(listed, gone)
-    assert main([], root, listed) == 1
-
-
-def test_what_is_documented_is_taken_out_of_the_list(tmp_path: Path) -> None:
-    root, listed = checkout(tmp_path, f"def turn(angle, speed):\n    {GOOD}\n"), tmp_path / "listed.txt"
-    write(listed, {("benchmarks/wheel.py", "turn")})
-    assert (main(["--write"], root, listed), read(listed)) == (0, set())
+    root = checkout(tmp_path, "def turn(angle, speed):\n    pass\n")
+    assert main(root) == 1
+    assert capsys.readouterr().out.startswith("benchmarks/wheel.py: turn: ")
+    (tmp_path / "benchmarks" / "wheel.py").write_text(f"def turn(angle, speed):\n    {GOOD}\n")
+    assert main(root) == 0

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.mesh_io import mesh_writer
-from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.surface.body import Body, volume
+from digiclay.core.surface.body import Body, compute_volume
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
 
@@ -36,7 +36,7 @@ def formed() -> Formed:
 
 @pytest.fixture
 def solid(formed: Formed) -> list[Body]:
-    return bodies(formed, Model())
+    return make_bodies(formed, Model())
 
 
 def path_for(folder: Path, kind: str) -> Path:
@@ -61,7 +61,7 @@ def test_trimesh_reads_back_a_watertight_solid_in_millimeters(solid, tmp_path, k
     assert read.is_watertight
     assert read.is_winding_consistent
     # 1e-6: each vertex is off by 1e-7 of its coordinates at most.
-    assert read.volume == pytest.approx(volume(solid[0]) * 1e9, rel=1e-6)
+    assert read.volume == pytest.approx(compute_volume(solid[0]) * 1e9, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", PLAIN)
@@ -86,18 +86,20 @@ def test_a_glb_is_in_meters_and_y_up_whatever_the_unit(solid, tmp_path, unit):
 def test_a_glb_keeps_its_outside_outside(solid, tmp_path):
     read = trimesh.load_mesh(mesh_writer.write(solid, tmp_path / "surface.glb"))
     assert read.is_watertight
-    assert read.volume == pytest.approx(volume(solid[0]), rel=1e-6)  # float32; a mirrored one is negative
+    assert read.volume == pytest.approx(
+        compute_volume(solid[0]), rel=1e-6
+    )  # float32; a mirrored one is negative
 
 
 def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
-    made = bodies(formed, Model(kind="features"), Finding(smallest=1))
+    made = make_bodies(formed, Model(kind="features"), Finding(smallest=1))
     scene = trimesh.load_scene(mesh_writer.write(made, tmp_path / "features.glb"))
     assert len(made) > 2
     assert set(scene.graph.nodes_geometry) == {body.name for body in made}
 
 
 def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_path):
-    made = bodies(formed, Model(kind="features"), Finding(smallest=1))
+    made = make_bodies(formed, Model(kind="features"), Finding(smallest=1))
     for unit, factor in (("mm", 1e3), ("m", 1.0)):
         path = mesh_writer.write(made, tmp_path / "features.3mf", unit=unit)
         model = lib3mf.Wrapper().CreateModel()
@@ -119,13 +121,13 @@ def test_a_3mf_names_its_unit_and_has_an_object_for_each_feature(formed, tmp_pat
 
 
 def test_a_3mf_says_of_an_open_skin_that_it_is_a_surface(formed, tmp_path):
-    path = mesh_writer.write(bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
+    path = mesh_writer.write(make_bodies(formed, Model(kind="surface")), tmp_path / "skin.3mf")
     with zipfile.ZipFile(path) as archive:
         assert b'type="surface"' in archive.read("3D/3dmodel.model")
 
 
 def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
-    made = bodies(formed, Model(), Finding(smallest=1))
+    made = make_bodies(formed, Model(), Finding(smallest=1))
     path = mesh_writer.write(made, tmp_path / "surface.obj")
     groups = [line.split()[1] for line in path.read_text().splitlines() if line.startswith("g ")]
     assert groups == ["rest", *made[0].groups]

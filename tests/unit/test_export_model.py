@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.mesh_io.export_model import KINDS, Model, bodies
+from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.surface.body import NO_PIN, Body, volume
+from digiclay.core.surface.body import NO_PIN, Body, compute_volume
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import Formed, of_history
+from digiclay.core.surface.formed import Formed, make_formed
 
 from tests.prisms import prism_volume
 
@@ -34,27 +34,27 @@ def mesh(body: Body) -> trimesh.Trimesh:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight(kind, arrangement, skin):
-    for body in bodies(formed(arrangement), Model(kind=kind, skin=skin), Finding()):
+    for body in make_bodies(formed(arrangement), Model(kind=kind, skin=skin), Finding()):
         made = mesh(body)
         assert made.is_watertight == body.closed == (kind != "surface")
         assert made.is_winding_consistent
         if body.closed:
             assert made.volume > 0.0
-            assert volume(body) == pytest.approx(made.volume, rel=1e-9)
+            assert compute_volume(body) == pytest.approx(made.volume, rel=1e-9)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_the_solid_of_the_bilinear_skin_has_the_volume_of_its_prisms(arrangement):
     bed = formed(arrangement)
-    (body,) = bodies(bed, Model())
+    (body,) = make_bodies(bed, Model())
     known = prism_volume(bed.position, bed.height, bed.rows, bed.columns)
-    assert volume(body) == pytest.approx(known, rel=1e-9)
+    assert compute_volume(body) == pytest.approx(known, rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_vertex_knows_height_force_and_mode(kind):
     bed = formed()
-    for body in bodies(bed, Model(kind=kind)):
+    for body in make_bodies(bed, Model(kind=kind)):
         assert tuple(body.values) == ("height", "force", "mode")
         np.testing.assert_array_equal(body.values["height"], body.vertices[:, 2])
         assert set(np.unique(body.values["mode"])) <= {NO_PIN, *range(8)}
@@ -64,14 +64,14 @@ def test_every_vertex_knows_height_force_and_mode(kind):
 @pytest.mark.parametrize("kind", ["surface", "solid", "pins"])
 def test_the_pin_tops_have_the_values_of_their_pins(kind):
     bed = formed()
-    (body,) = bodies(bed, Model(kind=kind))
+    (body,) = make_bodies(bed, Model(kind=kind))
     np.testing.assert_array_equal(body.values["force"][:168], bed.force)
     np.testing.assert_array_equal(body.values["mode"][:168], bed.mode)
 
 
 def test_all_of_a_pins_top_has_the_values_of_that_pin():
     place, steps = formed().position, np.random.default_rng(4).permutation(168)
-    (body,) = bodies(Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins"))
+    (body,) = make_bodies(Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins"))
     over = body.values["mode"] != NO_PIN
     assert over.sum() > 4 * 168
     # Each height is that of one pin, and its force is a hundredth of the steps it is up.
@@ -81,7 +81,7 @@ def test_all_of_a_pins_top_has_the_values_of_that_pin():
 
 @pytest.mark.parametrize("kind", ["solid", "pins"])
 def test_the_base_belongs_to_no_pin(kind):
-    (body,) = bodies(formed(), Model(kind=kind))
+    (body,) = make_bodies(formed(), Model(kind=kind))
     base = body.vertices[:, 2] == body.vertices[:, 2].min()
     assert base.any()
     assert set(body.values["mode"][base]) == {NO_PIN}
@@ -92,7 +92,7 @@ def test_the_base_belongs_to_no_pin(kind):
 @pytest.mark.parametrize("parts", [1, 3])
 def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
     bed = formed()
-    (body,) = bodies(bed, Model(kind=kind, resolution=parts), Finding())
+    (body,) = make_bodies(bed, Model(kind=kind, resolution=parts), Finding())
     assert body.groups == ("boss_1", "crease_1")
     assert len(body.group) == len(body.faces)
     middle = body.vertices[body.faces].mean(axis=1)
@@ -103,25 +103,25 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
 
 
 def test_without_a_search_there_are_no_groups():
-    (body,) = bodies(formed(), Model())
+    (body,) = make_bodies(formed(), Model())
     assert (body.groups, body.group.size) == ((), 0)
 
 
 def test_features_are_bodies_of_their_own_name():
-    assert [body.name for body in bodies(formed(), Model(kind="features"))] == ["boss_1", "crease_1"]
+    assert [body.name for body in make_bodies(formed(), Model(kind="features"))] == ["boss_1", "crease_1"]
 
 
 def test_a_surface_without_features_says_what_was_looked_for():
     place = formed().position
     with pytest.raises(OutputError, match=r"no feature of at least 3 pins more than 0\.5 mm off the former"):
-        bodies(Formed.of(place, np.full(168, 0.04), 0.04, 0.0, 0), Model(kind="features"))
+        make_bodies(Formed.of(place, np.full(168, 0.04), 0.04, 0.0, 0), Model(kind="features"))
 
 
 def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
     place = grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
     with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
-        bodies(bed, Model(resolution=40))
+        make_bodies(bed, Model(resolution=40))
 
 
 @pytest.mark.parametrize(
@@ -148,15 +148,15 @@ def history() -> dict[str, np.ndarray]:
 
 
 def test_the_former_surface_is_a_row_or_one_height():
-    np.testing.assert_allclose(of_history(history(), -1, 0).raised, formed().raised)
-    np.testing.assert_allclose(of_history(history(), -1, 0.035).raised, formed().raised + 0.005, atol=1e-15)
-    assert not of_history(history(), 1, 1).raised.any()
+    np.testing.assert_allclose(make_formed(history(), -1, 0).raised, formed().raised)
+    np.testing.assert_allclose(make_formed(history(), -1, 0.035).raised, formed().raised + 0.005, atol=1e-15)
+    assert not make_formed(history(), 1, 1).raised.any()
 
 
 @pytest.mark.parametrize(("row", "former"), [(2, 0), (-3, 0), (0, 2), (0, -3)])
 def test_a_row_the_history_does_not_have_is_refused(row, former):
     with pytest.raises(OutputError, match=r"^The history has 2 rows, 0 to 1 \(got -?\d as (row|former)\)\.$"):
-        of_history(history(), row, former)
+        make_formed(history(), row, former)
 
 
 @pytest.mark.parametrize("name", ["height", "former", "force"])

@@ -14,7 +14,7 @@ import pytest
 from digiclay.core.base import whole_files
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.mesh_io import mesh_writer
-from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.model.layout import Layout, grid
 from digiclay.core.surface.body import Body
 from digiclay.core.surface.formed import Formed
@@ -25,7 +25,7 @@ from tests.timeouts import TIMEOUT
 @pytest.fixture
 def solid() -> list[Body]:
     bed = grid(Layout(rows=7, columns=5, arrangement="hexagonal"))
-    return bodies(Formed.of(bed.positions, 0.04 + 0.3 * bed.x**2, 0.04, 0.0, 0), Model())
+    return make_bodies(Formed.of(bed.positions, 0.04 + 0.3 * bed.x**2, 0.04, 0.0, 0), Model())
 
 
 @pytest.mark.parametrize("name", ["surface.step", "surface", "stl"])
@@ -97,7 +97,7 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
         path.write_bytes(b"older")
         bed = grid(Layout(rows=60, columns=60))
         random = np.random.default_rng(1).uniform(0.03, 0.06, 3600)  # does not deflate into 64 kB
-        made = bodies(Formed.of(bed.positions, random, 0.04, 0.0, 0), Model())
+        made = make_bodies(Formed.of(bed.positions, random, 0.04, 0.0, 0), Model())
         with pytest.raises(OutputError, match=r"^Cannot write .*: No space left on device\.$"):
             mesh_writer.write(made, path, kind=kind)
         assert [one.name for one in disk.iterdir()] == [path.name]
@@ -121,7 +121,7 @@ def test_exporting_needs_numpy_alone():
         "import sys; sys.modules['trimesh'] = None\n"
         "from digiclay.core.mesh_io import export_model\nfrom digiclay.core.surface import formed\n"
         "bed = formed.Formed.of([[0, 0], [1, 0], [0, 1], [1, 1]], [1, 1, 1, 2], 1, 0, 0)\n"
-        "print(len(export_model.bodies(bed, export_model.Model())[0].faces))\n"
+        "print(len(export_model.make_bodies(bed, export_model.Model())[0].faces))\n"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(

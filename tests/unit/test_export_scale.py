@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.surface.body import PIECE
 
 from benchmarks.__main__ import main
@@ -30,7 +30,7 @@ def test_memory_grows_no_faster_than_the_bed():
 def test_the_benchmarks_bed_has_bosses_and_creases_to_be_found():
     from digiclay.core.surface.features import Finding
 
-    names = {body.name.split("_")[0] for body in bodies(formed(60), Model(kind="features"), Finding())}
+    names = {body.name.split("_")[0] for body in make_bodies(formed(60), Model(kind="features"), Finding())}
     assert names == {"boss", "crease"}
 
 

@@ -189,7 +189,7 @@ def test_the_parts_of_a_boss_share_its_pins_area_and_volume(
     whole = np.flatnonzero(bed.raised > Finding().threshold)
     np.testing.assert_array_equal(np.sort(np.concatenate([one.pins for one in parts])), whole)
     # Without what divides them: saddles and mounds as deep as nothing here is.
-    place = np.concatenate([one.region.place[one.region.faces] for one in parts])
+    place = np.concatenate([one.region.position[one.region.faces] for one in parts])
     assert sum(one.area for one in parts) == pytest.approx(area(place), rel=1e-9)
     (undivided,) = find(fit_skin(bed, "bilinear", 1, 1e-3), Finding(smallest=len(whole) // 2 + 1))
     # The smaller parts have too few pins then.

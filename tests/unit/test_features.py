@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, grid
-from digiclay.core.surface.feature_solids import solid
-from digiclay.core.surface.features import Feature, Finding, find, summary, table
+from digiclay.core.surface.feature_solids import make_feature_solid
+from digiclay.core.surface.features import Feature, Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skin_grid import fit_skin
 
@@ -127,7 +127,7 @@ def test_features_are_numbered_by_volume_bosses_first():
     found = features(formed(three))
     assert [one.name for one in found] == ["boss_1", "boss_2", "crease_1"]
     assert found[0].volume > found[1].volume
-    assert summary(found) == "2 bosses and 1 crease"
+    assert summarize(found) == "2 bosses and 1 crease"
 
 
 def test_features_are_measured_from_the_surface_as_it_was():
@@ -165,15 +165,15 @@ def test_neighbors_exactly_at_the_threshold_leave_no_triangle_without_area():
     height[[6, 7, 8, 9, 11, 14, 16, 17, 18, 19]] = 0.5
     height[[12, 13]] = 2.0
     (boss,) = features(Formed.of(place, height, 0.0, 0.0, 0), Finding(threshold=0.5, smallest=1))
-    a, b, c = np.moveaxis(boss.region.place[boss.region.faces], 1, 0)
+    a, b, c = np.moveaxis(boss.region.position[boss.region.faces], 1, 0)
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of rounding.
     assert area.min() > 1e-4 * 0.5 * 9e-6
-    assert len(np.unique(boss.region.place, axis=0)) == len(boss.region.place)
+    assert len(np.unique(boss.region.position, axis=0)) == len(boss.region.position)
 
 
 def test_the_table_is_in_millimeters():
-    head, row = table(features(formed(lambda x, y: ridge(x, y))))
+    head, row = make_table(features(formed(lambda x, y: ridge(x, y))))
     assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     assert row[:2] == ("boss_1", "ridge")
     assert row[4] == "6.00"
@@ -206,7 +206,7 @@ def test_every_body_is_closed_and_of_the_volume_that_is_listed(arrangement, seed
     found = features(rough(seed, arrangement), Finding(threshold=0.3e-3, smallest=1))
     assert len(found) > 2
     for one in found:
-        body = solid(one)
+        body = make_feature_solid(one)
         mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
         _, counts = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
         assert set(counts) == {2}
@@ -219,9 +219,9 @@ def test_every_body_is_closed_and_of_the_volume_that_is_listed(arrangement, seed
 def test_bodies_follow_the_skin_that_is_asked_for(skin):
     bed = formed(lambda x, y: ridge(x, y), rows=21, columns=21, pitch=2e-3)
     (coarse,), (fine,) = features(bed), features(bed, skin=skin, parts=4)
-    mesh = trimesh.Trimesh(solid(fine).vertices, solid(fine).faces, process=False)
+    mesh = trimesh.Trimesh(make_feature_solid(fine).vertices, make_feature_solid(fine).faces, process=False)
     assert mesh.is_watertight
-    assert len(mesh.faces) > 8 * len(solid(coarse).faces)
+    assert len(mesh.faces) > 8 * len(make_feature_solid(coarse).faces)
     # Top and bottom of every point are the skin now and before.
     assert mesh.bounds[0, 2] == pytest.approx(LEVEL, abs=1e-12)
     assert mesh.bounds[1, 2] == pytest.approx(LEVEL + fine.extreme, abs=1e-12)

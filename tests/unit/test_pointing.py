@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, matrices, underside
 from digiclay.core.model.layout import Grid, Layout, grid
-from digiclay.core.surface.pointing import ground, meeting, patch, ray
-from hypothesis import given
+from digiclay.core.surface.pointing import (
+    find_contact_outline,
+    find_ground_height,
+    find_ray,
+    intersect_surface,
+)
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -25,10 +30,11 @@ def test_a_ray_from_above_meets_each_pin_on_its_top(arrangement: str) -> None:
     cells, height = bed(arrangement)
     for cell in range(cells.count):
         origin = np.array([cells.x[cell], cells.y[cell], 1.0])
-        found = meeting(cells, height, origin, 3.0 * DOWN)
+        found = intersect_surface(cells, height, origin, 3.0 * DOWN)
         np.testing.assert_allclose(found, [*origin[:2], height[cell]], rtol=0, atol=1e-12)
 
 
+@example(turn=5e-324, slope=-1.0, x=0.0, y=0.0)
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, -0.05), st.floats(-0.015, 0.015), st.floats(-0.012, 0.012))
 def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one(
     turn: float, slope: float, x: float, y: float
@@ -36,7 +42,7 @@ def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one
     cells, height = bed("staggered")
     direction = np.array([np.cos(turn) * np.cos(slope), np.sin(turn) * np.cos(slope), np.sin(slope)])
     origin = np.array([x, y, 0.04]) - 0.3 * direction
-    found = meeting(cells, height, origin, direction)
+    found = intersect_surface(cells, height, origin, direction)
     assert found is not None
     assert found[2] <= height.max() + 1e-12
     # Looked at a hundred times as finely, over the bed alone.
@@ -53,16 +59,16 @@ def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one
 def test_a_ray_that_passes_by_meets_nothing() -> None:
     cells, height = bed()
     aside = np.array([1.0, 0.0, 1.0])
-    assert meeting(cells, height, aside, DOWN) is None
-    assert meeting(cells, height, np.array([0.0, 0.0, 1.0]), -DOWN) is None
-    assert meeting(cells, height, np.array([-1.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])) is None
+    assert intersect_surface(cells, height, aside, DOWN) is None
+    assert intersect_surface(cells, height, np.array([0.0, 0.0, 1.0]), -DOWN) is None
+    assert intersect_surface(cells, height, np.array([-1.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])) is None
 
 
 @pytest.mark.parametrize("bad", [[0.0, 0.0, 0.0], [np.nan, 0.0, -1.0], [0.0, np.inf, -1.0]])
 def test_what_is_no_ray_meets_nothing(bad: list[float]) -> None:
     cells, height = bed()
-    assert meeting(cells, height, np.array([0.0, 0.0, 1.0]), np.array(bad)) is None
-    assert meeting(cells, height, np.array(bad) * np.nan, DOWN) is None
+    assert intersect_surface(cells, height, np.array([0.0, 0.0, 1.0]), np.array(bad)) is None
+    assert intersect_surface(cells, height, np.array(bad) * np.nan, DOWN) is None
 
 
 def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out() -> None:
@@ -71,14 +77,14 @@ def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out() -
     cell = 5 * 15 + 7
     height[cell] = 0.06
     origin = np.array([-1.0, cells.y[cell], 0.05])
-    found = meeting(cells, height, origin, np.array([1.0, 0.0, 0.0]))
+    found = intersect_surface(cells, height, origin, np.array([1.0, 0.0, 0.0]))
     # To a quarter of a pitch of the pin's side.
     assert found[0] == pytest.approx(cells.x[cell] - 1.5e-3, abs=0.76e-3)
 
 
 def test_one_pin_alone_is_a_bed_too() -> None:
     cells = grid(Layout(rows=1, columns=1))
-    found = meeting(cells, np.array([0.04]), np.array([1e-3, -1e-3, 1.0]), DOWN)
+    found = intersect_surface(cells, np.array([0.04]), np.array([1e-3, -1e-3, 1.0]), DOWN)
     np.testing.assert_allclose(found, [1e-3, -1e-3, 0.04], rtol=0, atol=1e-12)
 
 
@@ -96,7 +102,7 @@ def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None
     seen[:3, 3] = 1.0, -2.0, -15.0
     for place in ([0.0, 0.0, 0.0], [0.3, -0.2, 0.5], [-1.0, 1.0, 0.1]):
         clip = projection @ seen @ [*place, 1.0]
-        origin, way = ray(projection, seen, clip[:2] / clip[3])
+        origin, way = find_ray(projection, seen, clip[:2] / clip[3])
         along = (place - origin) @ way
         assert along > 0.0
         # Twelve digits of the distance from where the ray begins.
@@ -106,8 +112,8 @@ def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None
 def test_the_ground_is_the_mean_of_the_pins_within_reach_and_the_nearest_beside_the_bed() -> None:
     cells, height = bed()
     near = np.hypot(cells.x - 1e-3, cells.y) <= 5e-3
-    assert ground(cells, height, 1e-3, 0.0, 5e-3) == pytest.approx(height[near].mean(), rel=1e-12)
-    assert ground(cells, height, 9.0, 9.0, 5e-3) == height[-1]
+    assert find_ground_height(cells, height, 1e-3, 0.0, 5e-3) == pytest.approx(height[near].mean(), rel=1e-12)
+    assert find_ground_height(cells, height, 9.0, 9.0, 5e-3) == height[-1]
 
 
 @pytest.mark.parametrize("turn", [LEVEL, (0.9, 0.3, -0.2, 0.25), (0.7, 0.0, 0.0, 0.7)])
@@ -117,7 +123,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
     finger, depth = Fingertip(), 1.2e-3
     pose = np.array([0.0, 0.0, 0.0, *turn])
     outline = finger.outline(pose[None])
-    rim = patch(finger, np.array(turn), depth)
+    rim = find_contact_outline(finger, np.array(turn), depth)
     x, y = rim.T
     place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     height = underside(*forms(outline), place)[0]
@@ -126,7 +132,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
 
 @pytest.mark.parametrize("depth", [-1.0, 0.0, 0.05, np.inf])
 def test_the_patch_never_leaves_the_finger(depth: float) -> None:
-    rim = patch(Fingertip(), np.array(LEVEL), depth)
+    rim = find_contact_outline(Fingertip(), np.array(LEVEL), depth)
     radius = np.hypot(rim[:, 0] / 10e-3, rim[:, 1] / 8e-3)
     # The root of a rounding error of 1e-16 is 1e-8.
     np.testing.assert_allclose(radius, 1.0 if depth > 0.0 else 0.0, rtol=0, atol=1e-7)
@@ -134,7 +140,9 @@ def test_the_patch_never_leaves_the_finger(depth: float) -> None:
 
 def test_a_finger_that_is_not_pressed_in_has_the_patch_of_its_lowest_point() -> None:
     tilted = np.array([0.9, 0.3, -0.2, 0.25])
-    np.testing.assert_array_equal(patch(Fingertip(), tilted, -0.01), patch(Fingertip(), tilted, 0.0))
+    np.testing.assert_array_equal(
+        find_contact_outline(Fingertip(), tilted, -0.01), find_contact_outline(Fingertip(), tilted, 0.0)
+    )
 
 
 def test_the_matrices_of_quaternions_turn_a_finger_about() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.mesh_io.export_model import Model, bodies
+from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Grid, Layout, grid
@@ -34,7 +34,7 @@ def bed(pitch: float, arrangement: str) -> tuple[Grid, Formed]:
 
 def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str, unit: str = "mm") -> Fitted:
     """Write a surface, and lay the file onto the bed it came from."""
-    write(bodies(formed, model), path, unit, format)
+    write(make_bodies(formed, model), path, unit, format)
     shape = Shape(file=str(path), fit="placed", unit="auto" if format in ("glb", "3mf") else unit)
     return fitted(shape, read(shape), cells, Actuator())
 
@@ -71,7 +71,7 @@ def test_a_file_in_meters_comes_back_too(tmp_path: Path, format: str) -> None:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement: str) -> None:
     cells, formed = bed(2.3, arrangement)
-    (body,) = bodies(formed, Model(kind="surface"))
+    (body,) = make_bodies(formed, Model(kind="surface"))
     rounded = np.array([[float(f"{value * 1e3:.6g}") for value in row] for row in body.vertices])
     tops = shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
     assert tops.covered.all()

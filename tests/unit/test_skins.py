@@ -37,8 +37,8 @@ def covered(formed: Formed, skin: str, parts: int) -> SurfaceGrid:
 def test_a_skin_passes_through_every_pin_top_to_a_micrometer(skin, arrangement, parts):
     formed = bed(arrangement)
     sheet = covered(formed, skin, parts)
-    assert len(sheet.place) == (6 * parts + 1) * (8 * parts + 1)
-    np.testing.assert_allclose(sheet.place[sheet.pins], formed.position, rtol=0.0, atol=ROUNDING)
+    assert len(sheet.position) == (6 * parts + 1) * (8 * parts + 1)
+    np.testing.assert_allclose(sheet.position[sheet.pins], formed.position, rtol=0.0, atol=ROUNDING)
     np.testing.assert_allclose(sheet.height[sheet.pins], formed.height, rtol=0.0, atol=1e-6)
 
 
@@ -68,7 +68,7 @@ def test_a_tilted_bed_has_a_plane_skin(skin, arrangement):
     place = bed(arrangement).position
     tilted = Formed.of(place, 0.04 + place @ (0.3, -0.2), 0.04, 0.0, 0)
     sheet = covered(tilted, skin, 4)
-    np.testing.assert_allclose(sheet.height, 0.04 + sheet.place @ (0.3, -0.2), rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(sheet.height, 0.04 + sheet.position @ (0.3, -0.2), rtol=0.0, atol=ROUNDING)
 
 
 def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
@@ -77,7 +77,7 @@ def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
     x, y = formed.position[:9, 0], formed.position[::9, 1]
     known = RegularGridInterpolator((y, x), formed.height.reshape(7, 9))
     # Points of the edge may be a rounding error outside.
-    inside = np.clip(sheet.place, formed.position.min(axis=0), formed.position.max(axis=0))
+    inside = np.clip(sheet.position, formed.position.min(axis=0), formed.position.max(axis=0))
     np.testing.assert_allclose(sheet.height, known(inside[:, ::-1]), rtol=0.0, atol=1e-14)
 
 
@@ -88,7 +88,7 @@ def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay
     place = formed.position * (-1.0 if mirrored else 1.0, 1.0)
     sheet = covered(Formed.of(place, formed.height, 0.04, 0.0, 0), "bilinear", 4)
     # In mm, because of Delaunay's own tolerances.
-    known = LinearNDInterpolator(Delaunay(place * 1e3), formed.height)(sheet.place * 1e3)
+    known = LinearNDInterpolator(Delaunay(place * 1e3), formed.height)(sheet.position * 1e3)
     compared = np.isfinite(known)
     # At the zig-zag ends the hull has triangles that the bed has not, but no point of ours lies in them.
     assert compared.mean() > 0.95
@@ -102,11 +102,11 @@ def test_the_smooth_skin_is_scipys_monotone_splines_along_and_then_across_the_ro
     x, y = formed.position[:, 0].reshape(7, 9), formed.position[::9, 1]
     height = formed.height.reshape(7, 9)
     # Beside the zig-zag ends of a shifted bed the skin is held between the pins, which SciPy's is not.
-    within = (sheet.place[:, 0] >= x[:, 0].max()) & (sheet.place[:, 0] <= x[:, -1].min())
+    within = (sheet.position[:, 0] >= x[:, 0].max()) & (sheet.position[:, 0] <= x[:, -1].min())
     points = np.flatnonzero(within)[::7]
     assert len(points) > 50
     for point in points:
-        at_x, at_y = sheet.place[point]
+        at_x, at_y = sheet.position[point]
         along = [PchipInterpolator(x[row], height[row])(at_x) for row in range(7)]
         assert sheet.height[point] == pytest.approx(PchipInterpolator(y, along)(at_y), abs=1e-14)
 
@@ -130,7 +130,7 @@ def test_a_skin_is_nowhere_above_or_below_the_pins_about_it(skin, arrangement):
     sheet = covered(formed, skin, 4)
     # The pins of the own cell and the cells beside it: a line between two shifted rows has its neighbors
     # in either of them.
-    away = np.linalg.norm(sheet.place[:, None] - formed.position, axis=2)
+    away = np.linalg.norm(sheet.position[:, None] - formed.position, axis=2)
     near = away <= 1.6 * formed.pitch
     lowest = np.where(near, formed.height, np.inf).min(axis=1)
     highest = np.where(near, formed.height, -np.inf).max(axis=1)
@@ -152,7 +152,7 @@ def test_the_membrane_lies_on_the_flat_ends_and_is_harmonic_between_them():
     formed = bed(rows=4, columns=5)
     sheet = covered(formed, "membrane", 6)
     rows, columns = sheet.rows, sheet.columns
-    away = np.linalg.norm(sheet.place[:, None] - formed.position, axis=2)
+    away = np.linalg.norm(sheet.position[:, None] - formed.position, axis=2)
     pin = np.argmin(away, axis=1)
     fixed = away.min(axis=1) <= CAP * (1 + 1e-9)
     np.testing.assert_array_equal(sheet.height[fixed], formed.height[pin[fixed]])
@@ -173,7 +173,7 @@ def test_a_mirrored_bed_has_the_mirrored_skin(skin, arrangement):
     formed = bed(arrangement)
     mirrored = Formed.of(formed.position * (-1.0, 1.0), formed.height, 0.04, 0.0, 0)
     one, other = covered(formed, skin, 3), covered(mirrored, skin, 3)
-    np.testing.assert_allclose(other.place, one.place * (-1.0, 1.0), rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(other.position, one.position * (-1.0, 1.0), rtol=0.0, atol=ROUNDING)
     np.testing.assert_allclose(
         other.height, one.height, rtol=0.0, atol=5e-9
     )  # the membrane stops at 1 nm a point

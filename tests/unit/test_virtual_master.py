@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster, VirtualMasterControl
-from digiclay.core.model.interfaces import Measurement
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout
 
 from tests.assemble import make_basis, make_system, master

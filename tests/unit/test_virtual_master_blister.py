@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
-from digiclay.core.model.interfaces import Commands, Measurement
+from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, grid
 
 from tests.assemble import make_system, master, path, record

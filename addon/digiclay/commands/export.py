@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
 from ..core.base.run_folder import claim_files
-from ..core.mesh_io.export_model import KINDS, Model, bodies
+from ..core.mesh_io.export_model import KINDS, Model, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, known_format, suffix, write
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import read_run
 from ..core.surface.body import Body
 from ..core.surface.features import Finding
-from ..core.surface.formed import of_history
+from ..core.surface.formed import make_formed
 from .arguments import add_run, millimeters, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
@@ -102,7 +102,7 @@ def exported(
         By default the solid.
     """
     made = model or Model(cap=scene.actuator.bore / 2.0)
-    parts = bodies(of_history(history, row), made, Finding())
+    parts = make_bodies(make_formed(history, row), made, Finding())
     known = list(kinds)
     names = file_names(known, made.kind)
     return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, known, strict=True)]
@@ -115,8 +115,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     run = read_run(arguments.run, "height", "position", "force", "mode")
     refuse_what_has_no_surface(run.scene, "export")
     model, finding = model_of(arguments, run.scene, arguments.kind), finding_of(arguments)
-    formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
-    made = bodies(formed, model, finding)
+    formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
+    made = make_bodies(formed, model, finding)
     files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], made)]
     if arguments.separate:
         files = [(body.name, [body]) for body in made]

@@ -6,10 +6,10 @@ import argparse
 import json
 from typing import Any
 
-from ..core.mesh_io.export_model import features
+from ..core.mesh_io.export_model import find_features
 from ..core.session.finished_run import read_run
-from ..core.surface.features import summary, table
-from ..core.surface.formed import of_history
+from ..core.surface.features import make_table, summarize
+from ..core.surface.formed import make_formed
 from .arguments import add_run, seconds
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
@@ -41,15 +41,15 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """List the features."""
     run = read_run(arguments.run, "height", "position", "force", "mode")
     refuse_what_has_no_surface(run.scene, "features")
-    formed = of_history(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
-    found = features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
+    formed = make_formed(run.history, row_of(run, arguments.time), former_of(run, arguments.former))
+    found = find_features(formed, model_of(arguments, run.scene, "surface"), finding_of(arguments))
     if arguments.quiet:
         return 0
     if arguments.json:
         print(json.dumps([one.figures() for one in found], indent=1))
         return 0
-    print(summary(found))
+    print(summarize(found))
     if found:
-        head, *rows = table(found)
+        head, *rows = make_table(found)
         print("\n".join(aligned(head, rows)))
     return 0

@@ -22,7 +22,7 @@ def make_object(body: Body, name: str, *, smooth: bool) -> Any:
     Parameters
     ----------
     body : Body
-        With values, as `export_model.bodies` makes it.
+        With values, as `export_model.make_bodies` makes it.
     name : str
         Of the object and its mesh.
     smooth : bool

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "SYMMETRIES", "WAITING", "Mirror",
-    "Sample", "Stroke", "deepen", "draw", "start",
+    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "SHALLOWEST", "SYMMETRIES", "WAITING",
+    "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]

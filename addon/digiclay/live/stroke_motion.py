@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
-from ..core.surface.pointing import ground
+from ..core.surface.pointing import find_ground_height
 from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, Stroke
 
 __all__ = ["APPROACH", "DRAG", "SPEED", "follow"]
@@ -107,7 +107,7 @@ def _step(
         return (_finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
     if stroke.phase == DRAGGING:
         stroke, x, y = _drag(stroke, x, y, DRAG * period)
-    surface = ground(grid, height, x, y, finger.width / 2)
+    surface = find_ground_height(grid, height, x, y, finger.width / 2)
     # Pins bottom out on the bed's floor.
     lowest = max(0.0, surface - stroke.samples[stroke.reached].depth)
     z = _sink(z, surface, lowest, period)

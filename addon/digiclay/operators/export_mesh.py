@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
-from ..core.mesh_io.export_model import bodies
+from ..core.mesh_io.export_model import make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
@@ -92,7 +92,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
             self.file_format = _told_by(self.filepath) or self.file_format
         target = self._file()
         bed = chosen_bed(context)
-        made = bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
+        made = make_bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
         files = [(target, made)]
         if self.separate and self.kind == "features":
             ending = suffix(self.file_format)

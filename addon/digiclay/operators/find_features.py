@@ -3,8 +3,8 @@
 from typing import Any
 
 from ..compat import bpy
-from ..core.mesh_io.export_model import features
-from ..core.surface.features import summary
+from ..core.mesh_io.export_model import find_features
+from ..core.surface.features import summarize
 from ..exchange import formed_bed
 from ..panels.shape_exchange import LISTED
 from .mesh_options import FindingOptions, SurfaceAction, chosen_bed
@@ -23,8 +23,8 @@ class FindFeatures(FindingOptions, bpy.types.Operator):
     def perform(self, context: Any) -> None:
         """Find them."""
         bed = chosen_bed(context)
-        found = features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
-        lines = [summary(found)]
+        found = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), self.finding())
+        lines = [summarize(found)]
         for one in found:
             extreme = f"{one.extreme * 1e3:.1f} mm {'high' if one.kind == 'boss' else 'deep'}"
             crest = f", crest {one.crest_length * 1e3:.0f} mm" if one.crests else ""

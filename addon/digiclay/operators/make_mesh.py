@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.mesh_io.export_model import bodies
+from ..core.mesh_io.export_model import make_bodies
 from ..exchange import body_mesh, formed_bed
 from .add_bed import select_only
 from .mesh_options import SurfaceOptions, chosen_bed
@@ -50,7 +50,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         """Make the objects, and select them."""
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
-        made = bodies(formed, self.model(bed), self.finding())
+        made = make_bodies(formed, self.model(bed), self.finding())
         width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
         smooth = self.skin != "bilinear" and self.kind != "pins"
         where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()

@@ -103,7 +103,7 @@ class Press(Polled, bpy.types.Operator):
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Draw the stroke on; whatever is not for it goes on to Blender, to turn the view for instance."""
-        bed = _bed(self.uid)
+        bed = brush.find_bed(bpy.context, self.uid)
         session = running.find(bed)
         stroke = session and find_stroke(session, self.number)
         if stroke is None:
@@ -163,7 +163,7 @@ class Press(Polled, bpy.types.Operator):
 
     def _change(self, change: Any) -> None:
         """Put a changed stroke into the session's queue."""
-        session = running.find(_bed(self.uid))
+        session = running.find(brush.find_bed(bpy.context, self.uid))
         if session is not None:
             running.put(change_stroke(session, self.number, change))
 
@@ -191,11 +191,6 @@ class Press(Polled, bpy.types.Operator):
         """Give back the status bar."""
         status.clear()
         return result
-
-
-def _bed(uid: int) -> Any | None:
-    """Return the bed, fetched anew since undo invalidates what is kept, or None when it is deleted."""
-    return next((thing for thing in bpy.context.scene.objects if thing.session_uid == uid), None)
 
 
 def _session(context: Any, bed: Any) -> running.Running:

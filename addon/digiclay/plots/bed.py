@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.metrics.summary import in_contact
-from ..core.surface.skin_mesh import grid_shape, skin, solid
+from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 from .relief import fit_relief
 
@@ -47,7 +47,7 @@ def draw_map(axes: Any, history: History, title: str) -> None:
     if min(rows, columns) < 2:
         picture: Any = axes.scatter(*pins.T * MM, c=top * MM, marker="s", **scale)
     else:
-        faces = skin(pins, top, rows, columns)
+        faces = make_skin(pins, top, rows, columns)
         picture = axes.tripcolor(*pins.T * MM, faces, top * MM, shading="gouraud", **scale)
     size, middle = np.ptp(pins, axis=0) * MM, 0.5 * (pins.min(axis=0) + pins.max(axis=0)) * MM
     half = 0.5 * np.maximum(size, max(0.75 * size.max(), 1.0))  # a narrow bed gets room for its labels
@@ -98,7 +98,7 @@ def draw_relief(axes: Any, history: History) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     pins, top, rows, columns = _thinned(history)
-    vertices, faces = solid(pins * MM, top * MM, rows, columns, base_thickness=3.0)
+    vertices, faces = make_solid(pins * MM, top * MM, rows, columns, base_thickness=3.0)
     count = 2 * (rows - 1) * (columns - 1)
     over, walls = faces[:count], faces[2 * count :]
     bright = np.column_stack([vertices, _light(vertices, over)])[over]
@@ -136,7 +136,7 @@ def _quartered(corners: Floats) -> Floats:
 def _thinned(history: History) -> tuple[Floats, Floats, int, int]:
     """Return positions, final heights, rows and columns, of at most `RESOLVED` pins a side."""
     pins, top = array(history, "position"), array(history, "height")[-1]
-    rows, columns = grid_shape(pins)
+    rows, columns = find_grid_shape(pins)
     index = np.arange(rows * columns).reshape(rows, columns)
     index = index[:: -(-rows // RESOLVED), :: -(-columns // RESOLVED)]
     return pins[index.ravel()], top[index.ravel()], index.shape[0], index.shape[1]

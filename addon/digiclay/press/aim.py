@@ -12,7 +12,7 @@ from .. import bridge
 from ..bridge import SCALE
 from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, grid
-from ..core.surface.pointing import meeting, ray
+from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
 from ..live import running
 from ..settings import properties
@@ -111,7 +111,7 @@ def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[flo
         When the bed is not uniformly scaled.
     """
     origin, direction = _ray(context, bed, xy)
-    return meeting(cells, height, origin, direction)
+    return intersect_surface(cells, height, origin, direction)
 
 
 def project(context: Any, bed: Any, points: Floats) -> Floats:
@@ -138,5 +138,5 @@ def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Float
     lens = np.array(looking.window_matrix, np.float64)
     seen = np.array(looking.view_matrix, np.float64) @ np.array(bed.matrix_world, np.float64)
     screen = 2.0 * np.array(xy) / [region.width, region.height] - 1.0
-    origin, way = ray(lens, seen, screen)
+    origin, way = find_ray(lens, seen, screen)
     return origin / SCALE, way

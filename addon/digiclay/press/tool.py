@@ -10,22 +10,20 @@ import numpy as np
 from .. import bridge
 from ..compat import bpy
 from ..core.model.layout import Grid
-from ..core.surface.pointing import patch
+from ..core.surface.pointing import find_contact_outline
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
 from ..live.stroke import SYMMETRIES
-from ..overlay.picture import Line, Words
-from . import aim
-from .brush import OPERATOR, TOOL, describe_brush
+from ..settings import finger_size
+from . import aim, marks
+from .brush import ADJUSTING, OPERATOR, TOOL, bed_in_use, describe_brush
 from .drape import drape
+from .fingers import find_kind
 
 __all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
-
-#: Colors of the patch: a light line on a dark one is seen on everything.
-DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 
 
 def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
@@ -44,7 +42,7 @@ def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: f
         How deep it would be pressed, m.
     """
     tip = view.fingertip_of(bed)
-    rim = place[:2] + patch(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
+    rim = place[:2] + find_contact_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
     return drape(cells, height, rim)
 
 
@@ -54,6 +52,8 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
 
     region = context.region
     if region is None or region.type != "WINDOW" or context.mode != "OBJECT":
+        return
+    if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
     found = aim.find_target(context, (xy[0] - region.x, xy[1] - region.y))
     if found is None or view.fingertip_of(found.bed) is None:
@@ -70,26 +70,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
     text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), depth, settings.strength)
-    cursor(
-        [Line(points, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for points in shown],
-        label(text, xy, context.preferences.system.ui_scale),
-    )
-
-
-def label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
-    """Return text beside the cursor, light on a dark edge.
-
-    Parameters
-    ----------
-    text : str
-    xy : (float, float)
-        Of the cursor, pixels of the window.
-    scale : float
-        Of Blender's interface.
-    """
-    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
-    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
-    return [*edge, Words(x, y, size, LIGHT, text)]
+    cursor(marks.edge_lines(shown, width), marks.label(text, xy, context.preferences.system.ui_scale))
 
 
 def _trail(found: aim.Target) -> list[Floats]:
@@ -98,10 +79,16 @@ def _trail(found: aim.Target) -> list[Floats]:
     if session is None or not session.strokes:
         return []
     finger, pose = find_ellipsoid(session.scene), session.pose
-    rim = pose[:2] + patch(finger, pose[3:], float(found.height.max()) - pose[2])
+    rim = pose[:2] + find_contact_outline(finger, pose[3:], float(found.height.max()) - pose[2])
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
     return [drape(found.grid, found.height, way) for way in ways if len(way) > 1]
+
+
+def _scale_key(key: str, scalar: float) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Return the entry of the keymap by which a key scales the fingertip."""
+    event = {"type": key, "value": "PRESS", "repeat": True}
+    return "digiclay.press_scale", event, {"properties": [("scalar", scalar)]}
 
 
 class PressTool(bpy.types.WorkSpaceTool):
@@ -113,12 +100,17 @@ class PressTool(bpy.types.WorkSpaceTool):
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; Ctrl and the wheel, or Ctrl and drag, set how deep; a pen presses by itself"
+        "Drag to sculpt; F, Shift F and Ctrl F set size, depth and strength; a pen presses by itself"
     )
     bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
+        ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
+        ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
+        ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
+        _scale_key("LEFT_BRACKET", 1.0 / 1.1),
+        _scale_key("RIGHT_BRACKET", 1.1),
     )
     draw_cursor = staticmethod(_draw_cursor)
 
@@ -133,6 +125,13 @@ class PressTool(bpy.types.WorkSpaceTool):
         tool : bpy.types.WorkSpaceTool
         """
         settings = tool.operator_properties(OPERATOR)
+        bed = bed_in_use(context)
+        if bed is not None:
+            row = layout.row(align=True)
+            kind = find_kind(finger_size.read_finger(bed.digiclay))
+            row.menu("DIGICLAY_MT_fingers", text=kind.label if kind else "Finger")
+            row.prop(bed.digiclay, "size")
+            row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
         layout.prop(settings, "depth")
         layout.prop(settings, "strength")
         layout.prop(settings, "use_pressure")

@@ -14,7 +14,7 @@ from .own_presets import path
 if TYPE_CHECKING:
     from ..core.control.blister import Blister
 
-__all__ = ["change_layout", "make_scene"]
+__all__ = ["change_layout", "fit_blister", "make_scene"]
 
 
 def make_scene(preset: str, layout: Layout, method: str) -> Scene:
@@ -51,13 +51,18 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
     scene : Scene
     layout : Layout
     """
-    return replace(scene, layout=layout, blister=_fit_blister(scene.blister, layout))
+    blister = scene.blister and fit_blister(scene.blister, layout)
+    return replace(scene, layout=layout, blister=blister)
 
 
-def _fit_blister(blister: Blister | None, layout: Layout) -> Blister | None:
-    """Return a blister that is at most as wide as the longer side of a bed, in the same proportions."""
-    if blister is None:
-        return None
+def fit_blister(blister: Blister, layout: Layout) -> Blister:
+    """Return a blister that is at most as wide as the longer side of a bed, in the same proportions.
+
+    Parameters
+    ----------
+    blister : Blister or None
+    layout : Layout
+    """
     widest = max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 2
     if blister.radius <= widest:
         return blister

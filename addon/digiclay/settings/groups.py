@@ -13,6 +13,7 @@ from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
+from . import finger_size
 from .declared import Update, group, title
 from .table import assign, read, reset
 
@@ -172,6 +173,23 @@ SETTINGS = make_group(
         "own_preset": bpy.props.StringProperty(
             name="Own Preset", description="The custom preset that was applied last", options={"HIDDEN"}
         ),
+        "size": bpy.props.FloatProperty(
+            name="Size (mm)",
+            description="Width of the fingertip, in mm; its length and height change in proportion",
+            get=lambda settings: 1e3 * finger_size.read_size(settings),
+            set=lambda settings, value: finger_size.set_size(settings, 1e-3 * value),
+            min=1e3 * finger_size.SMALLEST,
+            max=1e3 * finger_size.LARGEST,
+            soft_max=60.0,
+            step=50,
+            precision=1,
+        ),
+        "blister_follows": bpy.props.BoolProperty(
+            name="Blister Follows",
+            description="Keep the size of the blister in proportion to that of the fingertip",
+            default=True,
+        ),
+        "blister_suits": bpy.props.FloatProperty(options={"HIDDEN"}),
         "notes": bpy.props.StringProperty(options={"HIDDEN"}),
         **use_properties(),
         **pointers({**GROUPS, "control": CONTROL}),

@@ -1,4 +1,4 @@
-"""Controllers of a batch as one controller, which is again a `interfaces.Controller`.
+"""Controllers of a batch as one controller, which is again a `Controller`.
 
 Its memory is a list, one memory a run; instead of a disc it gives a list of discs, or None where no run
 asks for one.
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..control.runs import BatchControl
-from ..model.interfaces import Commands, Controller, Measurement
+from ..model.control_interface import Commands, Controller, Measurement
 from .broadcasting import merge_parts
 
 __all__ = ["RunByRun", "join_controllers"]

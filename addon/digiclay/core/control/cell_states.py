@@ -19,7 +19,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from ..model.set_point import SetPoint
 from .blister import Blister
@@ -150,7 +150,7 @@ class CellStatesControl:
         return Patch()
 
     def locate(self, memory: Patch, touched: Measurement) -> tuple[Patch, tuple[float, float, float] | None]:
-        """Find where the finger presses, and how far its blister can reach; see `interfaces.Controller`."""
+        """Find where the finger presses, and how far its blister can reach; see `Controller`."""
         pressed = touched.force > self._least(touched.mode)
         if not any_true(pressed):
             return memory, None
@@ -167,7 +167,7 @@ class CellStatesControl:
         return memory._replace(x=x, y=y, heading=heading), (x, y, radius + self.blister.edge_radius)
 
     def command(self, memory: Patch, seen: Measurement) -> tuple[Patch, Commands]:
-        """Apply the transitions of every cell, then the control of its mode; see `interfaces.Controller`."""
+        """Apply the transitions of every cell, then the control of its mode; see `Controller`."""
         seen = seen._replace(force=suppress_noise(seen.force, self.floor)) if self.floor else seen
         mode = follow_arrows(seen.mode, BY_FORCE, self._by_force(seen))
         under = _under_finger(mode)

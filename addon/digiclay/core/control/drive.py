@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Measurement
+from ..model.control_interface import Measurement
 from ..model.physics import Cell
 from .methods import ControlParameters
 from .runs import BatchControl
@@ -145,7 +145,7 @@ class CellwiseControl(BatchControl):
         """Nothing to remember but the cells' own rows."""
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
-        """Request the cells near the fingertip and those in motion only; see `interfaces.Controller`."""
+        """Request the cells near the fingertip and those in motion only; see `Controller`."""
         return memory, None
 
 

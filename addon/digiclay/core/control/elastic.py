@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
@@ -42,7 +42,7 @@ class ElasticControl(CellwiseControl):
     name = "elastic"
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let pressed cells give way, and the others spring back; see `interfaces.Controller`."""
+        """Let pressed cells give way, and the others spring back; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
         pressed = seen.force >= known.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 from .named_shapes import FILE, check_shape, evaluate_shape, read_values
@@ -67,7 +67,7 @@ class ForceDisplayControl(CellwiseControl):
     rows = 1
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Control the force of touched cells and the height of the others; see `interfaces.Controller`."""
+        """Control the force of touched cells and the height of the others; see `Controller`."""
         known, rest = self.parameters, self.actuator.rest_height
         asked = take_cells(self.field, seen.cells)
         pressed = seen.force >= known.felt_force

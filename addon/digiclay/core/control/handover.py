@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.interfaces import Commands, Controller, Measurement
+from ..model.control_interface import Commands, Controller, Measurement
 from ..shapes.request import Shape
 from .device_info import DeviceInfo
 from .drive import DriveParameters
@@ -69,7 +69,7 @@ class Handover:
     def locate(
         self, memory: Handed, touched: Measurement
     ) -> tuple[Handed, tuple[float, float, float] | None]:
-        """Let the one whose turn it is look at the touched cells; see `interfaces.Controller`."""
+        """Let the one whose turn it is look at the touched cells; see `Controller`."""
         if not self.is_displayed(memory):
             progress, disc = self.display.locate(memory.display, touched)
             return memory._replace(display=progress), disc
@@ -79,7 +79,7 @@ class Handover:
         return memory._replace(method=known), disc
 
     def command(self, memory: Handed, seen: Measurement) -> tuple[Handed, Commands]:
-        """Let the one whose turn it is command the cells; see `interfaces.Controller`."""
+        """Let the one whose turn it is command the cells; see `Controller`."""
         if self.method is None or not self.is_displayed(memory):
             progress, orders = self.display.command(memory.display, seen)
             return memory._replace(display=progress), orders

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 
@@ -49,7 +49,7 @@ class PlasticControl(CellwiseControl):
     name = "plastic"
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Let cells give way that are pressed beyond yield, hold the others; see `interfaces.Controller`."""
+        """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
         known = self.parameters
         pressed = seen.force >= known.felt_force
         yielding = seen.force > known.yield_force

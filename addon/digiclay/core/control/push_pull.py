@@ -17,7 +17,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
@@ -95,7 +95,7 @@ class PushPullControl:
     def locate(
         self, memory: Listening, touched: Measurement
     ) -> tuple[Listening, tuple[float, float, float] | None]:
-        """Listen where a hand may be; see `interfaces.Controller`.
+        """Listen where a hand may be; see `Controller`.
 
         The far pins of a real bed would listen as well; a free pin that listens stays where it is, so
         they are left out.
@@ -109,7 +109,7 @@ class PushPullControl:
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
 
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
-        """Drag commanded heights along, and move every pin up or down; see `interfaces.Controller`."""
+        """Drag commanded heights along, and move every pin up or down; see `Controller`."""
         known, target = self.parameters, seen.target
         limit = memory.radius * memory.radius * (1.0 + ON_THE_SIDE) if memory.radius >= 0.0 else -1.0
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import Grid
 
 __all__ = ["Replay"]

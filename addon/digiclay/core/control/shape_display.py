@@ -13,7 +13,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
@@ -115,11 +115,11 @@ class ShapeDisplayControl:
     def locate(
         self, memory: Progress, touched: Measurement
     ) -> tuple[Progress, tuple[float, float, float] | None]:
-        """Request all cells during the moves; see `interfaces.Controller`."""
+        """Request all cells during the moves; see `Controller`."""
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Commands]:
-        """Set the heights of the move under way, and command every cell; see `interfaces.Controller`."""
+        """Set the heights of the move under way, and command every cell; see `Controller`."""
         rest, target = self.actuator.rest_height, seen.target
         if memory.move < len(self.moves):
             memory, target = self._make_moves(memory, seen)

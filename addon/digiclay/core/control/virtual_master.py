@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import any_true, constants, count_true
 from ..base.modes import Mode
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster
@@ -67,7 +67,7 @@ class VirtualMasterControl(MasterControl):
         return Master()
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
-        """Locate the finger and move the master; see `interfaces.Controller`."""
+        """Locate the finger and move the master; see `Controller`."""
         sums = self._sum_forces(memory, touched)
         if self._noisy:
             memory = self.follow(memory, *sums)
@@ -107,7 +107,7 @@ class VirtualMasterControl(MasterControl):
         return measure_excess(x, y, self.parameters.radius * (1.0 + ON_THE_SIDE), basis)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Create the blister, freeze what is left behind, command every cell; see `interfaces.Controller`."""
+        """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
         *limits, rest, band = constants(self._limits, target.shape)
         off = target - rest

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.interfaces import Commands, Measurement
+from ..model.control_interface import Commands, Measurement
 from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, TouchParameters, check_damping, make_drive, raise_felt_force
@@ -180,12 +180,12 @@ class ViscousControl:
         return Spot()
 
     def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, tuple[float, float, float] | None]:
-        """Request all displaced cells and a margin around them; see `interfaces.Controller`."""
+        """Request all displaced cells and a margin around them; see `Controller`."""
         spot = memory.around(touched.quadratic_basis[:, touched.force >= self.parameters.felt_force])
         return spot, spot.disc(self.margin)
 
     def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Commands]:
-        """Exchange, relax, and move every cell to its new height; see `interfaces.Controller`."""
+        """Exchange, relax, and move every cell to its new height; see `Controller`."""
         known, actuator = self.parameters, self.actuator
         cells, rest = seen.cells, actuator.rest_height
         pressed = seen.force >= known.felt_force

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import DivergenceError
+from ..model.control_interface import Measurement
 from ..model.fingertip import require_one
-from ..model.interfaces import Measurement, Movement, Truth
+from ..model.interfaces import Movement, Truth
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
 from .state import ActiveSet, CellGroup, State, at_rest

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.interfaces import Controller, Segment, Sensors, Stepper
+from ..model.control_interface import Controller
+from ..model.interfaces import Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
 from .active_set import Selection

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
 from ..surface.body import NO_PIN, Body, Floats, Indices
-from ..surface.feature_solids import solid as feature_solid
+from ..surface.feature_solids import make_feature_solid as feature_solid
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
-from ..surface.pins_solid import pins_solid
+from ..surface.pins_solid import make_pins_solid
 from ..surface.skin_grid import SurfaceGrid, fit_skin
-from ..surface.skin_mesh import BASE_THICKNESS, base_level, solid
+from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS
 
-__all__ = ["KINDS", "Model", "bodies", "features", "sheet"]
+__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_grid"]
 
 #: Kinds of mesh, by name, with what is said of them in the help.
 KINDS: dict[str, str] = {
@@ -55,7 +55,7 @@ class Model(Parameters):
         return self.resolution or (1 if self.skin == "bilinear" else CURVED)
 
 
-def sheet(formed: Formed, model: Model) -> SurfaceGrid:
+def make_grid(formed: Formed, model: Model) -> SurfaceGrid:
     """Return the skin of a model.
 
     Parameters
@@ -77,7 +77,7 @@ def sheet(formed: Formed, model: Model) -> SurfaceGrid:
     return fit_skin(formed, model.skin, model.parts, model.cap)
 
 
-def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
+def find_features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
     """Return the features of the skin of a model.
 
     Parameters
@@ -87,10 +87,10 @@ def features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
         Its skin and resolution.
     finding : Finding
     """
-    return find(sheet(formed, model), finding)
+    return find(make_grid(formed, model), finding)
 
 
-def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
+def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
     """Return the bodies of a model, in m.
 
     Parameters
@@ -108,7 +108,7 @@ def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list
     ParameterError
         When there would be too many points.
     """
-    skin = sheet(formed, model)
+    skin = make_grid(formed, model)
     if model.kind == "features":
         found = find(skin, finding)
         if not found:
@@ -129,20 +129,20 @@ def bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list
     return [_skin(skin, model, names, label)]
 
 
-def _skin(sheet: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indices) -> Body:
+def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indices) -> Body:
     """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
     if model.kind == "surface":
-        vertices, faces = np.column_stack([sheet.place, sheet.height]), sheet.faces
-        values = sheet.values()
+        vertices, faces = np.column_stack([grid.position, grid.height]), grid.faces
+        values = grid.values()
     else:
-        level = base_level(sheet.height, base_thickness=model.base_thickness)
-        vertices, faces = solid(sheet.place, sheet.height, sheet.rows, sheet.columns, base=level)
-        values = sheet.values_with_base(level)
+        level = find_base_level(grid.height, base_thickness=model.base_thickness)
+        vertices, faces = make_solid(grid.position, grid.height, grid.rows, grid.columns, base=level)
+        values = grid.values_with_base(level)
     group, vertex_group = np.empty((2, 0), np.int32)
     if names:
         group, vertex_group = np.zeros(len(faces), np.int32), np.zeros(len(vertices), np.int32)
-        over = faces[: 2 * (sheet.rows - 1) * (sheet.columns - 1)]
-        vertex_group[: len(sheet.height)] = sheet.nearest(label)
+        over = faces[: 2 * (grid.rows - 1) * (grid.columns - 1)]
+        vertex_group[: len(grid.height)] = grid.nearest(label)
         group[: len(over)] = vertex_group[over].max(axis=1)
     closed = model.kind != "surface"
     return Body("clay", vertices, faces, values, names, group, vertex_group, closed)
@@ -150,7 +150,7 @@ def _skin(sheet: SurfaceGrid, model: Model, names: tuple[str, ...], label: Indic
 
 def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) -> Body:
     """Return the stepped bed; walls and undersides are in the feature of their pin."""
-    vertices, faces, pin = pins_solid(formed, base_thickness=model.base_thickness)
+    vertices, faces, pin = make_pins_solid(formed, base_thickness=model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
     # Every vertex above the base is a corner, or the middle, of some pin's top; these have the middle first.
     tops = faces[:, 0] < len(formed.height)

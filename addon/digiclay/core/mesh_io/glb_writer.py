@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..surface.body import Body, Floats, pieces
+from ..surface.body import Body, Floats, split_pieces
 
 __all__ = ["write"]
 
@@ -45,9 +45,9 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file.write(np.array([len(text)], "<u4").tobytes() + b"JSON" + text)
     file.write(np.array([size], "<u4").tobytes() + b"BIN\0")
     for body in bodies:
-        for some in pieces(len(body.vertices)):
+        for some in split_pieces(len(body.vertices)):
             file.write(_upright(body.vertices[some]).astype("<f4").tobytes())
-        for some in pieces(len(body.faces)):
+        for some in split_pieces(len(body.faces)):
             file.write(body.faces[some].astype("<u4").tobytes())
 
 

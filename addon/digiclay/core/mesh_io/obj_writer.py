@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..surface.body import Body, Indices, pieces
+from ..surface.body import Body, Indices, split_pieces
 
 __all__ = ["write"]
 
@@ -27,7 +27,7 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     first = 1
     for body in bodies:
         file.write(f"o {body.name}\n".encode())
-        for some in pieces(len(body.vertices)):
+        for some in split_pieces(len(body.vertices)):
             block = body.vertices[some] * factor
             file.write(((line * len(block)) % tuple(block.ravel().tolist())).encode())
         if body.groups:
@@ -41,6 +41,6 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 def _faces(file: BinaryIO, faces: Indices, first: int) -> None:
     """Write triangles whose vertex 0 is number `first` of the file."""
-    for some in pieces(len(faces)):
+    for some in split_pieces(len(faces)):
         block = faces[some].astype(np.int64) + first
         file.write((("f %d %d %d\n" * len(block)) % tuple(block.ravel().tolist())).encode())

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..surface.body import NO_PIN, Body, pieces
+from ..surface.body import NO_PIN, Body, split_pieces
 
 __all__ = ["write"]
 
@@ -44,11 +44,11 @@ def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     lines += ["property list uchar int vertex_indices", "end_header", ""]
     file.write("\n".join(lines).encode())
     for body in bodies:
-        for some in pieces(len(body.vertices)):
+        for some in split_pieces(len(body.vertices)):
             file.write(_vertices(body, some, factor).tobytes())
     first = 0
     for body in bodies:
-        for some in pieces(len(body.faces)):
+        for some in split_pieces(len(body.faces)):
             table = np.empty(len(body.faces[some]), FACE)
             table["count"], table["vertices"] = 3, body.faces[some] + first
             file.write(table.tobytes())

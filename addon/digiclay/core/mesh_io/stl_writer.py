@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..surface.body import Body, pieces
+from ..surface.body import Body, split_pieces
 
 __all__ = ["write_ascii", "write_binary"]
 
@@ -32,7 +32,7 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
     file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
     for body in bodies:
-        for some in pieces(len(body.faces)):
+        for some in split_pieces(len(body.faces)):
             corners = _corners(body, some, factor)
             table = np.zeros(len(corners), TRIANGLE)
             table["corners"], table["normal"] = corners, _normals(corners)
@@ -51,7 +51,7 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())
-        for some in pieces(len(body.faces)):
+        for some in split_pieces(len(body.faces)):
             corners = _corners(body, some, factor)
             table = np.concatenate([_normals(corners), corners.reshape(-1, 9)], axis=1)
             file.write("".join(TEXT.format(*row) for row in table.tolist()).encode())

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Sequence
 from typing import IO, BinaryIO
 
-from ..surface.body import Body, pieces
+from ..surface.body import Body, split_pieces
 
 __all__ = ["write"]
 
@@ -63,12 +63,12 @@ def _mesh(part: IO[bytes], body: Body, factor: float) -> None:
     number = "%.6f" if factor > 1.0 else "%.9f"
     vertex = f'<vertex x="{number}" y="{number}" z="{number}"/>\n'
     part.write(b"<vertices>\n")
-    for some in pieces(len(body.vertices)):
+    for some in split_pieces(len(body.vertices)):
         block = body.vertices[some] * factor
         part.write(((vertex * len(block)) % tuple(block.ravel().tolist())).encode())
     part.write(b"</vertices>\n<triangles>\n")
     triangle = '<triangle v1="%d" v2="%d" v3="%d"/>\n'
-    for some in pieces(len(body.faces)):
+    for some in split_pieces(len(body.faces)):
         faces = body.faces[some]
         part.write(((triangle * len(faces)) % tuple(faces.ravel().tolist())).encode())
     part.write(b"</triangles>\n")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import ParameterError
 from ..model.set_point import SetPoint, find_set_point
-from ..surface.skin_mesh import grid_shape
+from ..surface.skin_mesh import find_grid_shape
 from .finger_path import CellSums, in_contact, lag, ridge_errors, sum_cells, surface_under
 from .force import contact_loss_share, first_touch, rfd, touchdown
 from .signal import deviation, mean, weights
@@ -86,7 +86,7 @@ def cell_area(position: ArrayLike) -> float | None:
         A single row is taken as wide as its pins are apart; None for a single pin.
     """
     place = np.asarray(position, dtype=np.float64)
-    rows, columns = grid_shape(place)
+    rows, columns = find_grid_shape(place)
     along = abs(float(place[1, 0] - place[0, 0])) if columns > 1 else 0.0
     across = abs(float(place[columns, 1] - place[0, 1])) if rows > 1 else 0.0
     area = (along or across) * (across or along)

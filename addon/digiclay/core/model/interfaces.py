@@ -1,7 +1,7 @@
 """Interfaces of the parts between fingertip and pins, as protocols.
 
-A place holds either the real part or a stand-in from `absent` that owns no state and
-computes nothing. Parts hold parameters only: state is handed in and handed back.
+An interface is implemented by the part and by a null part from `null_parts`, which has no state rows and
+computes nothing. Parts hold parameters only: state is an argument and a result.
 """
 
 from __future__ import annotations
@@ -16,11 +16,8 @@ from numpy.typing import NDArray
 from .delay import Queue
 
 __all__ = [
-    "Commands",
-    "Controller",
     "Flow",
     "Lag",
-    "Measurement",
     "Movement",
     "Pulp",
     "Segment",
@@ -42,11 +39,41 @@ class Flow(Protocol):
     @property
     def knee(self) -> float: ...
 
-    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any: ...
+    def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
+        """Return flow over drop in laminar flow, m3/s/Pa.
 
-    def conductance(self, opening: Floats, drop: Floats) -> Floats: ...
+        Parameters
+        ----------
+        opening : float or ndarray
+            Valve opening K.
+        out : ndarray, optional
+            Array for the result.
+        """
+        ...
 
-    def flow(self, opening: Floats, drop: Floats) -> Floats: ...
+    def conductance(self, opening: Floats, drop: Floats) -> Floats:
+        """Return flow over drop, m3/s/Pa.
+
+        Parameters
+        ----------
+        opening : ndarray
+            Valve opening K.
+        drop : ndarray
+            Pressure drop, Pa.
+        """
+        ...
+
+    def flow(self, opening: Floats, drop: Floats) -> Floats:
+        """Return the flow into the cylinder, m3/s.
+
+        Parameters
+        ----------
+        opening : ndarray
+            Valve opening K.
+        drop : ndarray
+            Pressure drop, Pa.
+        """
+        ...
 
 
 class Lag(Protocol):
@@ -75,7 +102,16 @@ class Lag(Protocol):
         """
         ...
 
-    def response(self, queue: Queue, times: Sequence[float]) -> Floats: ...
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the linear map from own rows and queued commands to the openings at some times.
+
+        Parameters
+        ----------
+        queue : Queue
+        times : sequence of float
+            Times into the period, s.
+        """
+        ...
 
     def settle(self, own: Floats) -> None: ...
 
@@ -88,13 +124,31 @@ class Pulp(Protocol):
 
     def relaxed(self, own: Floats) -> Any: ...
 
-    def rate(self, own: Floats, tension: Floats) -> Floats: ...
+    def rate(self, own: Floats, tension: Floats) -> Floats:
+        """Return the rates of change of `own`, N/s.
+
+        Parameters
+        ----------
+        own : ndarray (rows, k)
+        tension : ndarray (k,)
+            Elastic force, N.
+        """
+        ...
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
 
     def propagator(self, step: float) -> Floats: ...
 
-    def age(self, own: Floats, time: Floats) -> None: ...
+    def age(self, own: Floats, time: Floats) -> None:
+        """Let `own` decay without tension, in place.
+
+        Parameters
+        ----------
+        own : ndarray (rows, k)
+        time : ndarray (k,)
+            s.
+        """
+        ...
 
 
 class Sensors(Protocol):
@@ -207,78 +261,3 @@ class Segment:
     start: float
     length: float
     nodes: tuple[int, ...]
-
-
-class Measurement(NamedTuple):
-    """Measured quantities of some cells.
-
-    Attributes
-    ----------
-    quadratic_basis : ndarray (6, m)
-        Rows 1, x, y, x², x y, y² of where they are, m.
-    height, force : ndarray (m,)
-        As measured, m and N.
-    target : ndarray (m,)
-        Height they are commanded to, m.
-    mode : ndarray (m,) of int8
-    own : ndarray (rows, m)
-        What the controller remembers of each cell; brought up to date in place.
-    cells : ndarray of int (m,)
-        Their numbers in the bed.
-    """
-
-    quadratic_basis: Floats
-    height: Floats
-    force: Floats
-    target: Floats
-    mode: NDArray[np.int8]
-    own: Floats
-    cells: NDArray[np.intp]
-
-
-class Commands(NamedTuple):
-    """Output of a controller, (m,) each: targets, m; modes; valve commands."""
-
-    target: Floats
-    mode: NDArray[np.int8]
-    command: Floats
-
-
-class Controller(Protocol):
-    """Control method with its parameters; its memory is an argument and a result."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def rows(self) -> int:
-        """State rows a cell needs."""
-        ...
-
-    def begin(self) -> Any:
-        """Return the memory before a session."""
-        ...
-
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
-        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control.
-
-        Parameters
-        ----------
-        memory : object
-            From `begin`, or the period before.
-        touched : Measurement
-            Of the cells the finger may touch.
-        """
-        ...
-
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
-        """Return memory and orders for the cells of the disc and all that still move.
-
-        Parameters
-        ----------
-        memory : object
-            From `locate`.
-        seen : Measurement
-            Of the cells to command.
-        """
-        ...

@@ -11,9 +11,10 @@ from ..control.methods import METHODS
 from ..engine.active_set import Selection
 from ..engine.state import Rows
 from ..engine.system import System, segments
+from ..model.control_interface import Controller
 from ..model.delay import Queue, queue
 from ..model.fingertip import require_one
-from ..model.interfaces import Controller, Flow, Lag, Pulp, Sensors, Stepper
+from ..model.interfaces import Flow, Lag, Pulp, Sensors, Stepper
 from ..model.laws import select_law
 from ..model.layout import Grid, grid
 from ..model.physics import Cell, speeds

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.layout import Grid
-from ..surface.regions import components
+from ..surface.regions import label_components
 
 __all__ = ["SMALL", "fill_holes"]
 
@@ -45,7 +45,7 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     joined = position[beside[number]]
     start = np.repeat(np.arange(number.size), joined.shape[1])
     edges = np.column_stack([start, joined.ravel()])[joined.ravel() >= 0]
-    group = components(number.size, edges)
+    group = label_components(number.size, edges)
     size = np.bincount(group, minlength=number.size)
     at_rim = np.zeros(number.size, np.bool_)
     at_rim[group[(beside[number] == grid.count).any(axis=1)]] = True

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Branch", "End", "Network", "length_of", "read"]
+__all__ = ["Branch", "End", "Network", "measure_length", "read_network"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
@@ -27,7 +27,7 @@ class Branch:
     @property
     def length(self) -> float:
         """In plan, m."""
-        return length_of(self.points)
+        return measure_length(self.points)
 
 
 #: A branch's end: its number, and 0 for the first point or 1 for the last.
@@ -38,7 +38,7 @@ End = tuple[int, int]
 class Network:
     """Nodes and branches, modified in place and discarded afterwards."""
 
-    place: list[Floats]
+    position: list[Floats]
     half: list[float]
     branches: dict[int, Branch] = field(default_factory=dict)
 
@@ -51,7 +51,7 @@ class Network:
         points = self.branches[end[0]].points
         return points if end[1] == 0 else points[::-1]
 
-    def way(self, end: End) -> Floats:
+    def path(self, end: End) -> Floats:
         """Return the unit vector in which a branch leaves its node."""
         points, half = self.away(end), self.half[self.branches[end[0]].nodes[end[1]]]
         run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -60,7 +60,7 @@ class Network:
         return step / max(float(np.hypot(*step)), 1e-12)
 
 
-def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
+def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Network:
     """Return the network of a skeleton: pins with three neighbors or more are junctions.
 
     Parameters
@@ -69,7 +69,7 @@ def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
         Neighbors within the feature; -1 where there is none.
     pins : ndarray of int (m,)
         Those of the skeleton.
-    place : ndarray (k, 2)
+    position : ndarray (k, 2)
         Places of all pins of the feature, m.
     half : ndarray (m,)
         Half the feature's width at the pins of the skeleton, m.
@@ -86,31 +86,31 @@ def read(beside: Pins, pins: Pins, place: Floats, half: Floats) -> Network:
             more = [n for n in around[waiting.pop()] if len(around[n]) > 2 and n not in group]
             group.update(more)
             waiting += more
-        cluster |= dict.fromkeys(group, len(network.place))
-        _add_node(network, place[sorted(group)], [wide[one] for one in group])
+        cluster |= dict.fromkeys(group, len(network.position))
+        _add_node(network, position[sorted(group)], [wide[one] for one in group])
     seen: set[tuple[int, int]] = set()
 
     def walk(start: int, step: int) -> list[int]:
-        way = [start, step]
-        while way[-1] not in cluster and way[-1] != start:
-            way.append(next(n for n in around[way[-1]] if n != way[-2]))
-        seen.update(((way[0], way[1]), (way[-1], way[-2])))
-        seen.update((one, -1) for one in way[1:-1])
-        return way
+        path = [start, step]
+        while path[-1] not in cluster and path[-1] != start:
+            path.append(next(n for n in around[path[-1]] if n != path[-2]))
+        seen.update(((path[0], path[1]), (path[-1], path[-2])))
+        seen.update((one, -1) for one in path[1:-1])
+        return path
 
-    def add(way: Iterable[int], nodes: list[int]) -> None:
-        points = np.array([place[one] for one in way])
-        points[0], points[-1] = network.place[nodes[0]], network.place[nodes[1]]
+    def add(path: Iterable[int], nodes: list[int]) -> None:
+        points = np.array([position[one] for one in path])
+        points[0], points[-1] = network.position[nodes[0]], network.position[nodes[1]]
         network.branches[len(network.branches)] = Branch(nodes, points)
 
     for pin, node in list(cluster.items()):
         for step in around[pin]:
             if cluster.get(step) != node and (pin, step) not in seen:
-                way = walk(pin, step)
-                add(way, [node, cluster[way[-1]]])
+                path = walk(pin, step)
+                add(path, [node, cluster[path[-1]]])
     for pin in around:
         if pin not in cluster and (pin, -1) not in seen:  # a ring by itself
-            node = _add_node(network, place[[pin]], [wide[pin]])
+            node = _add_node(network, position[[pin]], [wide[pin]])
             add(walk(pin, around[pin][0]), [node, node])
             seen.add((pin, -1))
     return network
@@ -125,17 +125,17 @@ def _neighbors(beside: Pins, pins: Pins) -> dict[int, list[int]]:
         straight = [
             len(row) == 6 or k % 2 == 0 or not (there[k - 1] or there[(k + 1) % 8]) for k in range(len(row))
         ]
-        found[pin] = [n for n, one, way in zip(row, there, straight, strict=True) if one and way]
+        found[pin] = [n for n, one, path in zip(row, there, straight, strict=True) if one and path]
     return found
 
 
 def _add_node(network: Network, places: Floats, half: list[float]) -> int:
     """Add a node in the middle of some places."""
-    network.place.append(places.mean(axis=0))
+    network.position.append(places.mean(axis=0))
     network.half.append(max(half))
-    return len(network.place) - 1
+    return len(network.position) - 1
 
 
-def length_of(points: Floats) -> float:
+def measure_length(points: Floats) -> float:
     """Return the length of a line in plan, m."""
     return float(np.hypot(*np.diff(points, axis=0).T).sum())

@@ -14,9 +14,9 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from .branches import Branch, End, Network, length_of, read
+from .branches import Branch, End, Network, measure_length, read_network
 
-__all__ = ["Chain", "chains", "reaches_out"]
+__all__ = ["Chain", "find_chains", "reaches_out"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
@@ -52,7 +52,7 @@ class Chain:
     nodes: frozenset[int]
 
 
-def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) -> list[Chain]:
+def find_chains(beside: Pins, pins: Pins, position: Floats, half: Floats, pitch: float) -> list[Chain]:
     """Return the lines of a skeleton.
 
     Parameters
@@ -61,18 +61,18 @@ def chains(beside: Pins, pins: Pins, place: Floats, half: Floats, pitch: float) 
         Neighbors of all pins of the feature, -1 where there is none.
     pins : ndarray of int (s,)
         Those of the skeleton.
-    place : ndarray (k, 2)
+    position : ndarray (k, 2)
         m.
     half : ndarray (s,)
         Half the width of the feature at each pin of the skeleton, m.
     pitch : float
         m.
     """
-    network = read(beside, pins, place, half)
+    network = read_network(beside, pins, position, half)
     _merge(network)
     _open_small_loops(network)
     _prune(network, pitch)
-    junctions = frozenset(node for node in range(len(network.place)) if len(network.ends(node)) > 2)
+    junctions = frozenset(node for node in range(len(network.position)) if len(network.ends(node)) > 2)
     return list(_assembled(network, _joints(network), junctions))
 
 
@@ -88,7 +88,7 @@ def reaches_out(points: Floats, half: float, pitch: float) -> bool:
     pitch : float
         m.
     """
-    return length_of(points) > FLANK * half + 0.5 * pitch
+    return measure_length(points) > FLANK * half + 0.5 * pitch
 
 
 def _merge(network: Network) -> None:
@@ -103,14 +103,14 @@ def _merge(network: Network) -> None:
             if branch.length > max(network.half[one], network.half[two]):
                 continue
             del network.branches[number]
-            network.place[one] = 0.5 * (network.place[one] + network.place[two])
+            network.position[one] = 0.5 * (network.position[one] + network.position[two])
             network.half[one] = max(network.half[one], network.half[two])
             for other in network.branches.values():
                 for end in (0, 1):
                     if other.nodes[end] in (one, two):
                         other.nodes[end] = one
                         other.points = other.points.copy()
-                        other.points[-end] = network.place[one]
+                        other.points[-end] = network.position[one]
             merged = True
             break
 
@@ -146,7 +146,7 @@ def _prune(network: Network, pitch: float) -> None:
 
 def _join_through(network: Network) -> None:
     """Make one branch of two that meet where no other does."""
-    for node in range(len(network.place)):
+    for node in range(len(network.position)):
         ends = network.ends(node)
         if len(ends) == 2 and ends[0][0] != ends[1][0]:
             one, two = ends
@@ -162,12 +162,12 @@ def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
     nothing = np.empty((0, 2))
     for number in list(network.branches):
         _share(network, number, joints)
-    for node in range(len(network.place)):
+    for node in range(len(network.position)):
         ends = [end for end in network.ends(node) if end not in joints]
         if len(ends) == 2 and len(network.ends(node)) == 2:
             joints[ends[0]], joints[ends[1]] = (ends[1], nothing), (ends[0], nothing)
             continue
-        ways = {end: network.way(end) for end in ends}
+        ways = {end: network.path(end) for end in ends}
         pairs = sorted((float(ways[a] @ ways[b]), a, b) for a, b in combinations(ends, 2))
         for cosine, a, b in pairs:
             if cosine < -STRAIGHT and a not in joints and b not in joints:
@@ -184,9 +184,9 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
     sides = [[end for end in network.ends(node) if end[0] != number] for node in (one, two)]
     if [len(side) for side in sides] != [2, 2] or any(end in joints for side in sides for end in side):
         return
-    ways = [[network.way(end) for end in side] for side in sides]
+    ways = [[network.path(end) for end in side] for side in sides]
     for k in (0, 1):
-        if any(float(way @ network.way((number, k))) > -STRAIGHT for way in ways[k]):
+        if any(float(way @ network.path((number, k))) > -STRAIGHT for way in ways[k]):
             return
     cosines = {
         order: sum(float(ways[0][k] @ ways[1][order[k]]) for k in (0, 1)) for order in permutations((0, 1))
@@ -232,7 +232,7 @@ def _without_nodes(network: Network, end: End, joints: dict[End, tuple[End, Floa
     for k in (0, 1):
         node = branch.nodes[k]
         if (end[0], k) in joints and len(network.ends(node)) > 2:
-            kept &= np.hypot(*(points - network.place[node]).T) > THROUGH * network.half[node]
+            kept &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
     middle = len(points) // 2
     kept[middle] |= not kept.any()
     left: Floats = points[kept]

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .crest_network import Chain, chains, reaches_out
+from .crest_network import Chain, find_chains, reaches_out
 from .pin_lattice import Lattice
-from .section_line import LEVEL, Field, even, smoothed
-from .skeleton import half_width, skeleton
+from .section_line import LEVEL, Field, smooth, space_evenly
+from .skeleton import find_skeleton, measure_half_width
 
-__all__ = ["Crest", "Ridge", "ridges"]
+__all__ = ["Crest", "Ridge", "find_ridges"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
@@ -78,7 +78,7 @@ class Ridge(NamedTuple):
     half: float
 
 
-def ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
+def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
     """Return the ridges and mounds of a feature that are parted by saddles, with their crests.
 
     Parameters
@@ -98,11 +98,11 @@ def ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: flo
     beside = lattice.neighbor[pins]
     place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
     among, on_bed = np.where(pins[place] == beside, place, -1), beside >= 0
-    line = skeleton(among, on_bed, off[pins])
+    line = find_skeleton(among, on_bed, off[pins])
     position = lattice.formed.position[pins]
-    field = Field(lattice, own, height, 2.0 * (half_width(among, on_bed) + 2.0) * lattice.pitch)
+    field = Field(lattice, own, height, 2.0 * (measure_half_width(among, on_bed) + 2.0) * lattice.pitch)
     half = field.half_widths(position[line])
-    found = chains(among, line, position, half, lattice.pitch) if len(line) > 1 else []
+    found = find_chains(among, line, position, half, lattice.pitch) if len(line) > 1 else []
     if not found:  # a single pin, or a ring of three
         return (Ridge((), position[line], float(half.max())),)
     usual = float(np.median(half))
@@ -179,14 +179,14 @@ def _meet(pieces: list[Chain], lines: list[Floats | None], pitch: float) -> None
                 fine
                 for k, line in enumerate(lines)
                 if k != number and line is not None and pieces[k].nodes & piece.nodes
-                for fine in (even(line, pitch / 4.0),)
+                for fine in (space_evenly(line, pitch / 4.0),)
                 if fine is not None
             ]
             if others:
                 there = np.concatenate(others)
                 foot = there[[int(np.argmin(np.hypot(*(there - mine[end]).T)))]]
                 joined = np.concatenate([foot, mine] if end == 0 else [mine, foot])
-                lines[number] = even(joined, pitch)
+                lines[number] = space_evenly(joined, pitch)
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:
@@ -195,7 +195,7 @@ def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:
         return None
     half = field.half_width(line, chain.closed)
     top = np.nan_to_num(field.lattice.at(field.height, line), nan=float(field.height.mean()))
-    whole = smoothed(np.column_stack([line, top, field.at(line)]), 2, chain.closed)
+    whole = smooth(np.column_stack([line, top, field.at(line)]), 2, chain.closed)
     if chain.closed:
         whole[-1] = whole[0]
     crest = Crest(whole[:, :3], whole[:, 3], chain.closed, half, len(chain.nodes) > 0)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .crests import Crest, Ridge
 
-__all__ = ["FeaturePart", "nearest", "parts"]
+__all__ = ["FeaturePart", "find_parts", "measure_distances"]
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class FeaturePart:
     reach: float
 
 
-def parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
+def find_parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
     """Return the parts of a ridge: itself, and the mounds on it.
 
     Parameters
@@ -89,7 +89,7 @@ def parts(ridge: Ridge, least: float) -> tuple[FeaturePart, ...]:
     return (FeaturePart(tuple(crests), core, ridge.half), *on_discs)
 
 
-def nearest(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
+def measure_distances(places: Floats, every: tuple[FeaturePart, ...] | list[FeaturePart]) -> Floats:
     """Return how far places (k, 2) are from each part, less its reach, m, shape (parts, k).
 
     Parameters

@@ -7,10 +7,10 @@ import numpy as np
 from .body import Body
 from .features import Feature
 
-__all__ = ["solid"]
+__all__ = ["make_feature_solid"]
 
 
-def solid(feature: Feature) -> Body:
+def make_feature_solid(feature: Feature) -> Body:
     """Return the body between the surface as it is and as it was before, closed.
 
     A boss stands on the former surface; a crease is the body that fills it up to there. Where the
@@ -18,10 +18,10 @@ def solid(feature: Feature) -> Body:
     an edge that thins out to nothing makes booleans of other programs fail.
     """
     region = feature.region
-    count = len(region.place)
+    count = len(region.position)
     now = region.former + (region.off if feature.kind == "boss" else -region.off)
     over, under = np.maximum(now, region.former), np.minimum(now, region.former)
-    vertices = np.concatenate([np.column_stack([region.place, over]), np.column_stack([region.place, under])])
+    vertices = np.concatenate([np.column_stack([region.position, one]) for one in (over, under)])
     start, end = region.outline().T
     walls = [[start, start + count, end + count], [start, end + count, end]]
     sides = [np.stack(corners, axis=1) for corners in walls]

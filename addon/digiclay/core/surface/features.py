@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.quantity import Parameters, quantity
-from .crests import ridges
-from .feature_parts import FeaturePart, nearest, parts
+from .crests import find_ridges
+from .feature_parts import FeaturePart, find_parts, measure_distances
 from .pin_lattice import Lattice
-from .regions import Region, components, cut, divided
+from .regions import Region, cut, divide, label_components
 from .skin_grid import SurfaceGrid
 
-__all__ = ["Feature", "Finding", "find", "summary", "table"]
+__all__ = ["Feature", "Finding", "find", "make_table", "summarize"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -108,7 +108,7 @@ class Feature:
         }  # fmt: skip
 
 
-def find(sheet: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
+def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first.
 
     Points belong together that the skin's triangles join; so two bosses that only touch at
@@ -121,36 +121,36 @@ def find(sheet: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
         Thresholds; by default its own defaults.
     """
     finding = finding or Finding()
-    lattice = Lattice.of(sheet.formed)
+    lattice = Lattice.of(grid.formed)
     found = []
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
-        some = sorted(_of_kind(sheet, finding, lattice, kind, sign), key=lambda one: -one.volume)
+        some = sorted(_of_kind(grid, finding, lattice, kind, sign), key=lambda one: -one.volume)
         found += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
     return found
 
 
 def _of_kind(
-    sheet: SurfaceGrid, finding: Finding, lattice: Lattice, kind: str, sign: float
+    grid: SurfaceGrid, finding: Finding, lattice: Lattice, kind: str, sign: float
 ) -> Iterator[Feature]:
     """Give the features of one kind, not yet numbered."""
-    off = sign * sheet.raised
+    off = sign * grid.raised
     inside = off > finding.threshold
-    faces = sheet.faces[inside[sheet.faces].any(axis=1)]
+    faces = grid.faces[inside[grid.faces].any(axis=1)]
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    label = components(len(off), edges[inside[edges].all(axis=1)])
+    label = label_components(len(off), edges[inside[edges].all(axis=1)])
     # All corners of a triangle that are inside are joined by it, and so have one label.
     of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
-    at_pins = sign * sheet.formed.raised
-    pins = _by_label(np.where(inside[sheet.pins], label[sheet.pins], -1))
+    at_pins = sign * grid.formed.raised
+    pins = _by_label(np.where(inside[grid.pins], label[grid.pins], -1))
     for name, block in _by_label(of_face).items():
         mine = pins.get(name, np.empty(0, np.int64))
         if len(mine) < finding.smallest:
             continue
-        region = cut(sheet.place, sheet.former, off, faces[block], finding.threshold)
+        region = cut(grid.position, grid.former, off, faces[block], finding.threshold)
         least = DEEP * finding.threshold
-        whole = ridges(lattice, mine, at_pins, sheet.formed.height, least)
-        every = [part for ridge in whole for part in parts(ridge, least)]
-        for part, own, piece in _shared_out(sheet, every, mine, region, finding.smallest):
+        whole = find_ridges(lattice, mine, at_pins, grid.formed.height, least)
+        every = [part for ridge in whole for part in find_parts(ridge, least)]
+        for part, own, piece in _shared_out(grid, every, mine, region, finding.smallest):
             lines = tuple(crest.points for crest in part.crests)
             high = at_pins[own]
             flat = np.mean(high[high >= 0.5 * high.max()] >= FLAT * high.max()) > 0.5
@@ -158,20 +158,20 @@ def _of_kind(
 
 
 def _shared_out(
-    sheet: SurfaceGrid, every: list[FeaturePart], pins: NDArray[np.int64], region: Region, smallest: int
+    grid: SurfaceGrid, every: list[FeaturePart], pins: NDArray[np.int64], region: Region, smallest: int
 ) -> Iterator[tuple[FeaturePart, NDArray[np.int64], Region]]:
     """Give each part its pins and its piece of a region; one with too few pins goes to those beside it."""
-    place = sheet.formed.position[pins]
+    place = grid.formed.position[pins]
     while len(every) > 1:
-        owner = np.argmin(nearest(place, every), axis=0)
+        owner = np.argmin(measure_distances(place, every), axis=0)
         count = np.bincount(owner, minlength=len(every))
         if count.min() >= smallest:
             break
         del every[int(np.argmin(count))]
     rest: Region | None = region
     while len(every) > 1 and rest is not None:
-        away = nearest(rest.place, every)
-        piece, rest = divided(rest, away[:-1].min(axis=0) - away[-1])
+        away = measure_distances(rest.position, every)
+        piece, rest = divide(rest, away[:-1].min(axis=0) - away[-1])
         if piece is not None:
             yield every[-1], pins[owner == len(every) - 1], piece
         every = every[:-1]
@@ -187,7 +187,7 @@ def _by_label(label: Indices) -> dict[int, NDArray[np.int64]]:
     return {name: order[start : start + count] for name, start, count in every if name >= 0}
 
 
-def table(features: list[Feature]) -> list[tuple[str, ...]]:
+def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
     """Return what a person reads: a head, and a row of texts a feature, in mm."""
     head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     rows = [
@@ -200,7 +200,7 @@ def table(features: list[Feature]) -> list[tuple[str, ...]]:
     return [head, *rows]
 
 
-def summary(features: list[Feature]) -> str:
+def summarize(features: list[Feature]) -> str:
     """Return how many there are in a few words."""
     counts = [(sum(one.kind == kind for one in features), kind) for kind in ("boss", "crease")]
     return " and ".join(

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import OutputError, ParameterError
-from .skin_mesh import check_heights, grid_shape
+from .skin_mesh import check_heights, find_grid_shape
 
-__all__ = ["Formed", "of_history"]
+__all__ = ["Formed", "make_formed"]
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class Formed:
         mode : array_like of int (n,) or int
             Codes of `modes.Mode`.
         """
-        rows, columns = grid_shape(position)
+        rows, columns = find_grid_shape(position)
         place, top = check_heights(position, height, rows, columns)
         _, before = check_heights(place, np.broadcast_to(former, top.shape), rows, columns, "former")
         _, pressed = check_heights(place, np.broadcast_to(force, top.shape), rows, columns, "force")
@@ -85,8 +85,8 @@ class Formed:
     @property
     def shift(self) -> float:
         """How far every other row is shifted the way the columns run, m; 0 in an aligned bed."""
-        way = np.sign(self.position[1, 0] - self.position[0, 0])
-        shift = float(way * (self.position[self.columns, 0] - self.position[0, 0]))
+        direction = np.sign(self.position[1, 0] - self.position[0, 0])
+        shift = float(direction * (self.position[self.columns, 0] - self.position[0, 0]))
         return shift if abs(shift) > 1e-3 * self.pitch else 0.0
 
     @property
@@ -112,7 +112,7 @@ class Formed:
         return self.height - self.former
 
 
-def of_history(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
+def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
     """Return one row of a history as a formed surface.
 
     Parameters

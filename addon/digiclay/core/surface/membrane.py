@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .formed import Formed
-from .skin_mesh import skin
+from .skin_mesh import make_skin
 
-__all__ = ["membrane"]
+__all__ = ["relax_membrane"]
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ STILL = 1e-9
 ROUNDS = 1000
 
 
-def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: float) -> Floats:
+def relax_membrane(formed: Formed, position: Floats, start: Floats, parts: int, cap: float) -> Floats:
     """Return the heights of the skin, m, shape (rows, columns) of its points.
 
     Finite elements on the triangles of the skin; the points on a pin's end keep its height.
@@ -27,7 +27,7 @@ def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: floa
     ----------
     formed : Formed
         The pins.
-    place : ndarray (rows, columns, 2)
+    position : ndarray (rows, columns, 2)
         The skin's points, m.
     start : ndarray (rows, columns)
         Heights to begin with, m, those of the pins at the pins.
@@ -36,34 +36,34 @@ def membrane(formed: Formed, place: Floats, start: Floats, parts: int, cap: floa
     cap : float
         Radius of a pin's flat end, m.
     """
-    flat = place.reshape(-1, 2)
-    height, free = _laid(formed, place, start, parts, cap)
-    faces = skin(flat, np.zeros(len(flat)), *start.shape)
+    flat = position.reshape(-1, 2)
+    height, free = _laid(formed, position, start, parts, cap)
+    faces = make_skin(flat, np.zeros(len(flat)), *start.shape)
     stiffness = _Stiffness(flat, faces)
     # Conjugate gradients on the free points, with the diagonal taken out.
     weight = np.where(free, 1.0 / stiffness.diagonal, 0.0)
     rest = -stiffness(height) * free
     step = weight * rest
-    way, power = step, float(rest @ step)
+    direction, power = step, float(rest @ step)
     for _ in range(ROUNDS):
         if np.abs(step).max() <= STILL:
             break
-        pull = stiffness(way) * free
-        length = power / float(way @ pull)
-        height = height + length * way
+        pull = stiffness(direction) * free
+        length = power / float(direction @ pull)
+        height = height + length * direction
         rest = rest - length * pull
         step = weight * rest
         power, former = float(rest @ step), power
-        way = step + power / former * way
+        direction = step + power / former * direction
     return height.reshape(start.shape)
 
 
 def _laid(
-    formed: Formed, place: Floats, start: Floats, parts: int, cap: float
+    formed: Formed, position: Floats, start: Floats, parts: int, cap: float
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Return heights with every end of a pin level, and which points no pin carries."""
     height, free = start.copy(), np.ones(start.shape, bool)
-    pins = place[::parts, ::parts]
+    pins = position[::parts, ::parts]
     reach = int(np.ceil(cap / min(formed.pitch, formed.row_spacing) * parts * 1.5)) + 1
     lines, points = start.shape
     for down in range(-reach, reach + 1):
@@ -72,7 +72,7 @@ def _laid(
             column = np.arange(formed.columns) * parts + across
             inside = ((row >= 0) & (row < lines))[:, None] & ((column >= 0) & (column < points))
             spot = np.ix_(np.clip(row, 0, lines - 1), np.clip(column, 0, points - 1))
-            near = inside & (np.sum((place[spot] - pins) ** 2, axis=-1) <= (cap * (1.0 + 1e-9)) ** 2)
+            near = inside & (np.sum((position[spot] - pins) ** 2, axis=-1) <= (cap * (1.0 + 1e-9)) ** 2)
             at = spot[0].repeat(formed.columns, 1)[near], spot[1].repeat(formed.rows, 0)[near]
             height[at] = start[::parts, ::parts][near]
             free[at] = False
@@ -83,11 +83,11 @@ def _laid(
 class _Stiffness:
     """The cotangent Laplacian of a flat triangle mesh, applied to heights."""
 
-    def __init__(self, place: Floats, faces: NDArray[np.int32]) -> None:
+    def __init__(self, position: Floats, faces: NDArray[np.int32]) -> None:
         starts, ends, weights = [], [], []
         for corner in range(3):
             tip, start, end = (faces[:, (corner + k) % 3] for k in range(3))
-            one, other = place[start] - place[tip], place[end] - place[tip]
+            one, other = position[start] - position[tip], position[end] - position[tip]
             area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
             weight = 0.5 * np.sum(one * other, axis=1) / area
             kept = np.abs(weight) > 1e-12  # across a right angle nothing pulls
@@ -95,7 +95,7 @@ class _Stiffness:
             ends.append(end[kept])
             weights.append(weight[kept])
         self._start, self._end = np.concatenate(starts), np.concatenate(ends)
-        self._weight, self._count = np.concatenate(weights), len(place)
+        self._weight, self._count = np.concatenate(weights), len(position)
         self.diagonal = self._gathered(self._weight, self._weight)
 
     def __call__(self, height: Floats) -> Floats:

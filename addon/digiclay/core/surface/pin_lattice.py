@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .formed import Formed
 
-__all__ = ["Lattice", "distance_to_level"]
+__all__ = ["Lattice", "measure_distance"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
@@ -55,7 +55,7 @@ class Lattice:
         """Distance of neighbors, the mean of that along a row and that of the rows, m."""
         return 0.5 * (self.formed.pitch + self.formed.row_spacing)
 
-    def at(self, values: Floats, place: Floats) -> Floats:
+    def at(self, values: Floats, position: Floats) -> Floats:
         """Return what has a value at each pin, (n,), at places (..., 2), m; NaN beyond the bed.
 
         It is straight along each row, and then between two rows.
@@ -63,16 +63,16 @@ class Lattice:
         Parameters
         ----------
         values : ndarray (n,)
-        place : ndarray (..., 2)
+        position : ndarray (..., 2)
             m.
         """
         bed = self.formed
         first = bed.position[:: bed.columns]
         along = bed.position[1, 0] - bed.position[0, 0]
-        row = (place[..., 1] - first[0, 1]) / (first[1, 1] - first[0, 1])
+        row = (position[..., 1] - first[0, 1]) / (first[1, 1] - first[0, 1])
         low = np.clip(np.floor(row), 0, bed.rows - 2).astype(np.int64)
         up = row - low
-        columns = [(place[..., 0] - first[low + step, 0]) / along for step in (0, 1)]
+        columns = [(position[..., 0] - first[low + step, 0]) / along for step in (0, 1)]
         parts = []
         for step, column in enumerate(columns):
             left = np.clip(np.floor(column), 0, bed.columns - 2).astype(np.int64)
@@ -88,8 +88,8 @@ class Lattice:
         return found
 
 
-def distance_to_level(
-    lattice: Lattice, values: Floats, place: Floats, way: Floats, level: Floats, most: float
+def measure_distance(
+    lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
 ) -> Floats:
     """Return how far it is from places to where values fall to a level.
 
@@ -98,7 +98,7 @@ def distance_to_level(
     lattice : Lattice
     values : ndarray (n,)
         At the pins.
-    place, way : ndarray (k, 2)
+    position, direction : ndarray (k, 2)
         Places, m, and unit vectors.
     level : ndarray (k,)
     most : float
@@ -111,11 +111,11 @@ def distance_to_level(
     """
     step = lattice.pitch / STEPS
     steps = np.arange(1, int(np.ceil(most / step)) + 1) * step
-    found = np.full(len(place), np.inf)
-    for start in range(0, len(place), max(1, CHUNK // len(steps))):
+    found = np.full(len(position), np.inf)
+    for start in range(0, len(position), max(1, CHUNK // len(steps))):
         part = slice(start, start + max(1, CHUNK // len(steps)))
-        here = place[part, None] + steps[:, None] * way[part, None]
-        above = np.column_stack([lattice.at(values, place[part]), lattice.at(values, here)])
+        here = position[part, None] + steps[:, None] * direction[part, None]
+        above = np.column_stack([lattice.at(values, position[part]), lattice.at(values, here)])
         above -= level[part, None]
         falls = above < 0.0  # not where the bed has ended: NaN
         first = np.argmax(falls, axis=1)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .formed import Formed
-from .skin_mesh import BASE_THICKNESS, base_level
+from .skin_mesh import BASE_THICKNESS, find_base_level
 
-__all__ = ["BRIDGE", "Parts", "parts", "pins_solid"]
+__all__ = ["BRIDGE", "Parts", "make_parts", "make_pins_solid"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -54,7 +54,7 @@ class Parts:
     twin: Codes
 
 
-def parts(formed: Formed) -> Parts:
+def make_parts(formed: Formed) -> Parts:
     """Divide a bed."""
     corner, loops = _squares(formed) if not formed.shift else _hexagons(formed)
     # Corners of one loop that coincide are one corner: the loop of a square has two at each.
@@ -70,7 +70,7 @@ def parts(formed: Formed) -> Parts:
     return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, NOBODY))
 
 
-def pins_solid(
+def make_pins_solid(
     formed: Formed, base: float | None = None, base_thickness: float = BASE_THICKNESS
 ) -> tuple[Floats, Indices, Codes]:
     """Return the stepped bed, closed.
@@ -79,7 +79,7 @@ def pins_solid(
     ----------
     formed : Formed
     base, base_thickness : float
-        As for `skin_mesh.solid`.
+        As for `skin_mesh.make_solid`.
 
     Returns
     -------
@@ -90,10 +90,10 @@ def pins_solid(
     pin : ndarray of int (f,)
         Whose top, wall or underside a face is.
     """
-    level = base_level(formed.height, base=base, base_thickness=base_thickness)
+    level = find_base_level(formed.height, base=base, base_thickness=base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
     height = level + steps * STEP
-    made, n = parts(replace(formed, height=height)), len(steps)
+    made, n = make_parts(replace(formed, height=height)), len(steps)
     # Each corner has a vertex at the height of every part about it, and one of the base.
     k, above = len(made.corner), int(steps.max()) + 1
     keys = np.concatenate([made.start * above + steps[made.pin], np.arange(k) * above])

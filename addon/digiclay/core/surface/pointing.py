@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..model.fingertip import Fingertip, matrices
 from ..model.layout import Grid
 
-__all__ = ["ground", "meeting", "patch", "ray"]
+__all__ = ["find_contact_outline", "find_ground_height", "find_ray", "intersect_surface"]
 
 Floats = NDArray[np.float64]
 
@@ -18,9 +18,11 @@ Floats = NDArray[np.float64]
 STEPS = 4
 #: How far behind the middle of a view without perspective its rays begin, in its own unit.
 BEHIND = 1e5
+#: Smaller components of a direction whose largest is 1 are none: a division by them may overflow.
+PARALLEL = 1e-200
 
 
-def ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
+def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
     """Return the ray through a place of a picture, in double precision throughout.
 
     Blender's own function takes the difference of two places near the eye in single precision,
@@ -42,15 +44,15 @@ def ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
     """
     across = np.array([lens[0, 0], lens[1, 1]])
     if lens[3, 2]:
-        eye, way = np.zeros(3), np.array([*((screen + lens[:2, 2]) / across), -1.0])
+        eye, direction = np.zeros(3), np.array([*((screen + lens[:2, 2]) / across), -1.0])
     else:
-        eye, way = np.array([*((screen - lens[:2, 3]) / across), BEHIND]), np.array([0.0, 0.0, -1.0])
+        eye, direction = np.array([*((screen - lens[:2, 3]) / across), BEHIND]), np.array([0.0, 0.0, -1.0])
     inverse = np.linalg.inv(seen)
-    way = inverse[:3, :3] @ way
-    return inverse[:3, :3] @ eye + inverse[:3, 3], way / np.linalg.norm(way)
+    direction = inverse[:3, :3] @ direction
+    return inverse[:3, :3] @ eye + inverse[:3, 3], direction / np.linalg.norm(direction)
 
 
-def meeting(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
+def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
     """Return where a ray first meets the pins, taken as flat tops that leave no gaps.
 
     Parameters
@@ -99,7 +101,7 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
     """Return when a ray enters and leaves a box; it never does where the first is after the last."""
     first, last = 0.0, math.inf
     for start, speed, near, far in zip(origin, direction, low, high, strict=True):
-        if speed == 0.0:
+        if abs(speed) < PARALLEL:
             if not near <= start <= far:
                 return 1.0, 0.0
             continue
@@ -108,7 +110,7 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
     return first, last
 
 
-def ground(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
+def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
     """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest.
 
     Parameters
@@ -125,7 +127,7 @@ def ground(grid: Grid, height: Floats, x: float, y: float, radius: float) -> flo
     return float(height[cells].mean())
 
 
-def patch(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
+def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: int = 48) -> Floats:
     """Return the outline of what of a finger is less than a depth above its lowest point.
 
     It is where the finger touches a plane it is pressed into so deep.

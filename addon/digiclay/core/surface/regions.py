@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Region", "components", "cut", "divided"]
+__all__ = ["Region", "cut", "divide", "label_components"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -23,7 +23,7 @@ class Region:
 
     Attributes
     ----------
-    place : ndarray (k, 2)
+    position : ndarray (k, 2)
         m.
     former : ndarray (k,)
         Height of the skin before, m.
@@ -33,7 +33,7 @@ class Region:
         Counter-clockwise seen from above.
     """
 
-    place: Floats
+    position: Floats
     former: Floats
     off: Floats
     faces: Indices
@@ -41,7 +41,7 @@ class Region:
     @property
     def _plan(self) -> Floats:
         """Area of each triangle in plan, m²."""
-        a, b, c = (self.place[self.faces[:, k]] for k in range(3))
+        a, b, c = (self.position[self.faces[:, k]] for k in range(3))
         area: Floats = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
         return area
 
@@ -58,13 +58,13 @@ class Region:
     def outline(self) -> Indices:
         """Return the edges that bound the region, shape (e, 2), its inside to their left."""
         edges = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-        size = len(self.place)
+        size = len(self.position)
         back = edges[:, 1] * size + edges[:, 0]
         alone = ~np.isin(edges[:, 0] * size + edges[:, 1], back)
         return edges[alone].astype(np.int32)
 
 
-def components(count: int, edges: Indices) -> Indices:
+def label_components(count: int, edges: Indices) -> Indices:
     """Return for each of `count` points the least point it is joined to by edges, shape (e, 2).
 
     Parameters
@@ -83,12 +83,12 @@ def components(count: int, edges: Indices) -> Indices:
             label = label[label]
 
 
-def cut(place: Floats, former: Floats, off: Floats, faces: Indices, threshold: float) -> Region:
+def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold: float) -> Region:
     """Return what of some triangles lies where `off` is above the threshold.
 
     Parameters
     ----------
-    place : ndarray (m, 2)
+    position : ndarray (m, 2)
     former, off : ndarray (m,)
         m, straight within each triangle.
     faces : ndarray of int (f, 3)
@@ -96,12 +96,12 @@ def cut(place: Floats, former: Floats, off: Floats, faces: Indices, threshold: f
     threshold : float
         m.
     """
-    values, pieces, whole = _clipped(np.column_stack([place, former, off]), faces, off, threshold)
+    values, pieces, whole = _clipped(np.column_stack([position, former, off]), faces, off, threshold)
     values[whole:, 3] = threshold
     return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
 
 
-def divided(region: Region, nearer: Floats) -> tuple[Region | None, Region | None]:
+def divide(region: Region, nearer: Floats) -> tuple[Region | None, Region | None]:
     """Return the two parts of a region where a value at its points is above 0, and where it is not.
 
     Together they are the region; one may have nothing.
@@ -112,7 +112,7 @@ def divided(region: Region, nearer: Floats) -> tuple[Region | None, Region | Non
     nearer : ndarray (k,)
         The value at its points.
     """
-    values = np.column_stack([region.place, region.former, region.off])
+    values = np.column_stack([region.position, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
     nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
     found: list[Region | None] = []

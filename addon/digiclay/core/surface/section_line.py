@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .crest_network import Chain
-from .pin_lattice import Lattice, distance_to_level
+from .pin_lattice import Lattice, measure_distance
 
-__all__ = ["LEVEL", "Field", "even", "smoothed"]
+__all__ = ["LEVEL", "Field", "smooth", "space_evenly"]
 
 Floats = NDArray[np.float64]
 
@@ -41,31 +41,33 @@ class Field:
     height: Floats
     most: float
 
-    def at(self, place: Floats) -> Floats:
+    def at(self, position: Floats) -> Floats:
         """Return how far the feature is off at places, m; 0 beyond the bed."""
-        return np.nan_to_num(self.lattice.at(self.off, place))
+        return np.nan_to_num(self.lattice.at(self.off, position))
 
-    def falls(self, place: Floats, way: Floats, level: Floats) -> Floats:
+    def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
         """Return how far it is to where the feature falls to a level, m.
 
         Parameters
         ----------
-        place : ndarray (k, 2)
+        position : ndarray (k, 2)
             Where to start, m.
-        way : ndarray (k, 2)
+        direction : ndarray (k, 2)
             Unit vectors.
         level : ndarray (k,)
             m.
         """
-        return distance_to_level(self.lattice, self.off, place, way, level, self.most)
+        return measure_distance(self.lattice, self.off, position, direction, level, self.most)
 
-    def half_widths(self, place: Floats) -> Floats:
+    def half_widths(self, position: Floats) -> Floats:
         """Return how far it is at least to where the feature falls to half its height at places, m."""
         angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
         ways = np.column_stack([np.cos(angles), np.sin(angles)])
-        k = len(place)
+        k = len(position)
         distance = self.falls(
-            np.repeat(place, AROUND, axis=0), np.tile(ways, (k, 1)), np.repeat(0.5 * self.at(place), AROUND)
+            np.repeat(position, AROUND, axis=0),
+            np.tile(ways, (k, 1)),
+            np.repeat(0.5 * self.at(position), AROUND),
         )
         least: Floats = np.minimum(distance.reshape(k, AROUND).min(axis=1), self.most)
         return least
@@ -73,15 +75,15 @@ class Field:
     def line(self, chain: Chain) -> Floats | None:
         """Return the line along the top that a chain of pins stands for, or none where it has no length."""
         pitch = self.lattice.pitch
-        line = even(chain.points, pitch)
+        line = space_evenly(chain.points, pitch)
         if line is None:
             return None
-        line = smoothed(line, 2, chain.closed)
+        line = smooth(line, 2, chain.closed)
         for _ in range(ROUNDS):
-            spread = even(self._centered(line, chain), pitch)
+            spread = space_evenly(self._centered(line, chain), pitch)
             if spread is None:
                 return None
-            line = smoothed(spread, 1, chain.closed)
+            line = smooth(spread, 1, chain.closed)
         half = self.half_width(line, chain.closed)
         for end in (0, 1):
             if not (chain.closed or chain.joined[end]):
@@ -146,10 +148,10 @@ class Field:
         line, run = line[kept], run[kept]
         back = max(0.0, run[-1] - max(2.0 * half, 2.0 * pitch))
         from_there = np.array([np.interp(back, run, axis) for axis in line.T])
-        way = (line[-1] - from_there) / max(float(np.hypot(*(line[-1] - from_there))), 1e-12)
-        longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * way
+        direction = (line[-1] - from_there) / max(float(np.hypot(*(line[-1] - from_there))), 1e-12)
+        longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
-        fine = even(path, pitch / 4.0)
+        fine = space_evenly(path, pitch / 4.0)
         assert fine is not None
         known = self.lattice.at(self.off, fine)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
@@ -175,7 +177,7 @@ class Field:
             share = over / (over - under) if k > start and under < 0.0 else 1.0
             fallen = along[k - 1] + (along[k] - along[k - 1]) * share
             at = int(np.flatnonzero(near)[-1])
-            aside = np.array([[-way[1], way[0]]])
+            aside = np.array([[-direction[1], direction[0]]])
             sides = [
                 float(self.falls(fine[at : at + 1], s * aside, np.array([0.5 * level]))[0])
                 for s in (1.0, -1.0)
@@ -186,11 +188,11 @@ class Field:
             return line[:1]
         kept = along < end - 0.25 * pitch
         tip = np.array([np.interp(end, along, axis) for axis in fine.T])
-        whole = even(np.concatenate([fine[kept], tip[None]]), pitch)
+        whole = space_evenly(np.concatenate([fine[kept], tip[None]]), pitch)
         return line[:1] if whole is None else whole
 
 
-def even(points: Floats, step: float) -> Floats | None:
+def space_evenly(points: Floats, step: float) -> Floats | None:
     """Return points along a line at even steps, `step` apart at most; none of a line without length.
 
     Parameters
@@ -207,7 +209,7 @@ def even(points: Floats, step: float) -> Floats | None:
     return np.column_stack([np.interp(at, run, axis) for axis in points.T])
 
 
-def smoothed(line: Floats, times: int, closed: bool) -> Floats:
+def smooth(line: Floats, times: int, closed: bool) -> Floats:
     """Return a line without its staircase; ends stay.
 
     Each point goes towards the middle of those beside it and a little further back again, so that an arc does

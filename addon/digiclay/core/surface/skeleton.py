@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["half_width", "rounded", "skeleton"]
+__all__ = ["average_neighbors", "find_skeleton", "measure_half_width"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
@@ -28,8 +28,8 @@ END = 0.5
 AHEAD = 1.25
 
 
-def half_width(beside: Pins, on_bed: Flags) -> int:
-    """Return how many rings of pins can be taken off a feature, one at least; arguments as `skeleton`.
+def measure_half_width(beside: Pins, on_bed: Flags) -> int:
+    """Return how many rings of pins can be taken off a feature, one at least; arguments as `find_skeleton`.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def half_width(beside: Pins, on_bed: Flags) -> int:
     return max(1, count)
 
 
-def rounded(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
+def average_neighbors(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
     """Return heights averaged with those of the neighbors, the ground's included, some times.
 
     Parameters
@@ -68,7 +68,7 @@ def rounded(beside: Pins, on_bed: Flags, off: Floats, times: int) -> Floats:
     return off
 
 
-def skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
+def find_skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
     """Return the pins along the top of a feature.
 
     Parameters
@@ -86,8 +86,8 @@ def skeleton(beside: Pins, on_bed: Flags, off: Floats) -> Pins:
         Ascending; one at least.
     """
     # A flat top gets its crest in the middle when it is rounded over its own half width.
-    top = rounded(beside, on_bed, off, half_width(beside, on_bed))
-    near = rounded(beside, on_bed, off, 1)
+    top = average_neighbors(beside, on_bed, off, measure_half_width(beside, on_bed))
+    near = average_neighbors(beside, on_bed, off, 1)
     holes = _hollows(beside, on_bed, near)
     return _thinned(beside, top, holes)
 

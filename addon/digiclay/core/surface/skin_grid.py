@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from .body import NO_PIN
 from .formed import Formed
-from .skin_mesh import skin
-from .skins import nearest_pin, over, places
+from .skin_mesh import make_skin
+from .skins import find_nearest_pin, interpolate_skin, place_points
 
 __all__ = ["SurfaceGrid", "fit_skin"]
 
@@ -30,7 +30,7 @@ class SurfaceGrid:
         The pins under it.
     parts : int
         Points a pitch.
-    place : ndarray (m, 2)
+    position : ndarray (m, 2)
         Points in plan, m.
     height, former : ndarray (m,)
         The skin, and the skin as it was before, m.
@@ -40,7 +40,7 @@ class SurfaceGrid:
 
     formed: Formed
     parts: int
-    place: Floats
+    position: Floats
     height: Floats
     former: Floats
     rows: int
@@ -49,7 +49,7 @@ class SurfaceGrid:
     @cached_property
     def faces(self) -> Indices:
         """Triangles of the skin, counter-clockwise seen from above."""
-        return skin(self.place, self.height, self.rows, self.columns)
+        return make_skin(self.position, self.height, self.rows, self.columns)
 
     @property
     def raised(self) -> Floats:
@@ -64,12 +64,12 @@ class SurfaceGrid:
 
     def nearest(self, of_pins: NDArray[Any]) -> NDArray[Any]:
         """Return at each point what is known of the nearest pin."""
-        near: NDArray[Any] = of_pins[nearest_pin(self.formed, self.parts)]
+        near: NDArray[Any] = of_pins[find_nearest_pin(self.formed, self.parts)]
         return near
 
     def values(self) -> dict[str, NDArray[np.float64]]:
         """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
-        force = over(self.formed, self.formed.force, "bilinear", self.parts, 0.0)
+        force = interpolate_skin(self.formed, self.formed.force, "bilinear", self.parts, 0.0)
         mode = self.nearest(self.formed.mode).astype(np.float64)
         return {"height": self.height, "force": force, "mode": mode}
 
@@ -95,7 +95,9 @@ def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceG
     cap : float
         Radius of a pin's flat end, m; of use to the membrane only.
     """
-    place = places(formed, parts)
-    rows, columns = place.shape[:2]
-    now, before = (over(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former))
-    return SurfaceGrid(formed, parts, place.reshape(-1, 2), now, before, rows, columns)
+    position = place_points(formed, parts)
+    rows, columns = position.shape[:2]
+    now, before = (
+        interpolate_skin(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former)
+    )
+    return SurfaceGrid(formed, parts, position.reshape(-1, 2), now, before, rows, columns)

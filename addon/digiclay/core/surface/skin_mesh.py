@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import ParameterError
 
-__all__ = ["BASE_THICKNESS", "base_level", "check_heights", "grid_shape", "skin", "solid"]
+__all__ = ["BASE_THICKNESS", "check_heights", "find_base_level", "find_grid_shape", "make_skin", "make_solid"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -36,7 +36,7 @@ SAME_LENGTH = 1e-6
 BAND = 1 << 16
 
 
-def grid_shape(position: ArrayLike) -> tuple[int, int]:
+def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
     """Return the rows and columns of pins that are ordered row by row.
 
     Parameters
@@ -64,7 +64,7 @@ def grid_shape(position: ArrayLike) -> tuple[int, int]:
     return len(place) // columns, columns
 
 
-def skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
+def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -> Indices:
     """Return the triangles over the pin tops.
 
     Parameters
@@ -112,7 +112,7 @@ def _triangles(place: Floats, top: Floats, index: Indices) -> Indices:
     return triangles
 
 
-def solid(
+def make_solid(
     position: ArrayLike,
     height: ArrayLike,
     rows: int,
@@ -130,7 +130,7 @@ def solid(
     Parameters
     ----------
     position, height, rows, columns
-        As for `skin`.
+        As for `make_skin`.
     base : float, optional
         Height of the flat base, m; 0 is the bed's floor. By default `base_thickness` below the
         lowest pin top.
@@ -147,11 +147,11 @@ def solid(
     Raises
     ------
     ParameterError
-        As `skin`; also when the base is not below every pin top.
+        As `make_skin`; also when the base is not below every pin top.
     """
     place, top = check_heights(position, height, rows, columns)
-    level = base_level(top, base=base, base_thickness=base_thickness)
-    over = skin(place, top, rows, columns)
+    level = find_base_level(top, base=base, base_thickness=base_thickness)
+    over = make_skin(place, top, rows, columns)
     n, faced = len(place), len(over)
     vertices = np.empty((2 * n, 3))
     vertices[:n, :2] = vertices[n:, :2] = place
@@ -167,7 +167,7 @@ def solid(
     return vertices, faces
 
 
-def base_level(
+def find_base_level(
     height: ArrayLike, *, base: float | None = None, base_thickness: float = BASE_THICKNESS
 ) -> float:
     """Return the height of the flat base, m: `base`, or `base_thickness` below the lowest pin top.

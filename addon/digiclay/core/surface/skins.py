@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ..base.spline import monotone
 from .formed import Formed
-from .membrane import membrane
+from .membrane import relax_membrane
 
-__all__ = ["SKINS", "nearest_pin", "over", "places"]
+__all__ = ["SKINS", "find_nearest_pin", "interpolate_skin", "place_points"]
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ SKINS: dict[str, str] = {
 }
 
 
-def places(formed: Formed, parts: int) -> Floats:
+def place_points(formed: Formed, parts: int) -> Floats:
     """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch.
 
     Parameters
@@ -49,7 +49,7 @@ def places(formed: Formed, parts: int) -> Floats:
     return np.swapaxes(fine, 0, 1)
 
 
-def over(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> Floats:
+def interpolate_skin(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> Floats:
     """Return the heights of a skin over its points, m, row by row.
 
     Parameters
@@ -71,14 +71,14 @@ def over(formed: Formed, height: Floats, skin: str, parts: int, cap: float) -> F
     makers: dict[str, Callable[[], Floats]] = {
         "bilinear": lambda: _straight(formed, pins, parts),
         "smooth": lambda: _smooth(formed, pins, parts),
-        "membrane": lambda: membrane(
-            formed, places(formed, parts), _straight(formed, pins, parts), parts, cap
+        "membrane": lambda: relax_membrane(
+            formed, place_points(formed, parts), _straight(formed, pins, parts), parts, cap
         ),
     }
     return makers[skin]().ravel()
 
 
-def nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
+def find_nearest_pin(formed: Formed, parts: int) -> NDArray[np.int32]:
     """Return the pin whose row and column each point of a skin is nearest to, row by row.
 
     Parameters
@@ -128,7 +128,7 @@ def _straight(formed: Formed, pins: Floats, parts: int) -> Floats:
 
 def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
     """Return the smooth skin, shape of its points."""
-    point = places(formed, parts)
+    point = place_points(formed, parts)
     first = formed.position.reshape(formed.rows, formed.columns, 2)
     fine = np.empty(point.shape[:2])
     lines = np.arange(len(point))

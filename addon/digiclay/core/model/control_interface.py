@@ -1,0 +1,87 @@
+"""Interface of the control methods: what is measured of cells, what is commanded to them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Commands", "Controller", "Measurement"]
+
+Floats = NDArray[np.float64]
+
+
+class Measurement(NamedTuple):
+    """Measured quantities of some cells.
+
+    Attributes
+    ----------
+    quadratic_basis : ndarray (6, m)
+        Rows 1, x, y, x², x y, y² of where they are, m.
+    height, force : ndarray (m,)
+        As measured, m and N.
+    target : ndarray (m,)
+        Height they are commanded to, m.
+    mode : ndarray (m,) of int8
+    own : ndarray (rows, m)
+        What the controller remembers of each cell; brought up to date in place.
+    cells : ndarray of int (m,)
+        Their numbers in the bed.
+    """
+
+    quadratic_basis: Floats
+    height: Floats
+    force: Floats
+    target: Floats
+    mode: NDArray[np.int8]
+    own: Floats
+    cells: NDArray[np.intp]
+
+
+class Commands(NamedTuple):
+    """Output of a controller, (m,) each: targets, m; modes; valve commands."""
+
+    target: Floats
+    mode: NDArray[np.int8]
+    command: Floats
+
+
+class Controller(Protocol):
+    """Control method with its parameters; its memory is an argument and a result."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        ...
+
+    def begin(self) -> Any:
+        """Return the memory before a session."""
+        ...
+
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float] | None]:
+        """Take in the cells the finger may touch; return memory and the disc x, y, radius to control.
+
+        Parameters
+        ----------
+        memory : object
+            From `begin`, or the period before.
+        touched : Measurement
+            Of the cells the finger may touch.
+        """
+        ...
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Return memory and orders for the cells of the disc and all that still move.
+
+        Parameters
+        ----------
+        memory : object
+            From `locate`.
+        seen : Measurement
+            Of the cells to command.
+        """
+        ...

@@ -1,0 +1,46 @@
+"""Marks of the Press tool in the view: lines and text that are seen on everything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..overlay.picture import Line, Words
+
+__all__ = ["edge_lines", "label"]
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: A light line on a dark one is seen on everything.
+DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
+
+
+def edge_lines(paths: Sequence[Floats], width: float) -> list[Line]:
+    """Return light lines on dark ones.
+
+    Parameters
+    ----------
+    paths : sequence of ndarray (k, 2)
+        Pixels.
+    width : float
+        Of a thin line, pixels.
+    """
+    return [Line(path, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for path in paths]
+
+
+def label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
+    """Return text beside a place, light on a dark edge.
+
+    Parameters
+    ----------
+    text : str
+    xy : (float, float)
+        Pixels.
+    scale : float
+        Of Blender's interface.
+    """
+    x, y, size = xy[0] + 22.0 * scale, xy[1] - 26.0 * scale, 12.0 * scale
+    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [*edge, Words(x, y, size, LIGHT, text)]

@@ -1,0 +1,107 @@
+"""The fingertip's size is changed from the Press tool: blister and lowest point keep their relation to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.core.scene.assembly import assemble
+from digiclay.device import view
+from digiclay.press.fingers import FINGERS, find_kind
+from digiclay.settings import finger_size, properties
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture
+def bed(extension: None) -> Any:
+    """A new bed, 25 x 25 pins."""
+    bpy.ops.mesh.digital_clay_add()
+    bpy.context.view_layer.update()
+    return bpy.context.object
+
+
+def lengths(bed: Any) -> tuple[float, ...]:
+    """Return size of the fingertip, then radius, edge and flat radius of the blister, mm."""
+    scene = properties.scene_of(bed)
+    blister = scene.blister
+    assert blister is not None
+    metres = (
+        2.0 * scene.fingers[0].fingertip.width,
+        blister.radius,
+        blister.edge_radius,
+        blister.flat_radius,
+    )
+    return tuple(round(1e3 * length, 4) for length in metres)
+
+
+def test_blister_and_drawn_ellipsoid_follow_the_size_in_proportion(bed: Any) -> None:
+    bed.digiclay.size = 8.0
+    assert lengths(bed) == (8.0, 7.5, 9.25, 3.0)
+    finger = bridge.finger_of(view.fingertip_of(bed))
+    assert (finger.length, finger.width, finger.height) == pytest.approx((5e-3, 4e-3, 4e-3), rel=1e-6)
+
+
+def test_a_blister_set_by_itself_keeps_its_size(bed: Any) -> None:
+    bed.digiclay.blister_follows = False
+    bed.digiclay.size = 8.0
+    assert lengths(bed) == (8.0, 15.0, 18.5, 6.0)
+
+
+@pytest.mark.parametrize("size", [5.0, 60.0])
+def test_the_lowest_point_stays_so_that_a_larger_finger_does_not_press(bed: Any, size: float) -> None:
+    before = bridge.pose(view.fingertip_of(bed))
+    bed.digiclay.size = size
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), before, rtol=0, atol=1e-7)
+
+
+def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(bed: Any) -> None:
+    bed.digiclay.size = 100.0
+    # Half the bed's longer side; a wider blister is no valid scene.
+    assert lengths(bed)[:2] == (100.0, 37.5)
+    bed.digiclay.size = 80.0
+    assert lengths(bed)[1] == 37.5
+    bed.digiclay.size = 16.0
+    assert lengths(bed) == pytest.approx((16.0, 15.0, 18.5, 6.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
+def test_a_size_stays_within_what_a_finger_can_have(bed: Any, asked: float, got: float) -> None:
+    finger_size.set_size(bed.digiclay, 1e-3 * asked)
+    assert lengths(bed)[0] == pytest.approx(got, rel=1e-6)
+
+
+def test_the_bracket_keys_scale_it_and_undo_brings_it_back(bed: Any) -> None:
+    bpy.ops.ed.undo_push(message="Add")
+    bpy.ops.digiclay.press_scale("EXEC_DEFAULT", True, scalar=1.5)
+    assert lengths(bpy.context.object)[0] == pytest.approx(24.0)
+    bpy.ops.ed.undo()
+    assert lengths(bpy.context.object)[0] == pytest.approx(16.0)
+
+
+def test_without_a_bed_or_its_fingertip_the_size_cannot_be_changed(bed: Any) -> None:
+    assert bpy.ops.digiclay.press_scale.poll()
+    bpy.data.objects.remove(view.fingertip_of(bed))
+    assert not bpy.ops.digiclay.press_scale.poll()
+    bpy.data.objects.remove(bed)
+    assert not bpy.ops.digiclay.press_scale.poll()
+
+
+@pytest.mark.parametrize("kind", list(FINGERS))
+def test_each_preset_finger_is_a_device_that_can_be_simulated_and_is_undone_in_one_step(
+    bed: Any, kind: str
+) -> None:
+    bpy.ops.ed.undo_push(message="Add")
+    bed.digiclay.size = 30.0
+    bpy.ops.ed.undo_push(message="Size")
+    bpy.ops.digiclay.press_finger("EXEC_DEFAULT", True, kind=kind)
+    scene = properties.scene_of(bpy.context.object)
+    assert find_kind(scene.fingers[0].fingertip) is FINGERS[kind]
+    assert scene.blister.radius == pytest.approx(min(37.5e-3, 15 / 8 * FINGERS[kind].finger.width), rel=1e-5)
+    assemble(scene)
+    bpy.ops.ed.undo()
+    assert lengths(bpy.context.object)[0] == pytest.approx(30.0)
