@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .tracking import Tracking
+
 __all__ = [
-    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "SHALLOWEST", "SYMMETRIES", "WAITING",
-    "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
+    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "RISING", "SHALLOWEST", "SYMMETRIES",
+    "WAITING", "Brush", "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
 #: Factors of x and y of a path and of its mirror images about the middle of the bed.
 Mirror = tuple[float, float]
 
-#: What the finger does: it waits for its turn, goes above the path's first place, presses there, goes along
-#: the path, leaves it; and the end.
-WAITING, ABOVE, PRESSING, DRAGGING, LEAVING, DONE = range(6)
+#: What the finger does: it waits for its turn, goes above the path's first place, presses there, rises with
+#: the blister (if its brush has one), goes along the path, leaves it; and the end.
+WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, DONE = range(7)
 #: Paths of a stroke, by its symmetry. There is one finger: it goes along them one after the other.
 SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
     "NONE": ((1.0, 1.0),),
@@ -26,11 +29,24 @@ SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
     "Y": ((1.0, 1.0), (1.0, -1.0)),
     "XY": ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)),
 }
-#: Deepest press, m, and least one.
+#: Deepest press, and least one, m; also the greatest and the least height of a raise.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
 #: Moves that come within this time of each other have waited together while Blender drew, s: their times are
 #: spread over the time since the one before, of which no more than this is taken for drawing, s.
 BURST, DRAWING = 4e-3, 1.0
+
+
+class Brush(Enum):
+    """Effect of a press stroke on the surface."""
+
+    LOWER = "LOWER"
+    RAISE = "RAISE"
+    LEVEL = "LEVEL"
+
+    @property
+    def inverse(self) -> Brush:
+        """What Ctrl makes of it."""
+        return {Brush.LOWER: Brush.RAISE, Brush.RAISE: Brush.LOWER}.get(self, self)
 
 
 @dataclass(frozen=True)
@@ -44,13 +60,16 @@ class Sample:
     x, y : float
         Place on the bed, m.
     depth : float
-        How deep to press there below the surface, m.
+        How far below the surface, or above it where it is raised, m.
+    share : float
+        Share of the way from the surface to the level, from 0 to 1.
     """
 
     time: float
     x: float
     y: float
     depth: float
+    share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +104,11 @@ class Stroke:
         When the last sample came, s.
     burst : int
         Index of the first sample that came together with the last one.
+    brush : Brush
+    tracking : Tracking or None
+        How the blister follows, of a brush that needs one; found when the finger begins.
+    climb : float
+        How fast the finger rises with the blister, m/s.
     """
 
     number: int
@@ -100,6 +124,9 @@ class Stroke:
     known: float = 0.0
     heard: float = 0.0
     burst: int = 0
+    brush: Brush = Brush.LOWER
+    tracking: Tracking | None = None
+    climb: float = 0.0
 
     @property
     def done(self) -> bool:
@@ -120,22 +147,25 @@ class Stroke:
 
 
 def start(
-    number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
-) -> Stroke:
+    number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
+    brush: Brush = Brush.LOWER, share: float = 1.0,
+) -> Stroke:  # fmt: skip
     """Return the stroke of a mouse that goes down at a place, m.
 
     Parameters
     ----------
     number : int
-    x, y, depth : float
-        m.
+    x, y, depth, share : float
+        See `Sample`.
     mirrors : tuple of (float, float), optional
         See `SYMMETRIES`.
+    brush : Brush, optional
     """
-    return Stroke(number, (Sample(0.0, x, y, _limit_depth(depth)),), mirrors=mirrors)
+    first = Sample(0.0, x, y, _limit_depth(depth), share)
+    return Stroke(number, (first,), mirrors=mirrors, brush=brush)
 
 
-def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Stroke:
+def draw(stroke: Stroke, time: float, x: float, y: float, depth: float, share: float = 1.0) -> Stroke:
     """Return the stroke drawn on to a place; nothing is added to one that is let go.
 
     Parameters
@@ -143,12 +173,12 @@ def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Strok
     stroke : Stroke
     time : float
         When Blender tells of the move, since the mouse went down, s; see `BURST`.
-    x, y, depth : float
+    x, y, depth, share : float
         See `Sample`.
     """
     if not stroke.held:
         return stroke
-    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth)))
+    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth), share))
     together = time - stroke.heard < BURST and stroke.burst > 0
     first = stroke.burst if together else len(samples) - 1
     start = max(samples[first - 1].time, time - DRAWING)
@@ -161,7 +191,7 @@ def draw(stroke: Stroke, time: float, x: float, y: float, depth: float) -> Strok
 
 
 def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
-    """Return the stroke pressed deeper where it is, m, within what can be pressed.
+    """Return the stroke with another depth where it is, m, within what is possible.
 
     Parameters
     ----------
@@ -172,7 +202,7 @@ def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
         m.
     """
     last = stroke.samples[-1]
-    return draw(stroke, time, last.x, last.y, last.depth + by)
+    return draw(stroke, time, last.x, last.y, last.depth + by, last.share)
 
 
 def _limit_depth(depth: float) -> float:

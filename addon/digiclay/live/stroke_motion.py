@@ -5,6 +5,9 @@ presses to its depth where the mouse went down, goes along the whole path, never
 never faster than a drag may be, and leaves upwards. A slow machine, or clay that gives way slowly, thus
 makes the finger late, and loses nothing of the path. Depth counts from the surface as it was when the
 finger began: pins that give way do not draw the finger after them. No Blender in here.
+
+A brush that raises presses until the blister starts, and rises to its height there, no faster than the
+pins can follow; then it goes along at that height, at a speed at which the pins ahead rise in time.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from numpy.typing import NDArray
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
-from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, Stroke
+from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
+from .tracking import Tracking
 
 __all__ = ["APPROACH", "DRAG", "SPEED", "follow"]
 
@@ -35,6 +39,11 @@ LIFT, CROSS = 0.4, 1.0
 DRAG = 0.1
 #: How far above the highest pin the finger passes over the bed, m.
 CLEARANCE = 4e-3
+#: How long a finger that takes a blister up gains speed, s: at once at half the free speed, it leaves the
+#: pins behind, whose valves have not opened yet.
+SPEED_UP = 1.0
+#: How far the finger may be off its height while it goes on along the path, m.
+SLACK = 0.5e-3
 #: Heights that differ by less count as equal, m.
 NEAR = 1e-9
 #: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
@@ -51,6 +60,7 @@ def follow(
     count: int,
     period: float,
     now: float,
+    tracking: Tracking | None = None,
 ) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a press stroke.
 
@@ -70,6 +80,8 @@ def follow(
         Control period, s.
     now : float
         Time by the wall, s, by a clock that never goes back.
+    tracking : Tracking, optional
+        How the device's blister follows; None without one. Taken by a stroke that begins.
 
     Returns
     -------
@@ -78,7 +90,7 @@ def follow(
         Poses between the periods, row 0 where the finger was; k is at most `count`.
     """
     if stroke.height is None:
-        stroke = replace(stroke, height=height.copy(), phase=ABOVE)
+        stroke = _begin(stroke, height, tracking)
     path, peak = [pose], float(height.max())
     while len(path) <= count and not stroke.done:
         stroke, place = _step(stroke, grid, finger, path[-1], peak, period, now)
@@ -87,6 +99,16 @@ def follow(
 
 
 Place = tuple[float, float, float]
+
+
+def _begin(stroke: Stroke, height: Floats, tracking: Tracking | None) -> Stroke:
+    """Return the stroke at its beginning; one whose brush needs a blister only leaves a device without."""
+    stroke = replace(stroke, height=height.copy(), phase=ABOVE)
+    if stroke.brush is Brush.LOWER:
+        return stroke
+    if tracking is None:
+        return replace(stroke, phase=LEAVING, mirrors=stroke.mirrors[:1])
+    return replace(stroke, tracking=tracking)
 
 
 def _step(
@@ -102,28 +124,113 @@ def _step(
     safe = max(peak, float(height.max())) + CLEARANCE
     if stroke.phase == ABOVE:
         return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
+    radius = finger.width / 2
     if stroke.phase == LEAVING:
+        if stroke.tracking is not None:
+            safe = max(safe, _find_lowest(stroke, grid, x, y, radius) + stroke.tracking.sink + CLEARANCE)
         z = min(safe, z + LIFT * period)
         return (_finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
+    move = _press if stroke.tracking is None or stroke.phase == PRESSING else _track
+    stroke, (x, y, z) = move(stroke, grid, radius, (x, y, z), period)
+    over = not stroke.held and stroke.reached == len(stroke.samples) - 1
+    if stroke.phase == DRAGGING and over and abs(z - _find_lowest(stroke, grid, x, y, radius)) < NEAR:
+        stroke = replace(stroke, phase=LEAVING)
+    return stroke, (x, y, z)
+
+
+def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: float) -> tuple[Stroke, Place]:
+    """Press into the surface, or drag at a depth below it."""
+    height = stroke.height
+    assert height is not None
+    x, y, z = place
     if stroke.phase == DRAGGING:
         stroke, x, y = _drag(stroke, x, y, DRAG * period)
-    surface = find_ground_height(grid, height, x, y, finger.width / 2)
+    surface = find_ground_height(grid, height, x, y, radius)
     # Pins bottom out on the bed's floor.
-    lowest = max(0.0, surface - stroke.samples[stroke.reached].depth)
+    if stroke.tracking is None:
+        lowest, after = _find_lowest(stroke, grid, x, y, radius), DRAGGING
+    else:
+        lowest, after = max(0.0, surface - stroke.tracking.press), RISING
     z = _sink(z, surface, lowest, period)
-    pressed = abs(z - lowest) < NEAR
-    if stroke.phase == PRESSING and pressed:
-        return replace(stroke, phase=DRAGGING), (x, y, z)
-    over = not stroke.held and stroke.reached == len(stroke.samples) - 1
-    if stroke.phase == DRAGGING and over and pressed:
-        return replace(stroke, phase=LEAVING), (x, y, z)
-    return stroke, (x, y, z)
+    pressed = stroke.phase == PRESSING and abs(z - lowest) < NEAR
+    return (replace(stroke, phase=after) if pressed else stroke), (x, y, z)
+
+
+def _track(stroke: Stroke, grid: Grid, radius: float, place: Place, period: float) -> tuple[Stroke, Place]:
+    """Take the blister up, or along; it goes along where the finger is at its height."""
+    tracking = stroke.tracking
+    assert tracking is not None
+    x, y, z = place
+    lowest = _find_lowest(stroke, grid, x, y, radius)
+    if stroke.phase == DRAGGING and abs(z - lowest) <= SLACK:
+        stroke, x, y = _drag(stroke, x, y, _limit_drag(stroke, grid, place) * period)
+        lowest = _find_lowest(stroke, grid, x, y, radius)
+    z, climb = _climb(z, stroke.climb, lowest, tracking.lift, period)
+    risen = stroke.phase == RISING and abs(z - lowest) < NEAR
+    return replace(stroke, climb=climb, phase=DRAGGING if risen else stroke.phase), (x, y, z)
+
+
+def _find_lowest(stroke: Stroke, grid: Grid, x: float, y: float, radius: float) -> float:
+    """Return how low the finger is to be at a place of its path, m.
+
+    Parameters
+    ----------
+    stroke : Stroke
+    grid : Grid
+    x, y, radius : float
+        The place, and how far about it the surface counts, m.
+    """
+    height, sample = stroke.height, stroke.samples[stroke.reached]
+    assert height is not None
+    surface = find_ground_height(grid, height, x, y, radius)
+    if stroke.tracking is None:
+        return max(0.0, surface - sample.depth)
+    if stroke.brush is Brush.RAISE:
+        top = surface + sample.depth
+    else:
+        level = find_ground_height(grid, height, *stroke.place(0), radius)
+        top = surface + sample.share * (level - surface)
+    return max(0.0, min(top, stroke.tracking.highest) - stroke.tracking.sink)
+
+
+def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
+    """Return how fast the finger may go along so that the pins ahead are at its height in time, m/s."""
+    assert stroke.height is not None
+    assert stroke.tracking is not None
+    x, y, z = place
+    tracking = stroke.tracking
+    near = stroke.height[grid.disc(x, y, tracking.radius)]
+    change = float(np.abs(near - z - tracking.sink).max(initial=NEAR))
+    return min(DRAG, tracking.speed / (tracking.slope * change))
+
+
+def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:
+    """Return height and speed after a control period on the way to a height, m and m/s.
+
+    Parameters
+    ----------
+    z, climb : float
+        Height, m, and speed upwards, m/s.
+    aim : float
+        m.
+    fastest : float
+        m/s; it is reached in the time `SPEED_UP`.
+    period : float
+        s.
+    """
+    gain = fastest / SPEED_UP
+    far = aim - z
+    wanted = math.copysign(min(fastest, math.sqrt(2.0 * gain * abs(far))), far)
+    climb += min(max(wanted - climb, -gain * period), gain * period)
+    if abs(far) <= max(abs(climb), gain * period) * period:
+        return aim, 0.0
+    return z + climb * period, climb
 
 
 def _finish_image(stroke: Stroke) -> Stroke:
     """Return the stroke with its next mirror image begun; without one it is done."""
     if stroke.image + 1 < len(stroke.mirrors):
-        return replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0)
+        return replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, climb=0.0)
     return replace(stroke, phase=DONE)
 
 

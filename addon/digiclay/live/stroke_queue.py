@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
-from .stroke import SYMMETRIES, Mirror, Stroke, start
+from .stroke import SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
+from .tracking import find_tracking
 
 __all__ = ["change_stroke", "drop_strokes", "find_stroke", "last_place", "queue_stroke", "take_path"]
 
@@ -19,20 +20,24 @@ Floats = NDArray[np.float64]
 
 
 def queue_stroke(
-    running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"]
-) -> tuple[Running, int]:
+    running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
+    brush: Brush = Brush.LOWER, share: float = 1.0,
+) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
 
     Parameters
     ----------
     running : Running
-    x, y, depth : float
-        m.
+    x, y, depth, share : float
+        See `stroke.Sample`.
     mirrors : tuple of (float, float), optional
         See `stroke.SYMMETRIES`.
+    brush : Brush, optional
     """
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
-    return replace(running, strokes=(*running.strokes, start(number, x, y, depth, mirrors))), number
+    return replace(
+        running, strokes=(*running.strokes, start(number, x, y, depth, mirrors, brush, share))
+    ), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:
@@ -92,13 +97,17 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
         Poses between the periods, k at most `count`.
     """
     system, first = running.system, running.strokes[0]
+    tracking = first.tracking
     if first.height is None:
+        tracking = find_tracking(running.scene, system)
         begun = Gesture(running.state.period, running.snapshot, running.pose)
         running = replace(running, next_gesture=begun, stroke_start=begun)
     finger = find_ellipsoid(running.scene)
     height = running.state.row(0)
     now = running.clock.seen or first.began
-    stroke, path = follow(first, system.grid, height, finger, running.pose, count, system.period, now)
+    stroke, path = follow(
+        first, system.grid, height, finger, running.pose, count, system.period, now, tracking
+    )
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:

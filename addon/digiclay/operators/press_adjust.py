@@ -7,7 +7,7 @@ import numpy as np
 from ..compat import bpy
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
-from ..live.stroke import DEEPEST, SHALLOWEST
+from ..live.stroke import DEEPEST, SHALLOWEST, Brush
 from ..press import aim, brush
 from ..settings import finger_size
 from .action import Action
@@ -55,7 +55,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
 
 
 class AdjustDepth(AdjustMixin, bpy.types.Operator):
-    """Set the depth of a press: move the mouse sideways, or type a depth"""
+    """Set the depth, or the height of Raise: move the mouse sideways, or type it"""
 
     bl_idname = "digiclay.press_depth"
     bl_label = "Press Depth"
@@ -63,20 +63,21 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     low, high, snap = SHALLOWEST, DEEPEST, 0.5e-3
 
     def read(self, bed: Any, settings: Any) -> float:
-        """Return the tool's depth, m."""
-        return 1e-3 * float(settings.depth)
+        """Return the depth, or height, of the tool's brush, m."""
+        self.amount = brush.amount_name(Brush(settings.brush))
+        return 1e-3 * float(getattr(settings, self.name))
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
-        """Set the tool's depth."""
-        settings.depth = 1e3 * value
+        """Set the depth, or height, of the tool's brush."""
+        setattr(settings, brush.amount_name(Brush(settings.brush)), 1e3 * value)
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return m a pixel."""
         return DEPTH_PIXEL / float(context.preferences.system.ui_scale)
 
     def say(self, value: float) -> str:
-        """Return the depth in mm."""
-        return f"Depth {1e3 * value:.2f} mm"
+        """Return the depth, or height, in mm."""
+        return f"{self.amount.title()} {1e3 * value:.2f} mm"
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return what of the finger touches at the depth."""

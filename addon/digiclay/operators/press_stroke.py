@@ -9,20 +9,22 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..device import view
 from ..live import running, selection, tick
-from ..live.stroke import DEEPEST, SYMMETRIES, deepen, draw
+from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
+from ..live.tracking import find_tracking
 from ..press import aim, brush
+from ..settings.declared import title
 from . import status
 from .action import Polled
 
 __all__ = ["Press"]
 
-#: Depth of a turn of the wheel, and of a pixel of Ctrl-drag at a UI scale of 1; m.
-WHEEL, PIXEL = 0.25e-3, 0.02e-3
-WHEELS = {"WHEELUPMOUSE": -WHEEL, "WHEELDOWNMOUSE": WHEEL}
-KEYS = (
-    "Depth {:.2f} mm  |  Ctrl and wheel, or Ctrl and drag: depth  |  Esc or right click: take the press back"
-)
+#: How far a turn of the wheel takes the surface up, m.
+WHEEL = 0.25e-3
+WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
+KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
+#: What is told where a brush cannot work.
+NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
 
 
 class Press(Polled, bpy.types.Operator):
@@ -33,9 +35,15 @@ class Press(Polled, bpy.types.Operator):
     # No undo step of its own: the session makes it when the finger has finished the stroke.
     bl_options = {"INTERNAL"}
 
+    brush: bpy.props.EnumProperty(
+        name="Brush",
+        description="What a stroke does to the surface",
+        items=brush.BRUSH_ITEMS,
+        default="LOWER",
+    )
     depth: bpy.props.FloatProperty(
         name="Depth (mm)",
-        description="Depth of the press below the surface, in mm",
+        description="How far a stroke of Lower goes below the surface, in mm",
         default=4.0,
         min=0.1,
         max=1e3 * DEEPEST,
@@ -43,9 +51,22 @@ class Press(Polled, bpy.types.Operator):
         precision=2,
         step=25,
     )
+    height: bpy.props.FloatProperty(
+        name="Height (mm)",
+        description="How far a stroke of Raise goes above the surface, in mm",
+        default=15.0,
+        min=0.1,
+        max=1e3 * DEEPEST,
+        soft_max=30.0,
+        precision=2,
+        step=100,
+    )
     strength: bpy.props.FloatProperty(
         name="Strength",
-        description="Share of the depth that a stroke reaches; pen pressure scales it further",
+        description=(
+            "Share of the depth, of the height, or of the way to the level that a stroke reaches; "
+            "pen pressure scales it further"
+        ),
         default=1.0,
         min=0.01,
         max=1.0,
@@ -63,7 +84,7 @@ class Press(Polled, bpy.types.Operator):
     )
     use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
-        description="Pen pressure scales the depth, up to its value",
+        description="Pen pressure scales depth, height and strength, up to their values",
         default=True,
     )
 
@@ -85,17 +106,25 @@ class Press(Polled, bpy.types.Operator):
         except (DigiclayError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
+        # Ctrl inverts the brush, for as long as this stroke lasts.
+        self.kind = Brush(self.brush).inverse if event.ctrl else Brush(self.brush)
+        if self.kind is not Brush.LOWER and find_tracking(session.scene, session.system) is None:
+            self.report({"ERROR"}, NO_BLISTER.format(brush.LABELS[self.kind], title(session.scene.method)))
+            return {"CANCELLED"}
         if session.paused:
             self.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
         selection.deselect(found.bed)
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
-        self.uid, self.grid, self.height = session.uid, found.grid, found.height.copy()
-        self.region, self.began, self.before = context.region, time.perf_counter(), event.mouse_y
-        self.full, self.pressure, self.ticked = 1e-3 * self.depth, 1.0, 0.0
+        self.uid, self.grid, self.surface = session.uid, found.grid, found.height.copy()
+        self.region, self.began = context.region, time.perf_counter()
+        self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
+        self.pressure, self.ticked = 1.0, 0.0
         self._feel(event)
         place = float(found.point[0]), float(found.point[1])
-        mirrors = SYMMETRIES[self.symmetry]
-        session, self.number = queue_stroke(session, *place, self._pressed_depth(), mirrors)
+        depth, share = self._amount()
+        session, self.number = queue_stroke(
+            session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share
+        )
         running.put(session)
         context.window_manager.modal_handler_add(self)
         self._tell(context)
@@ -116,7 +145,7 @@ class Press(Polled, bpy.types.Operator):
         if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE"):
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl:
-            self._deepen(context, WHEELS[event.type])
+            self._deepen(context, WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(lambda stroke: replace(stroke, held=False))
@@ -138,28 +167,26 @@ class Press(Polled, bpy.types.Operator):
         self._end(set())
 
     def _move(self, context: Any, bed: Any, event: Any) -> None:
-        """Draw on to the place under the mouse, or with Ctrl change the depth."""
-        down, self.before = self.before - event.mouse_y, event.mouse_y
+        """Draw on to the place under the mouse."""
         self._feel(event)
-        if event.ctrl and event.type != "LEFTMOUSE":
-            self._deepen(context, PIXEL * down / context.preferences.system.ui_scale)
-            return
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
-            point = aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
+            point = aim.hit_point(bpy.context, bed, self.grid, self.surface, xy)
         if point is not None and event.value != "PRESS":
             x, y = float(point[0]), float(point[1])
-            self._change(partial(draw, time=self._time(), x=x, y=y, depth=self._pressed_depth()))
+            depth, share = self._amount()
+            self._change(partial(draw, time=self._time(), x=x, y=y, depth=depth, share=share))
 
     def _deepen(self, context: Any, by: float) -> None:
-        """Press deeper, m, from here on; the tool shows the new depth beside the cursor and in the header."""
+        """Change depth or height, m, from here on; the tool shows it beside the cursor and in the header."""
         self.full = min(max(self.full + by, 0.0), DEEPEST)
         self._change(partial(deepen, time=self._time(), by=by * self.strength * self.pressure))
-        self._keep_depth(context)
+        self._keep_amount(context)
 
-    def _pressed_depth(self) -> float:
-        """Return how deep to press now, m."""
-        return float(self.full * self.strength * self.pressure)
+    def _amount(self) -> tuple[float, float]:
+        """Return depth or height, m, and share of a sample drawn now."""
+        share = float(self.strength * self.pressure)
+        return float(self.full) * share, share
 
     def _change(self, change: Any) -> None:
         """Put a changed stroke into the session's queue."""
@@ -176,16 +203,18 @@ class Press(Polled, bpy.types.Operator):
         if self.use_pressure and event.is_tablet:
             self.pressure = min(max(float(event.pressure), 0.0), 1.0)
 
-    def _keep_depth(self, context: Any) -> None:
-        """Let the next press have the depth of this one."""
-        self.depth = 1e3 * self.full
+    def _keep_amount(self, context: Any) -> None:
+        """Let the next stroke of this brush have the depth or height of this one."""
+        name = brush.amount_name(self.kind)
+        setattr(self, name, 1e3 * self.full)
         settings = brush.tool_settings(context)
         if settings is not None:
-            settings.depth = self.depth
+            setattr(settings, name, 1e3 * self.full)
 
     def _tell(self, context: Any) -> None:
-        """Show depth and keys in the status bar."""
-        status.show(context, KEYS.format(1e3 * self._pressed_depth()))
+        """Show brush, depth or height, and keys in the status bar."""
+        said = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
+        status.show(context, KEYS.format(said))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar."""

@@ -7,9 +7,11 @@ from typing import Any
 from ..core.model.fingertip import Fingertip
 from ..device import view
 from ..live import waiting
+from ..live.stroke import Brush
 
 __all__ = [
-    "ADJUSTING", "OPERATOR", "SYMMETRY_ITEMS", "TOOL", "bed_in_use", "describe_brush", "find_bed",
+    "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "SYMMETRY_ITEMS", "TOOL", "amount_name", "bed_in_use",
+    "describe_brush", "describe_stroke", "find_bed",
     "tool_settings",
 ]  # fmt: skip
 
@@ -17,6 +19,20 @@ __all__ = [
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
 ADJUSTING = frozenset({"DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength"})
+LABELS = {Brush.LOWER: "Lower", Brush.RAISE: "Raise", Brush.LEVEL: "Level"}
+BRUSH_ITEMS = (
+    ("LOWER", LABELS[Brush.LOWER], "Press a valley of the given depth. With Ctrl: Raise"),
+    (
+        "RAISE",
+        LABELS[Brush.RAISE],
+        "Press lightly, lift the blister by the given height, and draw it along: a ridge. With Ctrl: Lower",
+    ),
+    (
+        "LEVEL",
+        LABELS[Brush.LEVEL],
+        "Bring hills and hollows to the height of the surface under the first touch",
+    ),
+)
 SYMMETRY_ITEMS = (
     ("NONE", "No Symmetry", "Form the stroke alone"),
     ("X", "X", "Form the stroke, then its mirror image across the bed's YZ plane"),
@@ -52,16 +68,38 @@ def bed_in_use(context: Any) -> Any | None:
     return seen[0] if len(seen) == 1 else None
 
 
-def describe_brush(finger: Fingertip, depth: float, strength: float = 1.0) -> str:
-    """Return size and depth in mm, as shown beside the cursor.
+def amount_name(brush: Brush) -> str:
+    """Return which of the tool's settings says how far a brush goes: depth or height."""
+    return "height" if brush is Brush.RAISE else "depth"
+
+
+def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: float = 1.0) -> str:
+    """Return size, brush, and depth or height in mm, as shown beside the cursor.
 
     Parameters
     ----------
     finger : Fingertip
+    brush : Brush
     depth : float
-        m.
+        Depth or height, m.
     strength : float, optional
-        Share of the depth.
+        Share of it.
     """
+    return f"Size {2e3 * finger.width:.3g} mm   {describe_stroke(brush, depth, strength)}"
+
+
+def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
+    """Return a brush, and its depth or height in mm.
+
+    Parameters
+    ----------
+    brush : Brush
+    depth : float
+        Depth or height, m.
+    strength : float, optional
+        Share of it.
+    """
+    if brush is Brush.LEVEL:
+        return f"{LABELS[brush]} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
-    return f"Size {2e3 * finger.width:.3g} mm   Depth {1e3 * depth:.3g} mm{share}"
+    return f"{LABELS[brush]}, {amount_name(brush)} {1e3 * depth:.3g} mm{share}"

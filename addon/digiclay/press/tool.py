@@ -14,10 +14,10 @@ from ..core.surface.pointing import find_contact_outline
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
-from ..live.stroke import SYMMETRIES
+from ..live.stroke import SYMMETRIES, Brush
 from ..settings import finger_size
 from . import aim, marks
-from .brush import ADJUSTING, OPERATOR, TOOL, bed_in_use, describe_brush
+from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush
 from .drape import drape
 from .fingers import find_kind
 
@@ -69,8 +69,17 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     lines = [corner + aim.project(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
-    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), depth, settings.strength)
+    brush = _shown_brush(found.bed, settings)
+    amount = 1e-3 * getattr(settings, amount_name(brush))
+    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), brush, amount, settings.strength)
     cursor(marks.edge_lines(shown, width), marks.label(text, xy, context.preferences.system.ui_scale))
+
+
+def _shown_brush(bed: Any, settings: Any) -> Brush:
+    """Return the brush of the stroke that is drawn, which Ctrl may have inverted, or the tool's."""
+    session = running.find(bed)
+    last = session.strokes[-1] if session is not None and session.strokes else None
+    return last.brush if last is not None and last.held else Brush(settings.brush)
 
 
 def _trail(found: aim.Target) -> list[Floats]:
@@ -100,7 +109,8 @@ class PressTool(bpy.types.WorkSpaceTool):
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; F, Shift F and Ctrl F set size, depth and strength; a pen presses by itself"
+        "Drag to sculpt; Ctrl inverts Lower and Raise; F, Shift F and Ctrl F set size, depth or height, and "
+        "strength; a pen presses by itself"
     )
     bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
@@ -132,7 +142,9 @@ class PressTool(bpy.types.WorkSpaceTool):
             row.menu("DIGICLAY_MT_fingers", text=kind.label if kind else "Finger")
             row.prop(bed.digiclay, "size")
             row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
-        layout.prop(settings, "depth")
+        layout.row(align=True).prop(settings, "brush", expand=True)
+        if settings.brush != "LEVEL":
+            layout.prop(settings, amount_name(Brush(settings.brush)))
         layout.prop(settings, "strength")
         layout.prop(settings, "use_pressure")
         layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")

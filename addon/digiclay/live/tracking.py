@@ -1,0 +1,135 @@
+"""Tracking of a fingertip by a device's blister: what a press stroke that raises has to keep to. No Blender.
+
+Method I and Method II hold the force under the finger: once it has been pressed in, pins that feel it rise
+with it. So clay is raised by a light press and a rise that the pins can follow, and it is leveled by a
+finger that goes along at one height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.control.blister import Blister
+from ..core.control.cell_states import CellStates
+from ..core.control.virtual_master import VirtualMaster
+from ..core.engine.system import System
+from ..core.model.fingertip import Fingertip
+from ..core.model.layout import Layout
+from ..core.model.relaxation import Relaxation
+from ..core.model.touch import Touch
+from ..core.scene.schema import Scene
+from ..device.instant import find_ellipsoid
+
+__all__ = ["Tracking", "find_tracking"]
+
+Floats = NDArray[np.float64]
+
+#: How long a pin is under a finger that drags, s: some 4 mm at 14 mm/s. The pulp relaxes meanwhile.
+CONTACT_TIME = 0.3
+#: How far beyond the depth that starts a blister the first press goes, m.
+MARGIN = 0.5e-3
+#: Share of the pins' own speed at which a finger rises: at 0.8 Method II loses it.
+SHARE = 0.7
+#: Samples across a finger, and halvings, in the search for its sink.
+SAMPLES, HALVINGS = 41, 40
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """Limits within which the blister of a device follows a fingertip.
+
+    Attributes
+    ----------
+    sink : float
+        How far the finger's lowest point lies below the pins' tops while they hold its force, m.
+    press : float
+        Depth of a press that starts a blister, m.
+    speed : float
+        Speed at which pins rise without load, m/s.
+    lift : float
+        Speed at which a finger can rise with the blister under it, m/s.
+    slope : float
+        Steepest slope of the blister's profile per height, 1/m.
+    radius : float
+        Of the blister, m.
+    highest : float
+        Highest place of a pin's top, m.
+    """
+
+    sink: float
+    press: float
+    speed: float
+    lift: float
+    slope: float
+    radius: float
+    highest: float
+
+
+def find_tracking(scene: Scene, system: System) -> Tracking | None:
+    """Return how the blister of a scene follows a fingertip; None where its method has no blister.
+
+    Parameters
+    ----------
+    scene : Scene
+    system : System
+        Of the scene.
+    """
+    control, touch, blister = scene.control, system.cell.touch, scene.blister
+    if not isinstance(control, VirtualMaster | CellStates) or touch is None or blister is None:
+        return None
+    asked = control.force_setpoint
+    # Method II holds a force on every pin, so that they take on the finger's form; Method I holds their sum.
+    if isinstance(control, CellStates):
+        sink, trigger = _find_sink(touch, np.zeros(1), 1.0, asked), control.spring_trigger
+    else:
+        gap, share = _sample_underside(find_ellipsoid(scene), system.grid.layout)
+        sink, trigger = _find_sink(touch, gap, share, asked), asked
+    # Before a blister starts the pins give way like springs.
+    press = sink + trigger / control.spring_stiffness + MARGIN
+    # A valve that feels no force opens by gain times set point; the flow goes with the square of that.
+    opening = min(1.0, control.force_gain * asked)
+    speed = float(system.fastest)
+    lift, highest = SHARE * speed * opening**2, system.cell.actuator.stroke
+    return Tracking(sink, press, speed, lift, _find_slope(blister), blister.radius, highest)
+
+
+def _find_slope(blister: Blister) -> float:
+    """Return the steepest slope of a blister's profile, 1/m."""
+    distance = np.linspace(0.0, blister.radius, 201)
+    return float(-np.diff(blister.evaluate_profile(distance)).min() / distance[1])
+
+
+def _sample_underside(finger: Fingertip, layout: Layout) -> tuple[Floats, float]:
+    """Return heights of a level finger's underside over its lowest point, m, and pins per height."""
+    x = np.linspace(-finger.length, finger.length, SAMPLES)
+    y = np.linspace(-finger.width, finger.width, SAMPLES)
+    square = (x[:, None] / finger.length) ** 2 + (y / finger.width) ** 2
+    gap = finger.height * (1.0 - np.sqrt(1.0 - square[square < 1.0]))
+    return gap, float(x[1] - x[0]) * float(y[1] - y[0]) / (layout.pitch * layout.row_spacing)
+
+
+def _find_sink(touch: Touch, gap: Floats, share: float, force: float) -> float:
+    """Return how deep a finger lies in flat pins under a force.
+
+    Parameters
+    ----------
+    touch : Touch
+    gap : ndarray (k,)
+        Height of its underside over its lowest point at some places, m.
+    share : float
+        How many pins each of the places stands for.
+    force : float
+        N.
+    """
+    pulp = touch.pulp
+    kept = float(pulp.reduced(np.array(CONTACT_TIME))) if isinstance(pulp, Relaxation) else 1.0
+    low, high = 0.0, touch.fingertip.height
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2.0
+        tension = touch.contact.tension(middle - gap)
+        enough = kept * share * touch.contact.share * float(tension.sum()) >= force
+        low, high = (low, middle) if enough else (middle, high)
+    return high

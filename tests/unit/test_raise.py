@@ -1,0 +1,188 @@
+"""Raise leaves the paper's ridge, and Level one height, through the device's own blister."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import live_periods
+from digiclay.live import gestures, sculpting
+from digiclay.live.running import Running
+from digiclay.live.stroke import DEEPEST, Brush, draw, start
+from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.live.tracking import find_tracking
+from numpy.typing import NDArray
+
+from tests.hand import TICK, heights
+
+Floats = NDArray[np.float64]
+Places = list[tuple[float, float]]
+#: Half the length of a stroke, mm; it is drawn within half a second.
+HALF, DURATION = 30.0, 0.5
+ALONG: Places = [(-HALF, 0.0), (HALF, 0.0)]
+
+
+@pytest.fixture(autouse=True)
+def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out no control period: what a test forms must not depend on who else uses the machine."""
+    monkeypatch.setattr(live_periods, "SHARE", 1e9)
+
+
+def begin(**tables: object) -> Running:
+    """Return a session of the paper's bed, with other parameters."""
+    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
+    session, _ = sculpting.begin_session(7, "Bed", resolve(dict(tables)), above)
+    return sculpting.advance(session, above, 0.0, 100)
+
+
+def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+    """Queue a quick stroke from place to place, mm."""
+    (x, y), (to_x, to_y) = (np.array(place) * 1e-3 for place in ends)
+    session, number = queue_stroke(session, x, y, depth * 1e-3, brush=brush, share=share)
+    for part in np.arange(1, 31) / 30:
+        at = x + part * (to_x - x), y + part * (to_y - y)
+        session = change_stroke(
+            session, number,
+            lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),
+        )  # fmt: skip
+    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
+
+
+def finish(session: Running, most: float = 60.0) -> Running:
+    """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
+    now = session.clock.seen or 0.0
+    for count in range(round(most / TICK)):
+        if not session.strokes:
+            break
+        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    assert not session.strokes
+    now = session.clock.seen or 0.0
+    for count in range(15):
+        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    return session
+
+
+def form(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+    """Queue a stroke and finish it."""
+    return finish(queue(session, ends, brush, depth, share))
+
+
+def rise(session: Running) -> Floats:
+    """Return the heights above rest, shape (25, 25), mm; rows along y."""
+    return 1e3 * (heights(session) - session.system.cell.actuator.rest_height).reshape(25, 25)
+
+
+def along(session: Running, y: float = 0.0) -> Floats:
+    """Return the heights of the pins that a stroke along x at y, mm, has passed, above rest, mm."""
+    row = 12 + round(y / 3.0)
+    return rise(session)[row, 12 - round(HALF / 3.0) : 13 + round(HALF / 3.0)]
+
+
+@pytest.fixture(scope="module")
+def ridge() -> Running:
+    """A ridge raised with the defaults in one stroke along a line."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live_periods, "SHARE", 1e9)
+        return form(begin(), ALONG, Brush.RAISE)
+
+
+def test_a_line_of_60_mm_is_raised_by_15_mm_in_one_stroke(ridge: Running) -> None:
+    np.testing.assert_allclose(along(ridge), 15.0, rtol=0, atol=1.0)
+
+
+def test_the_ridge_has_the_section_of_the_blister(ridge: Running) -> None:
+    blister = ridge.scene.blister
+    assert blister is not None
+    across = rise(ridge)[:, 12]
+    # 3 mm apart: the finger's path makes the flat top no wider than a pin's pitch.
+    wanted = 15.0 * blister.evaluate_profile(np.abs(np.arange(-12, 13)) * 3e-3).clip(0.0)
+    np.testing.assert_allclose(across, wanted, rtol=0, atol=1.0)
+
+
+def test_a_raise_presses_no_harder_than_a_press(ridge: Running) -> None:
+    assert ridge.trace.force.max() < 2.0
+
+
+@pytest.mark.parametrize("preset", ["fast", "viscous"])
+def test_other_devices_raise_as_high(preset: str) -> None:
+    np.testing.assert_allclose(along(form(begin(preset=preset), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=1.5)
+
+
+def test_method_2_raises_the_whole_line() -> None:
+    formed = along(form(begin(control={"method": "cell_states"}), ALONG, Brush.RAISE))
+    np.testing.assert_allclose(formed, 15.0, rtol=0, atol=2.0)
+
+
+def test_noisy_sensors_do_not_lose_the_ridge() -> None:
+    noisy = {"force_noise": "2 mN", "height_noise": "20 um"}
+    np.testing.assert_allclose(along(form(begin(sensors=noisy), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=2.0)
+
+
+def test_ridges_drawn_in_quick_succession_both_form() -> None:
+    session = queue(begin(), [(-HALF, -21.0), (HALF, -21.0)], Brush.RAISE)
+    done = finish(queue(session, [(-HALF, 21.0), (HALF, 21.0)], Brush.RAISE))
+    for y in (-21.0, 21.0):
+        np.testing.assert_allclose(along(done, y), 15.0, rtol=0, atol=1.0)
+    assert len(done.gestures) == 2
+
+
+def test_a_ridge_along_the_edge_of_the_bed_is_raised_too() -> None:
+    formed = form(begin(), [(-36.0, 36.0), (36.0, 36.0)], Brush.RAISE)
+    np.testing.assert_allclose(rise(formed)[-1], 15.0, rtol=0, atol=1.0)
+
+
+def test_at_the_end_of_the_stroke_pins_are_raised_as_far_as_they_go() -> None:
+    session = begin(actuator={"stroke": "50 mm"})
+    formed = along(form(session, ALONG, Brush.RAISE, 30.0))
+    np.testing.assert_allclose(formed, 10.0, rtol=0, atol=0.7)
+
+
+def test_level_lowers_a_hill_and_raises_a_hollow() -> None:
+    session = form(begin(), [(12.0, -9.0), (12.0, 9.0)], Brush.RAISE, 6.0)
+    session = form(session, [(-12.0, -9.0), (-12.0, 9.0)], Brush.LOWER, 8.0)
+    before = along(session)
+    assert (before.max(), before.min()) == (pytest.approx(6.0, abs=1.0), pytest.approx(-8.0, abs=2.5))
+    level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
+    np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=1.0)
+
+
+def test_half_the_strength_levels_half_the_way() -> None:
+    session = form(begin(), [(0.0, -24.0), (0.0, 24.0)], Brush.RAISE, 10.0)
+    half = form(session, ALONG, Brush.LEVEL, share=0.5)
+    assert along(half)[10] == pytest.approx(5.0, abs=1.5)
+
+
+def test_a_raise_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
+    session = queue(begin(), ALONG, Brush.RAISE)
+    before, now = heights(session).copy(), 0.0
+    for _ in range(90):
+        now += TICK
+        session = sculpting.advance(session, session.pose, now, 100)
+    assert rise(session).max() > 5.0
+    np.testing.assert_array_equal(heights(gestures.withdraw_stroke(session)), before)
+
+
+@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "push_pull", "force_display"])
+def test_a_method_without_a_blister_is_told_from_those_that_raise(method: str) -> None:
+    scene = resolve({"control": {"method": method}})
+    assert find_tracking(scene, assemble(scene)) is None
+
+
+def test_a_queued_raise_ends_at_once_when_the_method_has_lost_its_blister_meanwhile() -> None:
+    session = queue(begin(control={"method": "elastic"}), ALONG, Brush.RAISE)
+    done = finish(session, 1.0)
+    assert (done.finished_strokes, np.abs(rise(done)).max()) == (1, 0.0)
+
+
+def test_ctrl_inverts_lower_and_raise_and_leaves_level_as_it_is() -> None:
+    assert [brush.inverse for brush in (Brush.LOWER, Brush.RAISE, Brush.LEVEL)] == [
+        Brush.RAISE, Brush.LOWER, Brush.LEVEL,
+    ]  # fmt: skip
+
+
+def test_heights_stay_within_what_can_be_raised() -> None:
+    assert start(1, 0.0, 0.0, 1.0, brush=Brush.RAISE).samples[0].depth == DEEPEST
