@@ -65,7 +65,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     def read(self, bed: Any, settings: Any) -> float:
         """Return the depth, or height, of the tool's brush, m."""
         self.amount = brush.amount_name(Brush(settings.brush))
-        return 1e-3 * float(getattr(settings, self.name))
+        return 1e-3 * float(getattr(settings, self.amount))
 
     def write(self, bed: Any, settings: Any, value: float) -> None:
         """Set the depth, or height, of the tool's brush."""
