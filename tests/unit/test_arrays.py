@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import any_true, apply_map, constants, count_true, per_row, prepare_map
+from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, apply_map, count_true, per_row, prepare_map
 
 CASES = {
     "no cell": np.zeros(0, np.bool_),
@@ -29,15 +29,29 @@ def test_it_holds_as_often_as_numpy_says(test: np.ndarray) -> None:
 @pytest.mark.parametrize("shape", [(4,), (4, 3)])
 def test_constants_of_one_run_and_of_many_calculate_alike(shape: tuple[int, ...]) -> None:
     values = np.arange(float(np.prod(shape))).reshape(shape)
-    two, minus_one = constants((2.0, -1.0), shape)
+    two, minus_one = Constants((2.0, -1.0))[shape]
     np.testing.assert_array_equal(values * two + minus_one, 2.0 * values - 1.0)
 
 
 def test_constants_of_one_run_are_shared_and_cannot_be_written_to() -> None:
-    (one,) = constants((1.0,), (5,))
-    assert constants((1.0,), (5,))[0] is one
+    known = Constants((1.0,))
+    (one,) = known[5,]
+    assert known[5,][0] is one
     with pytest.raises(ValueError, match="read-only"):
         one[0] = 2.0
+
+
+def test_constants_of_any_number_of_shapes_are_few() -> None:
+    known = Constants((1.0,))
+    sizes = [known[count,][0].size for count in range(3 * MOST_SHAPES)]
+    assert (sizes, len(known) <= MOST_SHAPES) == (list(range(3 * MOST_SHAPES)), True)
+
+
+def test_constants_of_many_runs_are_the_numbers_themselves_in_their_kind() -> None:
+    own = np.array([1.0, 2.0])
+    assert Constants((3.0, own))[4, 2] == (3.0, own)
+    (code,) = Constants((3,), np.int8)[4, 2]
+    assert type(code) is np.int8
 
 
 @pytest.mark.parametrize("rows", ["of one run", "of many", "of many, a part of them"])

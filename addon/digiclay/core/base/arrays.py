@@ -7,41 +7,50 @@ which numpy puts against the last axis; a linear map (o, i) that does is an arra
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["any_true", "apply_map", "constants", "count_true", "per_row", "prepare_map"]
+__all__ = ["MOST_SHAPES", "Constants", "any_true", "apply_map", "count_true", "per_row", "prepare_map"]
 
 Floats = NDArray[np.float64]
 
+#: Shapes for which one set of `Constants` is kept.
+MOST_SHAPES = 64
 
-def constants(numbers: tuple[Any, ...], shape: tuple[int, ...], kind: type = np.float64) -> tuple[Any, ...]:
-    """Return numbers such that arrays of a shape can be calculated with them.
+
+class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
+    """Numbers such that arrays of a shape can be calculated with them: ``Constants((0.0, 1.0))[shape]``.
 
     Numpy takes two operands of one shape twice as fast as an array and a number, so for the
-    cells of one run each becomes an array. These are shared: nobody can write to them.
+    cells of one run, (n,), each becomes an array. These are kept and shared: nobody can write to them.
 
     Parameters
     ----------
     numbers : tuple of float, or of ndarray (b,) where the runs differ
-    shape : (n,) or (n, b)
     kind : type
         Of the arrays' elements.
     """
-    if len(shape) == 1:
-        return _full(numbers, shape[0], kind)
-    return numbers if kind is np.float64 else tuple(kind(one) for one in numbers)
 
+    def __init__(self, numbers: tuple[Any, ...], kind: type = np.float64) -> None:
+        super().__init__()
+        self._numbers, self._kind = numbers, kind
 
-@lru_cache(maxsize=128)
-def _full(numbers: tuple[float, ...], count: int, kind: type) -> tuple[NDArray[Any], ...]:
-    """Return an array of `count` copies of each number."""
-    rows: NDArray[Any] = np.array(numbers, kind).repeat(count).reshape(len(numbers), count)
-    rows.flags.writeable = False
-    return tuple(rows)
+    def __missing__(self, shape: tuple[int, ...]) -> tuple[Any, ...]:
+        """Make the numbers for arrays of a shape, (n,) or (n, b), that has not been asked for."""
+        if len(self) >= MOST_SHAPES:
+            self.clear()
+        made = self._numbers
+        if len(shape) == 1:
+            rows: NDArray[Any] = np.array(made, self._kind).repeat(*shape).reshape(len(made), *shape)
+            rows.flags.writeable = False
+            made = tuple(rows)
+        elif self._kind is not np.float64:
+            made = tuple(self._kind(one) for one in made)
+        self[shape] = made
+        return made
 
 
 def any_true(test: NDArray[np.bool_]) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import constants
+from ..base.arrays import Constants
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
@@ -47,19 +47,7 @@ class Blister(Parameters):
         *cone*: 1 on the flat top, then falling linearly to 0 at the radius.
         *gaussian*: ``exp(-r²/(2 σ²))``.
         """
-        if self.profile == "gaussian":
-            bell: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
-            return bell
-        rim, slope, most = constants(self._cone, distance.shape)
-        cone: Floats = rim - distance
-        cone *= slope
-        np.minimum(cone, most, out=cone)
-        return cone
-
-    @cached_property
-    def _cone(self) -> tuple[Any, Any, float]:
-        """The cone's radius, m, its slope, 1/m, and its top."""
-        return self.radius, 1.0 / (self.radius - self.flat_radius), 1.0
+        return self.interpolate(distance, 0.0, 1.0)
 
     def interpolate(self, distance: Floats, edge: Any, top: Any) -> Floats:
         """Return heights ``edge + p(r) (top - edge)``, m.
@@ -71,7 +59,19 @@ class Blister(Parameters):
         edge, top : float or ndarray (m,) or (b,)
             Heights of the surface around the blister and of its top, m.
         """
-        height = self.evaluate_profile(distance)
-        height *= top - edge
-        height += edge
+        if self.profile == "gaussian":
+            height: Floats = np.exp(distance * distance * (-0.5 / self.sigma**2))
+            slope, start = top - edge, edge
+        else:
+            (flat,) = self._flat[distance.shape]
+            height = np.maximum(distance, flat)
+            slope = (edge - top) / (self.radius - self.flat_radius)
+            start = top - slope * self.flat_radius
+        height *= slope
+        height += start
         return height
+
+    @cached_property
+    def _flat(self) -> Constants:
+        """The radius of the flat top, m."""
+        return Constants((self.flat_radius,))

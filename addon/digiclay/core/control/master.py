@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..base.modes import Mode
@@ -86,9 +87,8 @@ class MasterControl(BatchControl):
     period: float
 
     def follow(
-        self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float,
-        surface: float,
-    ) -> Master:  # fmt: skip
+        self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float
+    ) -> Master:
         """VM Locate: the centroid of the forces near the master; at first touch, of all (equation 13).
 
         Parameters
@@ -98,8 +98,11 @@ class MasterControl(BatchControl):
             Sum of the forces on all cells, N, and their moments with x and y, N m.
         near, near_x, near_y : float
             Those of the cells near the master.
-        surface : float
-            Sum of force times height, N m.
+
+        Returns
+        -------
+        Master
+            Where it has found a finger, `is_new`: to be put into the surface by `set_surface`.
         """
         known = self.parameters
         if total < known.felt_force:
@@ -110,31 +113,29 @@ class MasterControl(BatchControl):
                 return master.move_to(x, y, update_heading(master.heading, x, y, known.travel))
             # The finger has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
-        x, y, surface = x / total, y / total, surface / total
-        return Master(
-            Phase.SPRING,
-            x,
-            y,
-            surface,
-            0.0,
-            reference=surface,
-            edge=min(max(surface, 0.0), self.actuator.stroke),
-            felt=surface,
-            heading=Heading(x, y),
-            losses=master.losses,
-        )
+        x, y = x / total, y / total
+        return Master(Phase.SPRING, x, y, math.nan, heading=Heading(x, y), losses=master.losses)
 
-    def track(self, master: Master, total: float, *sums: float) -> Master:
-        """Locate the finger, then move the master; arguments as `follow` takes them.
+    def is_new(self, master: Master) -> bool:
+        """Tell whether a master has found a finger, and is not in the surface yet."""
+        return math.isnan(master.height)
+
+    def set_surface(self, master: Master, total: float, surface: float) -> Master:
+        """Put a master that has found a finger into the surface; others stay where they are.
 
         Parameters
         ----------
         master : Master
         total : float
-            N.
-        *sums : float
+            Sum of the forces on all cells, N.
+        surface : float
+            Sum of force times height, N m.
         """
-        return self.lead(self.follow(master, total, *sums), total)
+        if not self.is_new(master):
+            return master
+        height = surface / total
+        edge = min(max(height, 0.0), self.actuator.stroke)
+        return master._replace(height=height, reference=height, edge=edge, felt=height)
 
     def wait(self, master: Master) -> Master:
         """Count the periods without a finger; give it up after the loss time."""
@@ -191,6 +192,10 @@ class MasterControl(BatchControl):
     def is_active(self, master: Master) -> bool:
         """Tell whether a master follows a finger."""
         return master.phase is not Phase.IDLE
+
+    def is_sunk(self, master: Master) -> bool:
+        """Tell whether a master is below the surface around it."""
+        return master.height < master.edge
 
     def get_place(self, master: Master) -> tuple[float, float]:
         """Return where a master is, m."""

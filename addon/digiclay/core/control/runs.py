@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BatchControl", "decide_by_run", "gather_by_run", "sum_weighted", "take_cells"]
+__all__ = ["BatchControl", "decide_by_any", "decide_by_run", "gather_by_run", "sum_weighted", "take_cells"]
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +46,21 @@ def decide_by_run(rule: Callable[..., Any]) -> Any:
 
     def decide(batch: BatchControl, memory: list[Any], *columns: list[Any]) -> list[Any]:
         return list(map(rule, batch.runs, memory, *columns))
+
+    return decide
+
+
+def decide_by_any(rule: Callable[..., bool]) -> Any:
+    """Return a method of a batch's controller: whether a rule holds for some run.
+
+    Parameters
+    ----------
+    rule : callable
+        Method of the controller of a run: takes it and its memory.
+    """
+
+    def decide(batch: BatchControl, memory: list[Any]) -> bool:
+        return any(map(rule, batch.runs, memory))
 
     return decide
 

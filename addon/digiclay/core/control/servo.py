@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, constants
+from ..base.arrays import Constants, any_true
 from ..base.quantity import quantity
 from .methods import ControlParameters
 
@@ -48,8 +49,7 @@ class Tracking(ControlParameters):
         target, height : ndarray (m,) or (m, b)
             Commanded and measured, m.
         """
-        numbers = (self.position_gain, self.dead_band, 1.0, -1.0, 0.0)
-        gain, band, most, least, none = constants(numbers, target.shape)
+        gain, band, most, least, none = self._constants[target.shape]
         error = target - height
         command: Floats = error * gain
         np.minimum(command, most, out=command)
@@ -57,6 +57,11 @@ class Tracking(ControlParameters):
         np.abs(error, error)
         np.putmask(command, error <= band, none)
         return command
+
+    @cached_property
+    def _constants(self) -> Constants:
+        """What `command` is made with: gain, 1/m; dead band, m; the command's bounds; no command."""
+        return Constants((self.position_gain, self.dead_band, 1.0, -1.0, 0.0))
 
 
 def lock_overloaded(command: Floats, force: Floats, limit: Any) -> Floats:

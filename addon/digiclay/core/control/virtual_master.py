@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, constants, count_true
+from ..base.arrays import Constants, any_true, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .master import Master, MasterControl, Phase, VirtualMaster
 from .master_cell import make_master_cell
-from .runs import decide_by_run, gather_by_run, sum_weighted
+from .runs import decide_by_any, decide_by_run, gather_by_run, sum_weighted
 from .servo import lock_overloaded
 from .travel import ABEAM, measure_excess, measure_offsets
 
@@ -36,7 +36,8 @@ Floats = NDArray[np.float64]
 #: Share of the total force that the cell in the middle of the finger carries while shaping, at least: 0.23
 #: to 0.33 of it measured while the finger moves slowly.
 HEAVIEST = 0.25
-CODES = tuple(int(mode) for mode in (Mode.EDGE, Mode.BLISTER, Mode.FROZEN))
+NONE = Constants((0.0,))
+CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,27 +69,27 @@ class VirtualMasterControl(MasterControl):
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Locate the finger and move the master; see `Controller`."""
-        sums = self._sum_forces(memory, touched)
-        if self._noisy:
-            memory = self.follow(memory, *sums)
-            held = self._sum_held(memory, touched, sums[0])
-            memory = self.lead(memory, held)
-        else:
-            memory = self.track(memory, *sums)
-        return memory, self.find_disc(memory)
-
-    def _sum_forces(self, memory: Any, touched: Measurement) -> tuple[Any, ...]:
-        """Return what `_follow` takes: sums over all cells, and over those near the master."""
         basis, force = touched.quadratic_basis, touched.force
         if self._noisy:
             force = suppress_noise(force, self.floor)
-        (none,) = constants((0.0,), force.shape)
+        sums = self._sum_forces(memory, basis, force)
+        held = self._sum_held(memory, touched, sums[0]) if self._noisy else sums[0]
+        memory = self.follow(memory, *sums)
+        if self.is_new(memory):
+            memory = self.set_surface(memory, sums[0], sum_weighted(touched.height, force).tolist())
+        memory = self.lead(memory, held)
+        return memory, self.find_disc(memory)
+
+    def _sum_forces(self, memory: Any, basis: Floats, force: Floats) -> tuple[Any, ...]:
+        """Return what `follow` takes: sums over all cells, and over those near the master."""
+        (none,) = NONE[force.shape]
         total, x, y, *_ = near = sum_weighted(basis, force).tolist()
-        far = self._measure_excess(memory, basis) > none
-        far &= force != none
+        beyond = self._measure_excess(memory, basis)
+        beyond *= force
+        far = beyond > none
         if any_true(far):
             near = sum_weighted(basis, np.where(far, none, force)).tolist()
-        return total, x, y, *near[:3], sum_weighted(touched.height, force).tolist()
+        return total, x, y, *near[:3]
 
     def _sum_held(self, memory: Any, touched: Measurement, felt: Any) -> Any:
         """Return the force that is controlled, N: of all touched cells, see docs/equations.md.
@@ -109,7 +110,7 @@ class VirtualMasterControl(MasterControl):
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
-        *limits, rest, band = constants(self._limits, target.shape)
+        *limits, rest, band = self._limits[target.shape]
         off = target - rest
         np.abs(off, off)
         # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
@@ -124,7 +125,7 @@ class VirtualMasterControl(MasterControl):
     ) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         abeam, radius, edge_radius, flat_radius, behind, release, noise = limits
-        edge_mode, formed, froze = constants(CODES, mode.shape, np.int8)
+        edge_mode, formed, froze = CODES[mode.shape]
         x, y, toward_x, toward_y = self.get_pose(memory)
         distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.quadratic_basis)
         inside = distance <= radius
@@ -145,7 +146,8 @@ class VirtualMasterControl(MasterControl):
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
             kept = seen.target > profile
-            kept ^= top < edge
+            if self.is_sunk(memory):
+                kept ^= top < edge
             kept &= frozen
             np.putmask(profile, kept, seen.target)
         target = seen.target.copy()
@@ -153,7 +155,7 @@ class VirtualMasterControl(MasterControl):
         touched = seen.force > noise
         touched &= inside
         np.putmask(mode, inside, formed)
-        np.copyto(mode, kind, "unsafe", touched)
+        np.putmask(mode, touched, kind)
         np.putmask(mode, ring, edge_mode)
         np.putmask(mode, frozen, froze)
         return memory, target
@@ -164,7 +166,7 @@ class VirtualMasterControl(MasterControl):
         return bool(np.any(self.floor))
 
     @cached_property
-    def _limits(self) -> tuple[Any, ...]:
+    def _limits(self) -> Constants:
         """Thresholds of the cells.
 
         How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the height of a
@@ -177,9 +179,8 @@ class VirtualMasterControl(MasterControl):
             for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
         )
         release = np.maximum(known.release_force, self.floor) if self._noisy else known.release_force
-        return (
-            -ABEAM, *wider, known.behind, release, self.floor, self.actuator.rest_height, known.dead_band
-        )  # fmt: skip
+        rest, band = self.actuator.rest_height, known.dead_band
+        return Constants((-ABEAM, *wider, known.behind, release, self.floor, rest, band))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +189,7 @@ class VirtualMasterBatch(VirtualMasterControl):
 
     follow = decide_by_run(MasterControl.follow)
     lead = decide_by_run(MasterControl.lead)
-    track = decide_by_run(MasterControl.track)
+    set_surface = decide_by_run(MasterControl.set_surface)
     add_noise = decide_by_run(MasterControl.add_noise)
     find_disc = decide_by_run(MasterControl.find_disc)
     set_edge = decide_by_run(MasterControl.set_edge)
@@ -196,9 +197,9 @@ class VirtualMasterBatch(VirtualMasterControl):
     get_pose = gather_by_run(MasterControl.get_pose)
     get_heights = gather_by_run(MasterControl.get_heights)
 
-    def is_active(self, master: Any) -> bool:
-        """Tell whether a master of some run follows a finger."""
-        return any(map(MasterControl.is_active, self.runs, master))
+    is_active = decide_by_any(MasterControl.is_active)
+    is_new = decide_by_any(MasterControl.is_new)
+    is_sunk = decide_by_any(MasterControl.is_sunk)
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:

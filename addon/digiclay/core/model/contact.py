@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import constants
+from ..base.arrays import Constants
 from ..base.quantity import Parameters, quantity
 
 __all__ = ["Contact", "ExponentialLaw"]
@@ -41,7 +41,7 @@ class ExponentialLaw:
         depth : ndarray (..., n)
             Indentation x, m; negative where there is a gap.
         """
-        m, offset, none, most, unit = constants(self.numbers, depth.shape)
+        m, offset, none, most, unit = self._numbers[depth.shape]
         exponent: Floats = depth * m
         exponent -= offset
         np.maximum(exponent, none, out=exponent)
@@ -51,10 +51,10 @@ class ExponentialLaw:
         return exponent
 
     @cached_property
-    def numbers(self) -> tuple[float, ...]:
+    def _numbers(self) -> Constants:
         """What `tension` is made with: m, 1/m; m x0; the exponent's bounds; b/m, N."""
         m = self.exponent
-        return m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m
+        return Constants((m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m))
 
 
 @dataclass(frozen=True)

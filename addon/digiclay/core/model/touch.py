@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import constants
+from ..base.arrays import Constants
 from .contact import ExponentialLaw
 from .fingertip import Fingertip, forms, reach, reaches, underside
 from .interfaces import Pulp
@@ -29,6 +30,11 @@ class Touch:
     fingertip: Fingertip
     contact: ExponentialLaw
     pulp: Pulp
+
+    @cached_property
+    def constants(self) -> Constants:
+        """What `force` is made with: no force, and the share of it that a cell carries."""
+        return Constants((0.0, self.contact.share))
 
 
 #: Which cells the finger may touch in a period: center of its way x, y and half the length
@@ -140,7 +146,7 @@ def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Float
     filters : ndarray (r, k)
         The relaxation's state rows z_i, N.
     """
-    none, share = constants((0.0, touch.contact.share), height.shape)
+    none, share = touch.constants[height.shape]
     tension = touch.contact.tension(height - under)
     tension -= touch.pulp.relaxed(filters)
     np.maximum(tension, none, out=tension)

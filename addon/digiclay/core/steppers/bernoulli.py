@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, apply_map, constants, per_row, prepare_map
+from ..base.arrays import Constants, any_true, apply_map, per_row, prepare_map
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
@@ -102,12 +102,12 @@ class StepWorkspace:
             )
             for s, rise in enumerate(self.free)
         )
-        self.constants, self.none = constants(plan.numbers, touched), np.zeros_like(self.moved)
+        self.constants, self.none = Constants(plan.numbers)[touched], np.zeros_like(self.moved)
         # What `pressed` is not for from the limits on.
         self.guarded, self.limits = empty(5, touched), empty(5, touched)
         self.limits[:] = per_row(plan.limits, rows.ndim)
         self.exponent, self.end, self.bent, self.growth, self.deviation = self.guarded
-        self.stops = constants((0.0, cell.actuator.stroke), every)
+        self.stops = Constants((0.0, cell.actuator.stroke))[every]
 
     def __call__(self, under: Floats) -> Floats:
         """Move the block on by one control period, in place; see `interfaces.Movement`."""
