@@ -234,3 +234,16 @@ def test_what_noise_hides_farther_off_does_not() -> None:
     far = [touched((0, 0, 0.395), (9, 0, force)) for force in (9.9e-3, 10.1e-3)]
     phases = [hearing(10e-3).locate(start, seen)[0].phase for seen in far]
     assert phases == [Phase.SPRING, Phase.SHAPING]
+
+
+def test_what_noise_hides_counts_around_where_the_master_was() -> None:
+    # 6 mm behind where it was and 11 mm from where it is now; the other way round 12 mm and 7 mm.
+    start = master(phase=Phase.SPRING)
+    moving = [touched((5, 0, 0.39), (x, 0, 20e-3)) for x in (-6, 12)]
+    found = [hearing(30e-3).locate(start, seen)[0] for seen in moving]
+    assert [(one.x, one.phase) for one in found] == [(5e-3, Phase.SHAPING), (5e-3, Phase.SPRING)]
+
+
+def test_at_first_touch_what_noise_hides_does_not_count() -> None:
+    memory, _ = hearing(10e-3).locate(Master(), touched((0, 0, 0.395), (3, 0, 9e-3)))
+    assert memory.phase is Phase.SPRING

@@ -155,7 +155,7 @@ class VirtualMasterControl(MasterControl):
         touched = seen.force > noise
         touched &= inside
         np.putmask(mode, inside, formed)
-        np.putmask(mode, touched, kind)
+        np.copyto(mode, kind, "unsafe", touched)
         np.putmask(mode, ring, edge_mode)
         np.putmask(mode, frozen, froze)
         return memory, target
