@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, apply_map, count_true, per_row, prepare_map
+from digiclay.core.base.arrays import (
+    MOST_SHAPES,
+    Constants,
+    any_true,
+    apply_map,
+    count_true,
+    per_row,
+    prepare_map,
+)
 
 CASES = {
     "no cell": np.zeros(0, np.bool_),
