@@ -269,6 +269,7 @@ def main() -> None:
     bpy.context.preferences.view.use_save_prompt = False
     if addon_utils.enable(EXTENSION) is None:
         SEEN["error"] = f"{EXTENSION} cannot be enabled"
+    sys.path.insert(0, str(SCRIPT.parent))  # scripts share what a hand does
     found = importlib.util.spec_from_file_location("script", SCRIPT)
     assert found is not None
     assert found.loader is not None

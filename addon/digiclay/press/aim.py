@@ -16,6 +16,7 @@ from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
 from ..live import running
 from ..settings import properties
+from .occlusion import is_hidden, shown_stretch
 
 __all__ = ["Target", "find_target", "hit_point", "project", "read_surface"]
 
@@ -52,7 +53,8 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
     """Return the nearest place on a visible bed under a pixel of the context's region.
 
     A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
-    through; pressing on it says why.
+    through; pressing on it says why. Where another object hides the pins there is no place: a click
+    there is for that object.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
     xy : (float, float)
         Pixels in the region.
     """
-    found, nearest = None, np.inf
+    found, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
         if not view.is_bed(bed):
             continue
@@ -74,7 +76,9 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
         origin, direction = _ray(context, bed, xy)
         distance = bridge.uniform(bed) * float((point - origin) @ direction)
         if distance < nearest:
-            found, nearest = Target(bed, cells, height, point), distance
+            found, nearest, eye = Target(bed, cells, height, point), distance, origin
+    if found is None or is_hidden(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point)):
+        return None
     return found
 
 
@@ -111,7 +115,11 @@ def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[flo
         When the bed is not uniformly scaled.
     """
     origin, direction = _ray(context, bed, xy)
-    return intersect_surface(cells, height, origin, direction)
+    first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))
+    if first > last:
+        return None
+    point = intersect_surface(cells, height, origin + first * direction, direction)
+    return point if point is not None and (point - origin) @ direction <= last else None
 
 
 def project(context: Any, bed: Any, points: Floats) -> Floats:
@@ -129,6 +137,12 @@ def project(context: Any, bed: Any, points: Floats) -> Floats:
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
     size = np.array([context.region.width, context.region.height])
     return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
+
+
+def _place(bed: Any, point: Floats) -> Floats:
+    """Return where a point of a bed's space (3,), m, is in the world."""
+    placed = np.array(bed.matrix_world, np.float64)
+    return np.asarray(placed[:3, :3] @ (point * SCALE) + placed[:3, 3])
 
 
 def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Floats]:

@@ -1,0 +1,127 @@
+"""Clicks and drags with the Press tool on a bed with a cube in front of it, in all kinds of views."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+from hand_strokes import drag, finish, hand, on_the_screen, reset, to
+from mathutils import Vector
+
+#: Places of the pins, mm: behind the cube, and beside it.
+COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
+#: How far the cube is from the place it covers, Blender units.
+DISTANCE = 0.25
+
+
+def covered_place(blender: Any) -> Vector:
+    """Return where the covered place is in the world."""
+    scale = blender.part("bridge").SCALE * 1e-3
+    return blender.beds()[0].matrix_world @ Vector((scale * COVERED[0], scale * COVERED[1], 40.0 * scale))
+
+
+def put(blender: Any) -> None:
+    """Put the cube between the eye of the view and the covered place."""
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
+    area, _ = blender.view()
+    looking = area.spaces.active.region_3d
+    place = covered_place(blender)
+    level = looking.view_perspective == "ORTHO" or looking.window_matrix[3][3] == 1.0
+    eye = looking.view_matrix.inverted()
+    way = eye.col[2].to_3d() if level else (eye.translation - place).normalized()
+    bpy.data.objects["Cube"].location = place + DISTANCE * way
+
+
+def try_both(blender: Any, name: str) -> Iterator[float | None]:
+    """Click on the cube, then on the pins beside it; write down what each has pressed and selected."""
+    put(blender)
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
+    yield 0.5
+    blender.shot(f"past_{name}")
+    seen = {}
+    for what, place in (("covered", COVERED), ("bare", BARE)):
+        yield from finish(blender, hand(to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3"))
+        sessions = blender.part("live.running").list_sessions()
+        seen[what] = sum(session.finished_strokes for session in sessions)
+        seen[f"{what} selected"] = [thing.name for thing in blender.window().view_layer.objects.selected]
+    blender.SEEN[name] = seen
+    yield from reset(blender)
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a user does."""
+    yield from prepare(blender)
+    area, _ = blender.view()
+    space = area.spaces.active
+    yield from try_both(blender, "perspective")
+    blender.call(bpy.ops.view3d.view_persportho)
+    yield 0.5
+    yield from try_both(blender, "orthographic")
+    blender.call(bpy.ops.view3d.view_persportho)
+    blender.call(bpy.ops.object.camera_add)
+    blender.window().scene.camera = bpy.context.object
+    blender.call(bpy.ops.view3d.camera_to_view)
+    yield 0.5
+    yield from try_both(blender, "camera")
+    blender.call(bpy.ops.view3d.view_camera)
+    space.shading.show_xray = True
+    yield 0.5
+    yield from try_both(blender, "xray")
+    space.shading.show_xray = False
+    yield from drawn_under(blender)
+    blender.call(bpy.ops.screen.region_quadview)
+    yield 0.5
+    yield from quarters(blender)
+
+
+def prepare(blender: Any) -> Iterator[float | None]:
+    """Have a bed with a session and a cube, and the Press tool in hand."""
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    blender.call(bpy.ops.object.delete)
+    blender.call(bpy.ops.mesh.digital_clay_add)
+    blender.call(bpy.ops.view3d.view_all)
+    entry = bpy.context.preferences.addons.new()
+    entry.module = blender.EXTENSION
+    entry.preferences.most_periods = 1000
+    blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    hand("search --onlyvisible --class blender windowfocus").wait(30)
+    yield 1.0
+    blender.window().view_layer.objects.active = blender.beds()[0]
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield 1.0
+
+
+def drawn_under(blender: Any) -> Iterator[float | None]:
+    """Press beside the cube and drag on behind it."""
+    put(blender)
+    yield 0.5
+    start, end = (on_the_screen(blender, x, COVERED[1]) for x in (-24.0, 24.0))
+    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
+    bed = blender.beds()[0]
+    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
+    blender.SEEN["drawn under"] = (1e3 * height[7]).tolist()
+    yield from reset(blender)
+
+
+def quarters(blender: Any) -> Iterator[float | None]:
+    """Point at the covered place and the bare one in each quarter of a quad view, the cube above the bed."""
+    bpy.data.objects["Cube"].location = covered_place(blender) + Vector((0.0, 0.0, DISTANCE))
+    yield 1.0
+    blender.shot("past_quarters")
+    aim, found = blender.part("press.aim"), {}
+    area, _ = blender.view()
+    regions = [region for region in area.regions if region.type == "WINDOW"]
+    for region in regions:
+        with bpy.context.temp_override(window=blender.window(), area=area, region=region):
+            context = bpy.context
+            kind = "top" if abs(context.region_data.view_matrix[2][2]) > 0.99 else "other"
+            bed = blender.beds()[0]
+            for what, place in (("covered", COVERED), ("bare", BARE)):
+                point = 1e-3 * np.array([[*place, 40.0]])
+                (xy,) = aim.project(context, bed, point)
+                hit = aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
+                found.setdefault(f"{kind} {what}", []).append(hit)
+    blender.SEEN["quarters"] = found | {"count": len(regions)}

@@ -1,0 +1,40 @@
+"""A click on an object in front of a bed is for that object; pins that are seen are pressed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.window.blender_window import played
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Play the script once; return what stood in the scene after each of its steps."""
+    return played("press_past_objects.py", tmp_path_factory.mktemp("past"), size=(800, 560), by_hand=True)
+
+
+@pytest.mark.parametrize("name", ["perspective", "orthographic", "camera"])
+def test_a_click_on_an_object_selects_it_and_one_beside_it_presses(seen: dict[str, Any], name: str) -> None:
+    before = seen[name]["covered"]
+    assert seen[name]["covered selected"] == ["Cube"]
+    assert seen[name]["bare"] == before + 1
+
+
+def test_through_xray_the_pins_behind_the_object_are_pressed(seen: dict[str, Any]) -> None:
+    assert seen["xray"]["covered selected"] == []
+    assert seen["xray"]["bare"] == seen["camera"]["bare"] + 2
+
+
+def test_a_stroke_goes_on_behind_an_object(seen: dict[str, Any]) -> None:
+    # 24 mm to either side of the middle, 3 mm a pin; the finger presses 4 mm deep.
+    assert np.max(seen["drawn under"][4:21]) < 40.0 - 1.0
+
+
+def test_in_a_quad_view_each_quarter_sees_for_itself(seen: dict[str, Any]) -> None:
+    found = seen["quarters"]
+    assert found["count"] == 4
+    assert found["top covered"] == [False]
+    assert found["top bare"] == [True]
