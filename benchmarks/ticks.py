@@ -45,7 +45,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     refuse_without_blender()
     from digiclay.compat import bpy
 
-    from .tick_times import PARTS, measure
+    from .tick_times import measure
 
     keep_to_one_core()
     count, found = QUICK if arguments.quick else FULL, []
@@ -55,14 +55,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
             bar(found[-1].name)
     text = "\n".join(_text(found, bpy.app.version_string))
     print(text)
-    head = ("rows", "columns", "pitch_m", "tick", "elapsed_s", "spent_s", *(f"{name}_s" for name in PARTS))
-    rows_of = [
-        [bed.rows, bed.columns, bed.pitch, tick, bed.elapsed[tick], bed.spent[tick]]
-        + [bed.parts[name][tick] for name in PARTS]
+    head = ("rows", "columns", "pitch_m", "ticks", "part", *(f"share_{share:g}_s" for share in SHARES))
+    figures = [
+        [bed.rows, bed.columns, bed.pitch, count, name, *np.quantile(times, SHARES)]
         for bed in found
-        for tick in range(count)
+        for name, times in _lines(bed).items()
     ]
-    kept(arguments.out, "ticks", text, head, rows_of)
+    kept(arguments.out, "ticks", text, head, figures)
     if arguments.out is not None:
         draw_histogram(found, [bed[-1] for bed in BEDS], arguments.out / "ticks.png")
     return 0
@@ -76,7 +75,7 @@ def keep_to_one_core() -> None:
 
 def _text(found: Sequence[Ticks], version: str) -> Iterator[str]:
     """Give the lines of the report."""
-    from .tick_times import PARTS, RATE
+    from .tick_times import RATE
 
     yield f"{made_with()}, Blender {version}"
     yield f"\nTicks of a live session at {RATE} a second while a hand draws with the Press tool; one core,"
@@ -85,13 +84,17 @@ def _text(found: Sequence[Ticks], version: str) -> Iterator[str]:
     for bed, (_, _, _, _, goal) in zip(found, BEDS, strict=True):
         kept_to = 100.0 * np.mean(bed.spent < goal)
         yield f"\n{bed.name}, {len(bed.spent)} ticks; {kept_to:.2f} % under {1e3 * goal:g} ms\n"
-        rest = bed.spent - sum(bed.parts[name] for name in PARTS if name != "garbage")
-        lines = {"whole tick": bed.spent, **bed.parts, "other": rest, "whole, elapsed time": bed.elapsed}
         rows = [
-            [name, *(f"{1e3 * np.quantile(times, share):.2f}" for share in SHARES)]
-            for name, times in lines.items()
+            [name, *(f"{1e3 * time:.2f}" for time in np.quantile(times, SHARES))]
+            for name, times in _lines(bed).items()
         ]
         yield from table(("", *NAMES), rows)
+
+
+def _lines(bed: Ticks) -> dict[str, Any]:
+    """Return the times of a bed's ticks, s, by the lines of the report."""
+    rest = bed.spent - sum(times for name, times in bed.parts.items() if name != "garbage")
+    return {"whole tick": bed.spent, **bed.parts, "other": rest, "whole, elapsed time": bed.elapsed}
 
 
 def draw_histogram(found: Sequence[Ticks], goals: Sequence[float], out: Path) -> Path:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
-import numpy as np
 import pytest
 from digiclay.live import bed_state, running, sculpting
 
@@ -51,6 +51,10 @@ def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
     told = capsys.readouterr().out
     assert "11 x 11 at 3 mm, 5 ticks" in told
     assert "20 x 21 at 1.5 mm, 5 ticks" in told
-    rows = np.loadtxt(tmp_path / "ticks.csv", delimiter=",", skiprows=1)
-    assert rows.shape == (10, 6 + len(PARTS))
+    with (tmp_path / "ticks.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * (3 + len(PARTS))
+    whole = [float(rows[0][f"share_{share:g}_s"]) for share in ticks.SHARES]
+    assert rows[0]["part"] == "whole tick"
+    assert 0.0 < whole[0] <= whole[-1]
     assert (tmp_path / "ticks.png").stat().st_size > 10_000
