@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from digiclay.commands.tables import table
 from digiclay.core.mesh_io.export_model import Model, make_bodies
-from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
 
@@ -60,7 +60,7 @@ class Export:
 
 def formed(side: int) -> Formed:
     """Return a bed of side x side pins with bosses and creases everywhere: waves 100 mm long, 10 mm high."""
-    place = grid(Layout(rows=side, columns=side)).positions
+    place = make_grid(Layout(rows=side, columns=side)).positions
     wave = np.sin(place[:, 0] * 63.0) * np.cos(place[:, 1] * 63.0)
     return Formed.of(place, 0.04 + 0.01 * wave, 0.04, 0.0, 0)
 
@@ -80,7 +80,7 @@ def measured(side: int, kind: str, file: str) -> Export:
     bed = formed(side)
     finding = Finding() if kind == "features" else None
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"bed{suffix(file)}"
+        path = Path(folder) / f"bed{find_suffix(file)}"
         started = time.perf_counter()
         made = make_bodies(bed, Model(kind=kind), finding)
         moment = time.perf_counter()

@@ -10,7 +10,7 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.model.conduit import OrificeAndConduit
 from digiclay.core.model.fingertip import JOIN
 from digiclay.core.steppers.bernoulli_plan import POINTS
-from digiclay.core.steppers.closed_form import TINY, crossed
+from digiclay.core.steppers.closed_form import TINY, solve_crossing
 
 from .peers import ROOT, Line
 from .problems import PERIOD, Measured, Problem
@@ -174,7 +174,7 @@ class Scalar:
         relief = math.log1p(stiffness * math.exp(exponent + bow) * math.expm1(growth) / growth)
         push, mean = stiffness * (1.0 + lost) - relief, relief / stiffness - 1.0
         if (math.expm1(max(exponent + slip + push, 0.0)) <= lost) != idle:
-            told = crossed(*(np.array([v]) for v in (exponent, bow, slip, decay, 1.0 + lost)))
+            told = solve_crossing(*(np.array([v]) for v in (exponent, bow, slip, decay, 1.0 + lost)))
             push, mean = float(told[0][0]), float(told[1][0])
         y[0] = min(max(y[0] + free + push / self.m, 0.0), self.stroke)
         tensions = [self.unit * one for one in (first, max(mean, 0.0), self.tension(y[0], end))]

@@ -13,8 +13,8 @@ from digiclay.core.base.errors import DivergenceError
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
-from digiclay.core.model.fingertip import forms, require_one, underside
-from digiclay.core.model.physics import speeds
+from digiclay.core.model.fingertip import compute_forms, compute_underside, require_one
+from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session.accuracy import SHARE, reference_settings
@@ -135,8 +135,8 @@ def _within_reach(
     assert system.cell.touch is not None
     poses = require_one(trajectories).poses(period * system.period + system.instants)
     places = system.grid.compute_basis(np.arange(system.grid.count))
-    under = underside(*forms(system.cell.touch.fingertip.outline(poses)), places)
-    lowest, highest = speeds(system.cell).reach(before, under, system.period)
+    under = compute_underside(*compute_forms(system.cell.touch.fingertip.outline(poses)), places)
+    lowest, highest = find_speeds(system.cell).reach(before, under, system.period)
     # Rounding: these undersides are worked out from other products.
     return bool((after >= lowest - 1e-12).all() and (after <= highest + 1e-12).all())
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from digiclay.core.metrics.summary import in_contact
+from digiclay.core.metrics.summary import find_contact_rows
 from digiclay.plots.bed import draw_map, draw_path, draw_relief
 from digiclay.plots.figure import INK, LINES, MM, SHADE, canvas, legend_above
 from digiclay.plots.run import LETTERS, session_cells
@@ -42,7 +42,7 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
             left = 0.85 + 6.5 * column
             heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
             force = place(f"{method} force", left, 0.7, 5.75, 2.0)
-            touching = in_contact(history["total_force"])
+            touching = find_contact_rows(history["total_force"])
             for axes in (heights, force):
                 over = axes.get_xaxis_transform()
                 axes.fill_between(

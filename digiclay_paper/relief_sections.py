@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
-from digiclay.core.metrics.summary import cell_area, in_contact
+from digiclay.core.metrics.summary import compute_cell_area, find_contact_rows
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ def asked_for(session: Session) -> Floats:
     history, blister = session.history, session.scene.blister
     assert blister is not None  # both methods have one
     rest = session.scene.actuator.rest_height
-    touching = in_contact(history["total_force"]) & ~np.isnan(history["set_point"])
+    touching = find_contact_rows(history["total_force"]) & ~np.isnan(history["set_point"])
     tip = history["fingertip"][touching]
     patch = _reach(session.scene, history["position"], history["following"][touching])
     boss, crease = np.zeros(len(history["position"])), np.zeros(len(history["position"]))
@@ -141,7 +141,7 @@ def _reach(scene: Scene, position: Floats, following: Floats) -> Floats:
     """Return how far the middles of the cells under the finger reach, m; 0 for Method I."""
     if scene.method != METHODS[1]:
         return np.zeros(len(following))
-    side = np.sqrt(cell_area(position) or 0.0)
+    side = np.sqrt(compute_cell_area(position) or 0.0)
     return np.asarray(np.maximum(side * (np.sqrt(following / np.pi) - 0.5), 0.0))
 
 

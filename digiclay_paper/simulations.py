@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.signal import amplitude, frequency, settling_time
+from digiclay.core.metrics.signal import measure_amplitude, measure_frequency, measure_settling_time
 from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -176,9 +176,9 @@ def _swing(
     end = float(done.history["time"][-1])
     late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
     wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
-    settled = settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
+    settled = measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     found = Swing(
-        gain, position_gain, amplitude(late["total_force"]),
-        frequency(late["time"], late["total_force"]), settled,
+        gain, position_gain, measure_amplitude(late["total_force"]),
+        measure_frequency(late["time"], late["total_force"]), settled,
     )  # fmt: skip
     return found._replace(settling=None) if found.sustained else found, done, quick

@@ -18,13 +18,13 @@ from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.delay import Delay
-from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, underside
+from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.model.supply import Supply
-from digiclay.core.model.trajectory import Path, Trajectory, level
+from digiclay.core.model.trajectory import Path, Trajectory, make_level
 from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:
     """Return the path of a level finger through waypoints (time in s, then x, y, z in mm)."""
     table = np.array(waypoints, float)
-    return level(table[:, 0], table[:, 1:] * 1e-3, interpolation)
+    return make_level(table[:, 0], table[:, 1:] * 1e-3, interpolation)
 
 
 #: A finger nobody meets.
@@ -176,7 +176,7 @@ def make_basis(x: Floats, y: Floats) -> Floats:
 
 def under(outline: Floats, x: Floats, y: Floats) -> Floats:
     """Return the finger's underside, (k, n), m, for outlines (k, 10)."""
-    return underside(*forms(outline), make_basis(x, y))
+    return compute_underside(*compute_forms(outline), make_basis(x, y))
 
 
 def one_cell(**parts: Any) -> System:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.base.quantity import quantities
+from digiclay.core.base.quantity import list_quantities
 from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
@@ -93,7 +93,7 @@ def table(chance: np.random.Generator) -> dict[str, Any]:
         if made.get(section) == ABSENT or (section == "blister" and "blister" not in made):
             continue
         known = import_parameters(section, method if method != ABSENT else "virtual_master")
-        fields = list(quantities(known))
+        fields = list(list_quantities(known))
         field = fields[chance.integers(len(fields))]
         made.setdefault(section, {})[field] = odd(chance, getattr(known(), field))
     if chance.random() < 0.2:

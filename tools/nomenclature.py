@@ -13,7 +13,7 @@ PAGE = ROOT / "docs" / "nomenclature.md"
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT / "addon"))
 
-from digiclay.core.base.quantity import EXTENTS, Parameters, Quantity, quantities  # noqa: E402
+from digiclay.core.base.quantity import EXTENTS, Parameters, Quantity, list_quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
 
@@ -114,8 +114,8 @@ VARIABLES = (
     ("ΔP_crit", "`Orifice.knee`", "Pa", "drop at which the flow turns turbulent (6), fully open valve"),
     ("Q, q", "`flow`", "m3/s", "flow into the cylinder (7)"),
     ("g, a", "`Orifice.laminar`, `Orifice.turbulent`", "m3/(s Pa), …", "coefficients of the open valve (7)"),
-    ("C_q", "in `valve.orifice`", "1", "discharge coefficient (3, 5)"),
-    ("Re\\*", "in `valve.orifice`", "1", "modified Reynolds number (4)"),
+    ("C_q", "in `valve.make_orifice`", "1", "discharge coefficient (3, 5)"),
+    ("Re\\*", "in `valve.make_orifice`", "1", "modified Reynolds number (4)"),
     ("R", "`Conduit.resistance`", "Pa s/m3", "resistance of the conduit (8)"),
     ("μ", "`Fluid.dynamic_viscosity`", "Pa s", "dynamic viscosity ρ ν"),
     ("r_VM", "`Master.x`, `Master.y`", "m", "position of the virtual master (13 again)"),
@@ -192,7 +192,7 @@ def section(name: str, method: str) -> list[str]:
     title = f"### [{name}]" + (f' with method = "{method}"' if name == "control" else "")
     lines = ["", title, "", "| Symbol | Name | Unit | Meaning | Range | Default | Source |", RULE]
     defaults = kind()
-    for field, known in quantities(kind).items():
+    for field, known in list_quantities(kind).items():
         meaning = known.doc + (f" ({', '.join(known.choices)})" if known.choices else "")
         default = shown(getattr(defaults, field))
         cells = (known.symbol, f"`{name}.{field}`", known.unit, meaning, bounds(known), default, known.source)

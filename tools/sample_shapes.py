@@ -85,14 +85,14 @@ def picture(path: Path) -> None:
     """Draw every sample shape as a bed of 49 x 49 pins shows it."""
     import matplotlib.pyplot as plt
     from digiclay.core.model.actuator import Actuator
-    from digiclay.core.model.layout import Layout, grid
+    from digiclay.core.model.layout import Layout, make_grid
     from digiclay.core.shapes.request import Shape
-    from digiclay.core.shapes.source_file import fitted_to, sample_shapes
+    from digiclay.core.shapes.source_file import fit_shape, list_shapes
     from matplotlib.colors import LightSource
 
-    bed = grid(Layout(rows=49, columns=49, pitch=2e-3))
+    bed = make_grid(Layout(rows=49, columns=49, pitch=2e-3))
     x, y = (values.reshape(49, 49) * 1e3 for values in (bed.x, bed.y))
-    names = sample_shapes()
+    names = list_shapes()
     figure, axes = plt.subplots(
         3, 5, figsize=(15, 9.4), subplot_kw={"projection": "3d", "computed_zorder": False}
     )
@@ -100,7 +100,7 @@ def picture(path: Path) -> None:
     for axis in axes.ravel():
         axis.set_axis_off()
     for axis, name in zip(axes.ravel(), names, strict=False):
-        z = fitted_to(Shape(file=name, rise=16e-3), bed, Actuator()).heights.reshape(49, 49) * 1e3
+        z = fit_shape(Shape(file=name, rise=16e-3), bed, Actuator()).heights.reshape(49, 49) * 1e3
         shade = light.shade(z, plt.get_cmap("cividis"), vert_exag=1.0, dx=2.0, dy=-2.0, blend_mode="soft")
         axis.plot_surface(x, y, z, facecolors=shade, rstride=1, cstride=1, linewidth=0, antialiased=False)
         axis.set_box_aspect((98, 98, 16), zoom=1.22)

@@ -9,7 +9,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session import live_periods
 from digiclay.device import unit_watch
 from digiclay.device.instant import Instant
@@ -41,7 +41,7 @@ def extension() -> Iterator[None]:
 def formed() -> Instant:
     """A staggered bed in which every pin has a height of its own and every mode occurs."""
     layout = Layout(rows=6, columns=8, arrangement="staggered")
-    bed = grid(layout)
+    bed = make_grid(layout)
     codes = np.arange(bed.count) * 5 % len(Mode)
     return Instant(
         position=bed.positions,

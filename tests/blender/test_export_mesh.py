@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.engine.simulation import begin, step
-from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
 from digiclay.device import view
@@ -26,7 +26,7 @@ LAYOUT = Layout(rows=12, columns=14)
 
 def shaped() -> Instant:
     """A boss of 5 mm, a crease of 4 mm, level ground between them; forces and all modes."""
-    place = grid(LAYOUT).positions
+    place = make_grid(LAYOUT).positions
     x, y = place.T * 1e3
     raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
     return Instant(
@@ -80,7 +80,7 @@ IMPORTERS = {
 @pytest.mark.parametrize("kind", ["solid", "surface", "pins", "features"])
 @pytest.mark.parametrize("file_format", IMPORTERS)
 def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file_format):
-    path = tmp_path / f"bed{suffix(file_format)}"
+    path = tmp_path / f"bed{find_suffix(file_format)}"
     done = bpy.ops.export_mesh.digital_clay(filepath=str(path), kind=kind, file_format=file_format)
     assert done == {"FINISHED"}
     bpy.ops.mesh.digital_clay_make(kind=kind, beside=False)
@@ -95,7 +95,7 @@ def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file
 @pytest.mark.parametrize("file_format", FORMATS)
 def test_every_format_is_written_with_its_ending(bed, tmp_path, file_format):
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), file_format=file_format)
-    assert [path.name for path in tmp_path.iterdir()] == [f"bed{suffix(file_format)}"]
+    assert [path.name for path in tmp_path.iterdir()] == [f"bed{find_suffix(file_format)}"]
 
 
 def test_a_name_gets_the_ending_of_its_format_in_place_of_another(bed, tmp_path):

@@ -16,7 +16,7 @@ import pytest
 from digiclay import bridge, command_line
 from digiclay.core.base.errors import OutputError
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.device import view
 from digiclay.device.instant import Instant
 
@@ -89,7 +89,7 @@ def test_the_operator_adds_the_bed_it_was_asked_for(arrangement: str) -> None:
     bed = bpy.context.object
     assert view.is_bed(bed)
     cells = bridge.read_cells(bed.data)
-    wanted = grid(Layout(rows=4, columns=7, pitch=2.5e-3, arrangement=arrangement))
+    wanted = make_grid(Layout(rows=4, columns=7, pitch=2.5e-3, arrangement=arrangement))
     np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
     np.testing.assert_allclose(cells["height"], 0.040, rtol=0, atol=FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}

@@ -14,7 +14,7 @@ from digiclay.compat import scratch, strips
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import COLORS, Mode
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session.render_settings import Film, Turntable
 from digiclay.device.instant import Instant
 from digiclay.pictures import film as films
@@ -27,7 +27,7 @@ SMALL = {"width": WIDTH, "height": HEIGHT, "rate": 8}
 @pytest.fixture
 def history() -> dict[str, np.ndarray]:
     """One second of a bed that turns from one mode into another half way, while the force rises."""
-    bed = grid(Layout(rows=5, columns=5))
+    bed = make_grid(Layout(rows=5, columns=5))
     time = np.linspace(0.0, 1.0, 201)
     rise = 0.02 * time[:, None] * np.ones(bed.count)
     mode = np.where(time[:, None] < 0.5, Mode.HOLD, Mode.FORCE_FOLLOW) * np.ones(bed.count)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.scene.scene_source import SAMPLES, find, list_samples, load
-from digiclay.core.shapes.source_file import sample_shapes
+from digiclay.core.shapes.source_file import list_shapes
 from digiclay.device import view
 from digiclay.operators.open_scene import SceneFiles
 from digiclay.recorded import takes
@@ -39,7 +39,7 @@ def test_every_sample_session_opens_as_the_bed_it_describes(name: str) -> None:
     assert made.shape is None or made.shape.heights
 
 
-@pytest.mark.parametrize("name", sample_shapes())
+@pytest.mark.parametrize("name", list_shapes())
 def test_every_sample_shape_opens_on_a_bed_that_displays_it(name: str) -> None:
     assert bpy.ops.digiclay.add_sample(sample=f"shape:{name}") == {"FINISHED"}
     height = bridge.read_cells(bpy.context.object.data)["height"]

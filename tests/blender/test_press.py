@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.model.layout import grid
+from digiclay.core.model.layout import make_grid
 from digiclay.device import view
 from digiclay.press import aim, tool
 from digiclay.press.drape import drape
@@ -138,7 +138,7 @@ def test_a_hidden_bed_is_looked_through(bed: Any, in_the_view: Any) -> None:
 
 def test_without_a_session_the_surface_is_what_is_drawn(bed: Any) -> None:
     cells, height = aim.read_surface(bed)
-    wanted = grid(properties.scene_of(bed).layout)
+    wanted = make_grid(properties.scene_of(bed).layout)
     np.testing.assert_array_equal(cells.positions, wanted.positions)
     np.testing.assert_array_equal(height, bridge.read_cells(bed.data)["height"])
 

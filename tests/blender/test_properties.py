@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.base.quantity import quantities
+from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.scene_source import find, list_samples, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
@@ -28,7 +28,7 @@ EVERY += [("control", method) for method in METHODS]
 
 def thing(layout: Layout | None = None) -> Any:
     """Return an object with the pins of a layout, by default the default's."""
-    places = grid(layout or Layout())
+    places = make_grid(layout or Layout())
     mesh = bridge.points("Bed", places.count)
     bridge.write_cells(mesh, places.positions, np.zeros(places.count))
     return bpy.data.objects.new("Bed", mesh)
@@ -54,7 +54,7 @@ def test_every_parameter_of_a_part_has_a_property_with_its_unit_and_meaning(
     shown = properties.part_group(settings, section).bl_rna.properties
     kind = import_parameters(section, method)
     defaults = {field.name: field.default for field in dataclasses.fields(kind)}
-    for name, known in quantities(kind).items():
+    for name, known in list_quantities(kind).items():
         unit, _ = unit_of(known.unit, defaults[name])
         assert shown[name].name.endswith(f"({unit})") or not unit
         assert known.doc[1:] in shown[name].description

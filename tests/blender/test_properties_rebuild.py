@@ -10,7 +10,7 @@ import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.layout import grid
+from digiclay.core.model.layout import make_grid
 from digiclay.device import view
 from digiclay.live import bed_state
 from digiclay.settings import properties
@@ -37,7 +37,7 @@ def test_the_pins_of_a_rebuilt_bed_stand_at_rest_where_its_layout_says(bed: Any)
     settings.layout.rows, settings.layout.arrangement, settings.actuator.rest_height = 9, "hexagonal", 30.0
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
     cells = bridge.read_cells(bed.data)
-    wanted = grid(properties.scene_of(bed).layout)
+    wanted = make_grid(properties.scene_of(bed).layout)
     np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
     np.testing.assert_allclose(cells["height"], 0.030, rtol=0, atol=FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session import snapshot
-from digiclay.core.shapes.height_text import unpacked as heights_of
-from digiclay.core.shapes.source_file import sample_shapes
+from digiclay.core.shapes.height_text import unpack as heights_of
+from digiclay.core.shapes.source_file import list_shapes
 from digiclay.device import view
 from digiclay.exchange import image_reader
 from digiclay.live import bed_state
@@ -64,7 +64,7 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed() -> None:
     # A square box is as wide as the bed: all 169 pins go up by the rise.
     assert bpy.ops.digiclay.shape_from_object(rise=12.0, scale=0.5) == {"FINISHED"}
     scene = properties.scene_of(made)
-    wanted = heights_of(scene.shape.heights, grid(scene.layout))
+    wanted = heights_of(scene.shape.heights, make_grid(scene.layout))
     raised = wanted > scene.actuator.rest_height + 6e-3
     assert raised.sum() in (36, 49)
     assert wanted.max() == pytest.approx(52e-3, abs=4e-9)
@@ -118,7 +118,7 @@ def test_the_finger_is_lifted_out_of_the_shape() -> None:
     assert bridge.pose(tip)[2] > heights(made).max()
 
 
-@pytest.mark.parametrize("name", sample_shapes())
+@pytest.mark.parametrize("name", list_shapes())
 def test_every_sample_shape_is_displayed(name: str) -> None:
     made = bed()
     assert bpy.ops.digiclay.shape_sample(sample=name) == {"FINISHED"}
@@ -151,7 +151,7 @@ def test_what_is_formed_becomes_the_shape_and_goes_again() -> None:
     shown = heights(made)
     assert bpy.ops.digiclay.shape_keep() == {"FINISHED"}
     scene = properties.scene_of(made)
-    assert np.abs(heights_of(scene.shape.heights, grid(scene.layout)) - shown).max() < 4e-9
+    assert np.abs(heights_of(scene.shape.heights, make_grid(scene.layout)) - shown).max() < 4e-9
     assert bpy.ops.digiclay.shape_remove() == {"FINISHED"}
     assert properties.scene_of(made).shape is None
 

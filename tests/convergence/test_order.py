@@ -14,7 +14,7 @@ import pytest
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.physics import rates
+from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Valve
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -82,7 +82,7 @@ def reference(problem: str) -> Floats:
 
         def rhs(t: float, flat: Floats, command: float = command) -> Floats:
             under = motion.poses(np.array([t]))[0, 2:3] if touched else np.empty(0)
-            return rates(system.cell, flat[:, None], under, np.array([command]))[:, 0]
+            return compute_rates(system.cell, flat[:, None], under, np.array([command]))[:, 0]
 
         span = (i * PERIOD, (i + 1) * PERIOD)
         # A short longest step, so that no kink is stepped over unseen.

@@ -13,7 +13,7 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
-from digiclay.core.model.physics import speeds
+from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Path, Trajectory, Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
@@ -99,7 +99,7 @@ def assert_within_reach(system: System, finger: Trajectory, height: Floats) -> N
     for period, (before, after) in enumerate(pairwise(height)):
         poses = finger.poses(period * system.period + system.instants)
         unders = under(system.cell.touch.fingertip.outline(poses), system.grid.x, system.grid.y)
-        lowest, highest = speeds(system.cell).reach(before, unders, system.period)
+        lowest, highest = find_speeds(system.cell).reach(before, unders, system.period)
         # Rounding: the undersides are taken over another sum here.
         assert (after >= lowest - 1e-12).all()
         assert (after <= highest + 1e-15).all()

@@ -10,7 +10,7 @@ from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
-from digiclay.core.model.trajectory import Trajectory, level
+from digiclay.core.model.trajectory import Trajectory, make_level
 from digiclay.core.model.valve import Valve
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -32,7 +32,7 @@ steppers = st.sampled_from(["bernoulli", "runge_kutta_4"])
 
 def finger(spots: list[tuple[float, float, float]]) -> Trajectory:
     """Return a level finger that visits spots, in mm, within the session."""
-    return level(np.linspace(0.0, COUNT * 5e-3, len(spots)), np.array(spots) * 1e-3)
+    return make_level(np.linspace(0.0, COUNT * 5e-3, len(spots)), np.array(spots) * 1e-3)
 
 
 def tilted(path: Trajectory, turn: tuple[float, ...]) -> Trajectory:
@@ -153,7 +153,7 @@ valves = st.sampled_from([{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid":
 def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: dict[str, object]) -> None:
     # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead time.
     system = one_cell(dead_time=0.0, control=scripted(lambda t, x, y: script[round(t / 5e-3)]), **parts)
-    run = record(system, level(np.zeros(1), np.array([[0, 0, 1.0]])), len(script))
+    run = record(system, make_level(np.zeros(1), np.array([[0, 0, 1.0]])), len(script))
     opening, volume, count = 0.0, 0.0, 1000
     dt = 5e-3 / count
     for command in script:

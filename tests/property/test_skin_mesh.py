@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.skin_mesh import make_solid
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -38,13 +38,13 @@ def bed(rows: int, columns: int, arrangement: str):
 
 def made(layout: Layout, height: np.ndarray) -> trimesh.Trimesh:
     """The solid as trimesh sees it, vertices and faces untouched."""
-    vertices, faces = make_solid(grid(layout).positions, height, layout.rows, layout.columns)
+    vertices, faces = make_solid(make_grid(layout).positions, height, layout.rows, layout.columns)
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
 def volume(layout: Layout, height: np.ndarray) -> float:
     """The sum of the prisms."""
-    return prism_volume(grid(layout).positions, height, layout.rows, layout.columns)
+    return prism_volume(make_grid(layout).positions, height, layout.rows, layout.columns)
 
 
 @given(beds())
@@ -84,7 +84,7 @@ def test_the_solid_has_one_piece_without_handles(case):
 def test_a_bed_mirrored_in_x_has_the_same_volume(case):
     # The mirror image of a shifted layout is no layout, so the positions are mirrored with the heights.
     layout, height = case
-    place = grid(layout).positions
+    place = make_grid(layout).positions
     vertices, faces = make_solid(place * (-1.0, 1.0), height, layout.rows, layout.columns)
     mirrored = trimesh.Trimesh(vertices, faces, process=False)
     assert mirrored.volume == pytest.approx(volume(layout, height), rel=ROUNDING)

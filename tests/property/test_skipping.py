@@ -9,7 +9,7 @@ import numpy as np
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.model.control_interface import Commands, Controller, Measurement
 from digiclay.core.model.layout import Layout
-from digiclay.core.model.trajectory import level
+from digiclay.core.model.trajectory import make_level
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -63,7 +63,7 @@ class Everywhere:
 def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(
     spots: list[tuple[float, float, float]],
 ) -> None:
-    trajectory = level(np.linspace(0.0, COUNT * BED.period, len(spots)), np.array(spots) * 1e-3)
+    trajectory = make_level(np.linspace(0.0, COUNT * BED.period, len(spots)), np.array(spots) * 1e-3)
     fewer = record(BED, trajectory, COUNT)
     all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, COUNT)
     assert all_cells.last.active.cells.size == BED.grid.count

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from digiclay.core.base.quantity import quantities
+from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import SECTIONS, import_parameters
 
@@ -35,7 +35,7 @@ def test_the_page_of_symbols_is_the_one_the_declarations_make(maker: ModuleType)
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_parameter_is_on_the_page_of_symbols(maker: ModuleType, section: str) -> None:
     text = maker.PAGE.read_text(encoding="utf-8")
-    names = quantities(import_parameters(section, "virtual_master"))
+    names = list_quantities(import_parameters(section, "virtual_master"))
     assert [name for name in names if f"`{section}.{name}`" not in text] == []
 
 
@@ -44,7 +44,7 @@ def test_every_parameter_says_where_it_comes_from(maker: ModuleType) -> None:
         source
         for section in SECTIONS
         for method in METHODS
-        for known in quantities(import_parameters(section, method)).values()
+        for known in list_quantities(import_parameters(section, method)).values()
         for source in known.source.split(", ")
     }
     # The paper, derived, chosen; or a reference that the page lists, and none that nobody takes a value from.

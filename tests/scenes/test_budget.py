@@ -16,7 +16,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import SAMPLES
 from digiclay.core.scene.schema import Scene
-from digiclay.core.studies.omissions import Fitted, fitted, omissions
+from digiclay.core.studies.omissions import Fitted, find_omissions, propose_omissions
 from numpy.typing import NDArray
 
 from tests.assemble import record, sample
@@ -42,7 +42,7 @@ def heights(scene: Scene) -> NDArray[np.float64]:
 @cache
 def found(name: str, budget: float) -> Fitted:
     """Fit a sample session into a budget."""
-    return fitted(cut(name), budget)
+    return find_omissions(cut(name), budget)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -67,8 +67,8 @@ def test_a_larger_budget_leaves_no_more_work_to_do() -> None:
 
 
 def test_what_is_left_out_is_left_out_of_the_scene() -> None:
-    one = fitted(cut("tap"), 500e-6)
-    full = {omission.said: omission.leave_out for omission in omissions(cut("tap"), 500e-6)}
+    one = find_omissions(cut("tap"), 500e-6)
+    full = {omission.said: omission.leave_out for omission in propose_omissions(cut("tap"), 500e-6)}
     rebuilt = cut("tap")
     for said in one.left_out:
         rebuilt = full[said](rebuilt)
@@ -84,12 +84,12 @@ def test_a_trial_that_leaves_the_budget_is_broken_off_and_not_kept() -> None:
 @pytest.mark.parametrize("budget", [0.0, -1e-6, math.nan, math.inf])
 def test_a_budget_that_is_no_length_is_refused(budget: float) -> None:
     with pytest.raises(ParameterError, match=r"run.budget must be above 0 m"):
-        fitted(cut("tap"), budget)
+        find_omissions(cut("tap"), budget)
 
 
 def test_a_budget_below_the_integrations_own_error_is_refused_with_the_remedy() -> None:
     with pytest.raises(ParameterError, match=r"own integration.*richardson"):
-        fitted(cut("tap"), 1e-10)
+        find_omissions(cut("tap"), 1e-10)
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> Callable[[str], bool]:

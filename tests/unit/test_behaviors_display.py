@@ -10,7 +10,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.named_shapes import SHAPES
 from digiclay.core.model.control_interface import Measurement
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
@@ -39,7 +39,7 @@ def test_an_approximate_gradual_refresh_moves_all_rows_at_once() -> None:
 def test_a_move_waits_no_longer_than_its_patience() -> None:
     # Every pin is held down by something; each row is given up in its turn.
     behavior = control(shape="pyramid", refresh="one_time", patience=0.05)
-    bed, full = grid(Layout(5, 5)), np.full(25, 40e-3)
+    bed, full = make_grid(Layout(5, 5)), np.full(25, 40e-3)
     place, mode = bed.compute_basis(np.arange(25)), np.zeros(25, np.int8)
     stuck = Measurement(place, full, np.zeros(25), full, mode, np.zeros((0, 25)), np.arange(25))
     memory = behavior.begin()
@@ -50,7 +50,7 @@ def test_a_move_waits_no_longer_than_its_patience() -> None:
 
 def test_a_move_waits_as_long_as_its_patience() -> None:
     behavior = control(shape="pyramid", refresh="one_time", patience=0.0525)
-    place, full = grid(Layout(5, 5)).compute_basis(np.arange(25)), np.full(25, 40e-3)
+    place, full = make_grid(Layout(5, 5)).compute_basis(np.arange(25)), np.full(25, 40e-3)
     stuck = Measurement(
         place, full, np.zeros(25), full, np.zeros(25, np.int8), np.zeros((0, 25)), np.arange(25)
     )
@@ -92,7 +92,7 @@ def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_fing
         "control": {"method": "force_display", "release_time": 0.0225},
     }
     behavior = assemble(resolve(table)).controller
-    place, full = grid(Layout(1, 1)).compute_basis(np.arange(1)), np.full(1, 40e-3)
+    place, full = make_grid(Layout(1, 1)).compute_basis(np.arange(1)), np.full(1, 40e-3)
     mode, own, follows = np.full(1, Mode.FORCE_FOLLOW, np.int8), np.zeros((behavior.rows, 1)), []
     for _ in range(6):
         _, given = behavior.command(

@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.control.drive import Drive
 from digiclay.core.control.named_shapes import SHAPES, evaluate_shape
 from digiclay.core.control.viscous import make_exchange
-from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
@@ -23,7 +23,7 @@ def driven(**table: object) -> Drive:
 
 def bed(arrangement: str, rows: int = 7, columns: int = 7) -> Grid:
     """Return a bed."""
-    return grid(Layout(rows, columns, arrangement=arrangement))
+    return make_grid(Layout(rows, columns, arrangement=arrangement))
 
 
 # Drive

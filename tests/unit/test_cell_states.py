@@ -13,12 +13,12 @@ from digiclay.core.control.cell_states import CellStates, CellStatesControl, Pat
 from digiclay.core.control.travel import Heading
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.control_interface import Commands, Measurement
-from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.model.layout import Grid, Layout, make_grid
 
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
 CONTROL = CellStatesControl(CellStates(), BLISTER, Actuator(), lift=0.157, period=5e-3)
-BED = grid(Layout(rows=13, columns=13))
+BED = make_grid(Layout(rows=13, columns=13))
 MIDDLE = 6 * 13 + 6
 
 

@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.model.contact import Contact
-from digiclay.core.steppers.closed_form import LARGE, TINY, careful, crossed, not_zero, pressed
+from digiclay.core.steppers.closed_form import (
+    LARGE,
+    TINY,
+    replace_zeros,
+    solve_carefully,
+    solve_crossing,
+    solve_pressed,
+)
 
 COUNT = 4000
 
@@ -38,7 +45,7 @@ def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> 
 
 def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
     """Return what `crossed` says of one cell."""
-    push, mean = crossed(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
+    push, mean = solve_crossing(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
     return float(push[0]), float(mean[0])
 
 
@@ -68,8 +75,8 @@ def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share: float) ->
 def test_the_careful_solution_is_that_of_the_plain_one_where_both_hold(growth: float) -> None:
     exponent, decay, pulp = np.array([2.0]), np.array([0.3]), np.array([1.7])
     grown, slip = np.array([growth]), np.array([growth]) - decay * pulp
-    relief = pressed(np.exp(exponent), grown, decay)
-    push, mean = careful(exponent, grown, slip, decay, pulp)
+    relief = solve_pressed(np.exp(exponent), grown, decay)
+    push, mean = solve_carefully(exponent, grown, slip, decay, pulp)
     assert push == pytest.approx(decay * pulp - relief, rel=1e-12, abs=1e-14)
     assert mean == pytest.approx(relief / decay, rel=1e-12)
 
@@ -81,9 +88,9 @@ def test_the_careful_solution_is_that_of_the_plain_one_where_both_hold(growth: f
 def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay: float, pulp: float) -> None:
     numbers = tuple(np.array([value]) for value in (slip, decay, pulp))
     with np.errstate(all="raise", under="ignore"):
-        growth = not_zero(numbers[0] + numbers[1] * numbers[2])
-        push, mean = careful(np.array([exponent]), growth, *numbers)
-        met = crossed(np.array([exponent]), np.zeros(1), *numbers)
+        growth = replace_zeros(numbers[0] + numbers[1] * numbers[2])
+        push, mean = solve_carefully(np.array([exponent]), growth, *numbers)
+        met = solve_crossing(np.array([exponent]), np.zeros(1), *numbers)
     assert np.isfinite([push, mean, *met]).all()
     assert mean[0] >= 0.0
     # Not to the last bit: exponents are in the thousands.

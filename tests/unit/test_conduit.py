@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.model.conduit import Conduit, OrificeAndConduit, in_series
+from digiclay.core.model.conduit import Conduit, OrificeAndConduit, connect_in_series
 from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.valve import Valve, orifice
+from digiclay.core.model.valve import Valve, make_orifice
 from scipy.integrate import quad
 
 THIN = Fluid(density=760.0, viscosity=0.65e-6)
@@ -18,7 +18,7 @@ OPENINGS, DROPS = (grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], n
 
 def series(gap: str = "stroke") -> OrificeAndConduit:
     """A wide valve, a thin fluid and a narrow conduit: both branches, and drops of like size."""
-    return in_series(orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), NARROW, THIN)
+    return connect_in_series(make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), NARROW, THIN)
 
 
 def valve_drop(law: OrificeAndConduit, flow: np.ndarray, opening: np.ndarray, power: int) -> np.ndarray:
@@ -70,20 +70,20 @@ def test_flow_through_both_is_continuous_where_the_valve_turns_turbulent() -> No
 
 
 def test_behind_a_wide_open_valve_the_flow_is_hagen_and_poiseuilles() -> None:
-    wide = in_series(orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit(), Fluid())
+    wide = connect_in_series(make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit(), Fluid())
     # 200 mm against 0.8 mm: the valve's resistance is (1/250)^4 of the conduit's, some 1e-9.
     drop = np.array([1e2, 1e4, 1e5])
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
 
 
 def test_without_length_the_conduit_changes_nothing() -> None:
-    valve = orifice(Valve(orifice_diameter=0.8e-3), THIN)
-    both = in_series(valve, Conduit(length=0.0), THIN)
+    valve = make_orifice(Valve(orifice_diameter=0.8e-3), THIN)
+    both = connect_in_series(valve, Conduit(length=0.0), THIN)
     assert both.flow(OPENINGS, DROPS) == pytest.approx(valve.flow(OPENINGS, DROPS), rel=1e-14)  # rounding
 
 
 def test_the_conduit_never_adds_flow() -> None:
-    valve = orifice(Valve(orifice_diameter=0.8e-3), THIN)
+    valve = make_orifice(Valve(orifice_diameter=0.8e-3), THIN)
     assert np.all(series().flow(OPENINGS, DROPS) < valve.flow(OPENINGS, DROPS))
 
 

@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.contact import LARGEST_EXPONENT, Contact
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 
 from tests.assemble import under
 
@@ -54,7 +54,7 @@ def test_the_cells_together_carry_what_a_flat_plate_does(arrangement: str, depth
     # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One constant
     # cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger stands.
     share = 0.29 if arrangement == "hexagonal" else 0.34
-    contact, bed = Contact(share=share), grid(Layout(rows=15, columns=15, arrangement=arrangement))
+    contact, bed = Contact(share=share), make_grid(Layout(rows=15, columns=15, arrangement=arrangement))
     offsets = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) * 0.5e-3
     poses = np.array([[x, y, -depth, *LEVEL] for x, y in offsets])
     carried = share * contact.tension(-under(Fingertip().outline(poses), bed.x, bed.y)).sum(axis=1)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.engine.system import System, segments
-from digiclay.core.model.delay import Delay, Queue, queue
+from digiclay.core.engine.system import System, make_segments
+from digiclay.core.model.delay import Delay, Queue, split_delay
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.steppers.bernoulli import BernoulliExponential
 from digiclay.core.steppers.runge_kutta import RungeKutta4
@@ -83,27 +83,27 @@ def test_nothing_moves_before_the_dead_time_is_over() -> None:
 
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
 def test_the_commands_kept_and_the_cut_make_up_the_dead_time(dead_time: float) -> None:
-    waiting = queue(Delay(dead_time), PERIOD)
+    waiting = split_delay(Delay(dead_time), PERIOD)
     whole = waiting.length - (2 if waiting.cut else 1)
     assert whole * PERIOD + waiting.cut == pytest.approx(dead_time, abs=1e-15)  # rounding
 
 
 @pytest.mark.parametrize("dead_time", [0.0, 5e-3, 10e-3, 15e-3])
 def test_whole_periods_of_dead_time_need_no_cut(dead_time: float) -> None:
-    assert queue(Delay(dead_time), PERIOD).cut == 0.0
+    assert split_delay(Delay(dead_time), PERIOD).cut == 0.0
 
 
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
 def test_the_steps_of_a_period_fill_it_without_a_gap(dead_time: float) -> None:
-    cut, _ = segments(RungeKutta4(), queue(Delay(dead_time), PERIOD).cut, PERIOD, 5)
+    cut, _ = make_segments(RungeKutta4(), split_delay(Delay(dead_time), PERIOD).cut, PERIOD, 5)
     ends = [part.start + part.length for part in cut]
     assert [part.start for part in cut] == pytest.approx([0.0, *ends[:-1]], abs=1e-18)
     assert ends[-1] == pytest.approx(PERIOD, abs=1e-18)
 
 
 def test_a_step_ends_where_the_next_command_arrives() -> None:
-    waiting = queue(Delay(7.3e-3), PERIOD)
-    cut, _ = segments(BernoulliExponential(), waiting.cut, PERIOD, 5)
+    waiting = split_delay(Delay(7.3e-3), PERIOD)
+    cut, _ = make_segments(BernoulliExponential(), waiting.cut, PERIOD, 5)
     seen = {round(part.start, 12): waiting.seen(part.start) for part in cut}
     assert seen == {0.0: 0, 1e-3: 0, 2e-3: 0, 2.3e-3: 1, 3e-3: 1, 4e-3: 1}
 
@@ -129,7 +129,7 @@ def test_other_steppers_end_a_step_at_the_kink() -> None:
 @pytest.mark.parametrize("dead_time", DEAD_TIMES)
 def test_the_instants_of_each_step_are_the_stepper_s_nodes(dead_time: float) -> None:
     stepper = RungeKutta4()
-    cut, instants = segments(stepper, queue(Delay(dead_time), PERIOD).cut, PERIOD, 5)
+    cut, instants = make_segments(stepper, split_delay(Delay(dead_time), PERIOD).cut, PERIOD, 5)
     wanted = [[part.start + node * part.length for node in stepper.nodes] for part in cut]
     assert [instants[list(part.nodes)].tolist() for part in cut] == [
         pytest.approx(w, abs=1e-15) for w in wanted
@@ -137,7 +137,7 @@ def test_the_instants_of_each_step_are_the_stepper_s_nodes(dead_time: float) -> 
 
 
 def test_without_dead_time_the_newest_command_is_seen_at_once() -> None:
-    assert queue(Delay(0.0), PERIOD) == Queue(1, 0.0)
+    assert split_delay(Delay(0.0), PERIOD) == Queue(1, 0.0)
 
 
 def test_a_dead_time_below_zero_is_refused() -> None:

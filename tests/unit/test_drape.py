@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.press.drape import drape
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -18,14 +18,14 @@ def ring(radius: float, count: int = 64) -> np.ndarray:
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_on_even_pins_the_line_is_even(arrangement: str) -> None:
-    cells = grid(Layout(rows=9, columns=9, arrangement=arrangement))
+    cells = make_grid(Layout(rows=9, columns=9, arrangement=arrangement))
     line = drape(cells, np.full(81, 0.04), ring(0.02))
     # A mean of equal numbers, in some roundings.
     np.testing.assert_allclose(line[:, 2], 0.04, rtol=1e-14, atol=0)
 
 
 def test_a_step_of_15_mm_between_neighbors_makes_no_spike() -> None:
-    cells = grid(Layout())
+    cells = make_grid(Layout())
     height = np.where(cells.x > 0.0, 0.055, 0.04)
     places = ring(0.009)
     apart = np.abs(np.diff(drape(cells, height, places)[:, 2], append=0.04)[:-1])
@@ -37,7 +37,7 @@ def test_a_step_of_15_mm_between_neighbors_makes_no_spike() -> None:
 
 
 def test_a_single_high_pin_raises_the_line_by_a_sixth_of_its_height() -> None:
-    cells = grid(Layout())
+    cells = make_grid(Layout())
     height = np.full(cells.count, 0.04)
     height[cells.at(np.zeros(1), np.zeros(1))] += 0.012
     # The weight of the middle of a normal distribution over squares of one standard deviation: 1 / (2 pi).
@@ -46,12 +46,12 @@ def test_a_single_high_pin_raises_the_line_by_a_sixth_of_its_height() -> None:
 
 @pytest.mark.parametrize("place", [(0.05, 0.0), (-1.0, 2.0), (1e3, -1e3)])
 def test_beyond_the_edge_the_line_has_the_height_of_the_edge(place: tuple[float, float]) -> None:
-    cells = grid(Layout())
+    cells = make_grid(Layout())
     height = np.full(cells.count, 0.04)
     height[cells.at(np.zeros(1), np.zeros(1))] = 0.09
     assert drape(cells, height, np.array([place]))[0, 2] == pytest.approx(0.04)
 
 
 def test_a_bed_of_one_pin_has_its_height_everywhere() -> None:
-    cells = grid(Layout(rows=1, columns=1))
+    cells = make_grid(Layout(rows=1, columns=1))
     assert (drape(cells, np.array([0.03]), ring(0.01))[:, 2] == 0.03).all()

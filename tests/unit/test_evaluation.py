@@ -71,7 +71,7 @@ def test_the_kind_of_a_part_is_all_but_its_numbers() -> None:
 
 def test_the_reach_of_many_fingers_is_that_of_each() -> None:
     from digiclay.core.model.fingertip import Fingertip
-    from digiclay.core.model.fingertip import reach as alone
+    from digiclay.core.model.fingertip import compute_reach as alone
 
     poses = np.zeros((3, 2, 7))
     poses[..., 3], poses[:, :, 2] = 1.0, np.array([[0.03, 0.031], [0.0405, 0.04], [0.06, 0.06]])

@@ -14,7 +14,7 @@ import pytest
 import trimesh
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.body import Body, compute_volume
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed
@@ -31,7 +31,7 @@ def formed() -> Formed:
     """A bed on which every pin has a height, a force and nearly a mode of its own."""
     random = np.random.default_rng(3)
     height, force = random.uniform(0.03, 0.06, 35), random.uniform(0.0, 1.0, 35)
-    return Formed.of(grid(BED).positions, height, 0.04, force, np.arange(35) % 8)
+    return Formed.of(make_grid(BED).positions, height, 0.04, force, np.arange(35) % 8)
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def solid(formed: Formed) -> list[Body]:
 
 
 def path_for(folder: Path, kind: str) -> Path:
-    return folder / f"surface{mesh_writer.suffix(kind)}"
+    return folder / f"surface{mesh_writer.find_suffix(kind)}"
 
 
 def corners(body: Body) -> np.ndarray:
@@ -186,7 +186,7 @@ def test_a_path_may_have_blanks_and_umlauts(solid, tmp_path, kind):
     folder = tmp_path / "für später 粘土"
     folder.mkdir()
     assert (
-        mesh_writer.write(solid, folder / f"gewölbte Fläche 1{mesh_writer.suffix(kind)}", kind=kind)
+        mesh_writer.write(solid, folder / f"gewölbte Fläche 1{mesh_writer.find_suffix(kind)}", kind=kind)
         .stat()
         .st_size
     )

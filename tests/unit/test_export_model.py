@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.body import NO_PIN, Body, compute_volume
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import Formed, make_formed
@@ -19,7 +19,7 @@ ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 def formed(arrangement: str = "aligned") -> Formed:
     """A boss, a crease, level ground between them; every pin with a force and a mode of its own."""
-    place = grid(Layout(rows=12, columns=14, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=12, columns=14, arrangement=arrangement)).positions
     x, y = place.T * 1e3
     raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
     force, mode = np.arange(168) / 100.0, np.arange(168) % 8
@@ -118,7 +118,7 @@ def test_a_surface_without_features_says_what_was_looked_for():
 
 
 def test_a_skin_of_too_many_points_is_refused_before_it_is_made():
-    place = grid(Layout(rows=400, columns=400)).positions
+    place = make_grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
     with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
         make_bodies(bed, Model(resolution=40))

@@ -15,7 +15,7 @@ from digiclay.core.base import whole_files
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.mesh_io.export_model import Model, make_bodies
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.body import Body
 from digiclay.core.surface.formed import Formed
 
@@ -24,7 +24,7 @@ from tests.timeouts import TIMEOUT
 
 @pytest.fixture
 def solid() -> list[Body]:
-    bed = grid(Layout(rows=7, columns=5, arrangement="hexagonal"))
+    bed = make_grid(Layout(rows=7, columns=5, arrangement="hexagonal"))
     return make_bodies(Formed.of(bed.positions, 0.04 + 0.3 * bed.x**2, 0.04, 0.0, 0), Model())
 
 
@@ -93,9 +93,9 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     disk.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=TIMEOUT)
     try:
-        path = disk / f"surface{mesh_writer.suffix(kind)}"
+        path = disk / f"surface{mesh_writer.find_suffix(kind)}"
         path.write_bytes(b"older")
-        bed = grid(Layout(rows=60, columns=60))
+        bed = make_grid(Layout(rows=60, columns=60))
         random = np.random.default_rng(1).uniform(0.03, 0.06, 3600)  # does not deflate into 64 kB
         made = make_bodies(Formed.of(bed.positions, random, 0.04, 0.0, 0), Model())
         with pytest.raises(OutputError, match=r"^Cannot write .*: No space left on device\.$"):

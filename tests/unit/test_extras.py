@@ -183,5 +183,5 @@ def test_the_instant_before_the_finger_is_named_to_the_last_digit(here: Path) ->
 def test_libraries_that_read_are_imported_where_a_stop_does_no_harm() -> None:
     # trimesh reads three formats, which are imported within `defer_interrupt`; all others need no library.
     assert {
-        kind: mesh_reader.reader(kind) for kind in mesh_reader.MESHES if mesh_reader.reader(kind)
+        kind: mesh_reader.find_library(kind) for kind in mesh_reader.MESHES if mesh_reader.find_library(kind)
     } == dict.fromkeys((".stl", ".ply", ".off"), "trimesh")

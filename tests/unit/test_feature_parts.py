@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.features import Feature, Finding, find
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skin_grid import fit_skin
@@ -144,7 +144,7 @@ def formed(name: str, arrangement: str, pitch: float) -> Formed:
     """A bed of 84 mm x 84 mm."""
     spacing = pitch * (np.sqrt(0.75) if arrangement == "hexagonal" else 1.0)
     layout = Layout(int(84 / spacing) + 1, int(84 / pitch) + 1, pitch * 1e-3, arrangement)
-    place = grid(layout).positions
+    place = make_grid(layout).positions
     return Formed.of(place, 0.04 + 1e-3 * SHAPES[name][0](*(place.T * 1e3)), 0.04, 0.0, 0)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.feature_solids import make_feature_solid
 from digiclay.core.surface.features import Feature, Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
@@ -20,7 +20,7 @@ def formed(
     raised, arrangement: str = "aligned", rows: int = 41, columns: int = 41, pitch: float = 1e-3
 ) -> Formed:
     """A bed formed from level to a function of x and y, mm in and mm out."""
-    place = grid(Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)).positions
     height = LEVEL + 1e-3 * np.asarray(raised(*(place.T * 1e3)), float)
     return Formed.of(place, height, LEVEL, 0.0, 0)
 
@@ -151,7 +151,7 @@ def test_a_feature_of_too_few_pins_is_none(smallest, count):
 
 
 def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
-    place = grid(Layout(rows=5, columns=5)).positions
+    place = make_grid(Layout(rows=5, columns=5)).positions
     height = np.full(25, 0.0)
     height[[11, 12]] = 0.5, 1.0
     bed = Formed.of(place, height, 0.0, 0.0, 0)
@@ -160,7 +160,7 @@ def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature():
 
 
 def test_neighbors_exactly_at_the_threshold_leave_no_triangle_without_area():
-    place = grid(Layout(rows=5, columns=5)).positions
+    place = make_grid(Layout(rows=5, columns=5)).positions
     height = np.zeros(25)
     height[[6, 7, 8, 9, 11, 14, 16, 17, 18, 19]] = 0.5
     height[[12, 13]] = 2.0
@@ -195,7 +195,7 @@ def test_a_smallest_size_that_makes_no_sense_is_refused(bad):
 
 def rough(seed: int, arrangement: str) -> Formed:
     """Bosses and creases of every shape, pinched, holed and side by side."""
-    place = grid(Layout(rows=14, columns=13, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=14, columns=13, arrangement=arrangement)).positions
     random = np.random.default_rng(seed)
     return Formed.of(place, LEVEL + random.integers(-2, 3, len(place)) * 0.5e-3, LEVEL, 0.0, 0)
 

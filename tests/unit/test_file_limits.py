@@ -15,15 +15,15 @@ from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.base.toml_text import LARGEST
 from digiclay.core.control.named_shapes import read_values
 from digiclay.core.engine.simulation import begin
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load, read_table
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import read_run
-from digiclay.core.session.memory_limit import available_memory
+from digiclay.core.session.memory_limit import measure_available_memory
 from digiclay.core.session.take import Take, from_bytes, to_bytes
-from digiclay.core.shapes.heightmap import height_map
+from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.core.shapes.request import Shape
 from digiclay.core.shapes.source_file import read as read_shape
 
@@ -157,7 +157,7 @@ def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path: Path)
     grown(tmp_path / "history.npz", "height.npy", 10_001 * 4472 * 4472 * 8)
     said = refused(lambda: read_run(tmp_path, "height"))
     assert "of free memory (got 1.6e+03 GB of time, height)" in said
-    assert available_memory() < 1.6e12
+    assert measure_available_memory() < 1.6e12
 
 
 def npy(array: np.ndarray) -> bytes:
@@ -253,19 +253,19 @@ def test_an_array_that_promises_more_than_there_is_is_refused(tmp_path: Path, co
     path = tmp_path / "heights.npy"
     path.write_bytes(content)
     assert "heights.npy" in refused(lambda: read_shape(Shape(file=str(path))))
-    bed = grid(Layout(2, 2, 3e-3))
+    bed = make_grid(Layout(2, 2, 3e-3))
     assert "heights.npy" in refused(lambda: read_values("shape", str(path), bed, 0.0, 1.0, "m"))
 
 
 def test_an_array_of_too_many_heights_is_refused() -> None:
     many = np.broadcast_to(np.float32(0.0), (20_000, 20_000))
     with pytest.raises(ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"):
-        height_map("x.npy", many)
+        make_height_map("x.npy", many)
 
 
 def test_an_array_for_another_bed_is_not_read(tmp_path: Path) -> None:
     np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
-    bed = grid(Layout(2, 2, 3e-3))
+    bed = make_grid(Layout(2, 2, 3e-3))
     path = str(tmp_path / "large.npy")
     assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))
 

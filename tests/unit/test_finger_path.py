@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.finger_path import ridge_errors, sum_cells, surface_under
+from digiclay.core.metrics.finger_path import measure_ridge_errors, measure_surface_under, sum_cells
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ ALL = np.ones(201, dtype=bool)
 
 def errors(final: Floats, rows: NDArray[np.bool_] = ALL, tip: Floats = TIP, away: float = 11e-3) -> Floats:
     """The ridge errors in mm."""
-    return ridge_errors(PLACE, final, tip, rows, away) * 1e3
+    return measure_ridge_errors(PLACE, final, tip, rows, away) * 1e3
 
 
 def test_a_ridge_at_the_path_has_no_error() -> None:
@@ -47,14 +47,14 @@ def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
 
 def test_a_press_without_travel_leaves_no_ridge() -> None:
     still = np.tile(TIP[100], (50, 1))
-    assert ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
+    assert measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
 
 
 def test_going_on_after_the_finger_was_lost_does_not_count() -> None:
     # Shaping stops in the middle, and goes on 12 mm later.
     rows = ALL.copy()
     rows[100:140] = False
-    counted = ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
+    counted = measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
     # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
     assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
 
@@ -103,9 +103,9 @@ def test_the_sums_have_the_first_and_the_last_heights() -> None:
 
 def test_the_surface_under_the_finger_counts_cells_by_their_force() -> None:
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
-    assert surface_under(SUMS, TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
+    assert measure_surface_under(SUMS, TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
 
 
 def test_rows_without_contact_have_no_surface_under_the_finger() -> None:
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
-    assert surface_under(sum_cells(nothing), TIP[:2]).size == 0
+    assert measure_surface_under(sum_cells(nothing), TIP[:2]).size == 0

@@ -9,27 +9,27 @@ import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, grid
-from digiclay.core.shapes.fitting import Fitted, fitted, given
-from digiclay.core.shapes.height_text import packed, unpacked
-from digiclay.core.shapes.heightmap import height_map
-from digiclay.core.shapes.mesh_relief import shape_mesh
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.shapes.fitting import Fitted, fit_given, fit_relief
+from digiclay.core.shapes.height_text import pack, unpack
+from digiclay.core.shapes.heightmap import make_height_map
+from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Shape
 
 REST, STROKE = Actuator().rest_height, Actuator().stroke
-BED = grid(Layout(13, 25, 3e-3))
+BED = make_grid(Layout(13, 25, 3e-3))
 #: Heights of up to 0.1 m in 64 bits, after a few sums.
 ROUNDING = 1e-12
 
 
 def mesh(solid: trimesh.Trimesh) -> Any:
     """Return a mesh of trimesh's, in mm."""
-    return shape_mesh("solid.stl", solid.vertices, solid.faces, "z", 1e-3)
+    return make_shape_mesh("solid.stl", solid.vertices, solid.faces, "z", 1e-3)
 
 
 def laid(what: Any, bed: Any = BED, **known: Any) -> Fitted:
     """Return a shape laid onto a bed."""
-    return fitted(Shape(**known), what, bed, Actuator())
+    return fit_relief(Shape(**known), what, bed, Actuator())
 
 
 def box(wide: float, deep: float, high: float) -> Any:
@@ -58,7 +58,7 @@ def test_covering_a_shape_fills_the_bed() -> None:
 
 def test_stretched_a_shape_fills_the_bed_to_its_corners_and_no_more() -> None:
     values = np.random.default_rng(3).uniform(0.0, 1.0, (13, 25))
-    cells = laid(height_map("x.png", values), fit="stretch")
+    cells = laid(make_height_map("x.png", values), fit="stretch")
     shown = (cells.heights - REST) / 15e-3
     assert np.abs(shown * np.ptp(values) + values.min() - values.ravel()).max() < 1e-10
 
@@ -99,7 +99,7 @@ def test_a_true_relief_is_as_high_as_the_plan_makes_it() -> None:
 
 def test_a_map_of_heights_is_true_in_meters_whatever_its_plan() -> None:
     values = np.linspace(0.0, 7e-3, 12).reshape(3, 4)
-    cells = laid(height_map("x.npy", values, 1.0), relief="true", fit="stretch")
+    cells = laid(make_height_map("x.npy", values, 1.0), relief="true", fit="stretch")
     assert np.ptp(cells.heights) == pytest.approx(7e-3, abs=ROUNDING)
 
 
@@ -114,7 +114,7 @@ def test_placed_a_shape_stands_where_its_coordinates_say() -> None:
 
 def test_what_leaves_the_stroke_is_clipped_and_counted() -> None:
     row = np.linspace(0.0, 1.0, 25)
-    cells = laid(height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3)
+    cells = laid(make_height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3)
     wanted = REST - 50e-3 + 120e-3 * row
     assert cells.too_low == 13 * np.count_nonzero(wanted < -1e-9) > 0
     assert cells.too_high == 13 * np.count_nonzero(wanted > STROKE + 1e-9) > 0
@@ -139,17 +139,19 @@ def test_overhangs_are_told() -> None:
 
 
 def test_a_level_picture_makes_a_level_bed() -> None:
-    assert np.all(laid(height_map("gray.png", np.full((4, 4), 99))).heights == REST)
+    assert np.all(laid(make_height_map("gray.png", np.full((4, 4), 99))).heights == REST)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
 def test_every_arrangement_is_covered_by_a_stretched_picture(arrangement: str) -> None:
-    bed = grid(Layout(7, 9, 3e-3, arrangement))
-    assert laid(height_map("x.png", np.eye(4)), bed, fit="stretch").covered == bed.count
+    bed = make_grid(Layout(7, 9, 3e-3, arrangement))
+    assert laid(make_height_map("x.png", np.eye(4)), bed, fit="stretch").covered == bed.count
 
 
-PICTURE, ARRAY = height_map("x.png", np.eye(3)), height_map("x.npy", np.eye(3), 1.0)
-LINE = shape_mesh("l.stl", np.array([[0.0, 0, 0], [9, 0, 0], [4, 0, 5]]), np.array([[0, 1, 2]]), "z", 1e-3)
+PICTURE, ARRAY = make_height_map("x.png", np.eye(3)), make_height_map("x.npy", np.eye(3), 1.0)
+LINE = make_shape_mesh(
+    "l.stl", np.array([[0.0, 0, 0], [9, 0, 0], [4, 0, 5]]), np.array([[0, 1, 2]]), "z", 1e-3
+)
 BESIDE = (
     "shape.x, y must leave the shape over the bed (got solid.stl: no pin lies under it). Set shape.fit to"
 )
@@ -183,12 +185,12 @@ def test_nothing_is_no_shape() -> None:
 def test_heights_come_out_of_a_text_as_they_went_in() -> None:
     heights = np.random.default_rng(4).uniform(0.0, STROKE, BED.count)
     # 32 bits: half of 2^-24 of 0.1 m at most.
-    assert np.abs(unpacked(packed(heights), BED) - heights).max() <= 4e-9
+    assert np.abs(unpack(pack(heights), BED) - heights).max() <= 4e-9
 
 
 def test_heights_in_a_scene_are_displayed_as_they_are() -> None:
     heights = np.linspace(-1e-3, 0.11, BED.count)
-    cells = given(Shape(file="Suzanne", heights=packed(heights)), BED, Actuator())
+    cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
     assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
     assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
     assert cells.told().startswith("Suzanne: heights from 0.0 to 100.0 mm")
@@ -199,13 +201,13 @@ def test_heights_in_a_scene_are_displayed_as_they_are() -> None:
     [
         ("rubbish!", "must be heights packed as text (got 'rubbish!')"),
         ("AAAA", "must be heights packed as text (got 'AAAA')"),
-        (packed(np.arange(325.0))[:40], "must be heights packed as text"),
-        (packed(np.ones(7)), "must hold the heights of the bed's 13 x 25 cells (got 7 heights)"),
-        (packed(np.ones(10**6)), "of the bed's 13 x 25 cells (got more than 325 heights)"),
-        (packed(np.where(np.arange(325) == 9, np.nan, 1.0)), "must be finite numbers (got nan at cell 9)"),
+        (pack(np.arange(325.0))[:40], "must be heights packed as text"),
+        (pack(np.ones(7)), "must hold the heights of the bed's 13 x 25 cells (got 7 heights)"),
+        (pack(np.ones(10**6)), "of the bed's 13 x 25 cells (got more than 325 heights)"),
+        (pack(np.where(np.arange(325) == 9, np.nan, 1.0)), "must be finite numbers (got nan at cell 9)"),
     ],
 )
 def test_a_text_that_holds_other_heights_is_refused(text: str, said: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        unpacked(text, BED)
+        unpack(text, BED)
     assert said in str(caught.value)

@@ -12,18 +12,24 @@ from digiclay.cli import main
 from digiclay.commands.exit_codes import WRONG
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fingertip import Fingertip
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.forming import display_of, display_time, shaped, summit, touch_height
+from digiclay.core.scene.forming import (
+    compute_display_time,
+    find_display,
+    find_summit,
+    find_touch_height,
+    make_forming_scene,
+)
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import fitted_to, sample_shapes
+from digiclay.core.shapes.source_file import fit_shape, list_shapes
 from PIL import Image
 
 SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]
-BED = grid(Layout(13, 13))
+BED = make_grid(Layout(13, 13))
 
 
 def form(folder: Path, word: str, *options: str) -> Path:
@@ -63,7 +69,7 @@ def test_a_mesh_goes_in_is_formed_and_comes_out(tmp_path: Path, capsys: pytest.C
 def test_what_comes_out_goes_in_again_as_it_was(tmp_path: Path) -> None:
     first = form(tmp_path, "face", "--finger", "away")
     height = read(first)["height"][-1]
-    again = fitted_to(Shape(file=str(first / "surface.stl"), fit="placed"), BED, Actuator())
+    again = fit_shape(Shape(file=str(first / "surface.stl"), fit="placed"), BED, Actuator())
     assert again.covered == 169
     # 32-bit numbers of 50 mm in the file.
     assert np.abs(again.heights - height).max() < 1e-8
@@ -71,7 +77,7 @@ def test_what_comes_out_goes_in_again_as_it_was(tmp_path: Path) -> None:
 
 def test_without_a_touch_the_shape_comes_out_as_it_went_in(tmp_path: Path) -> None:
     out = form(tmp_path, "saddle", "--finger", "away")
-    wanted = fitted_to(Shape(file="saddle", rise=12e-3), BED, Actuator()).heights
+    wanted = fit_shape(Shape(file="saddle", rise=12e-3), BED, Actuator()).heights
     # The dead band of the pins' height control.
     assert np.abs(read(out)["height"][-1] - wanted).max() <= 10e-6 + 4e-9
 
@@ -86,7 +92,7 @@ def test_the_folder_alone_repeats_the_run(tmp_path: Path) -> None:
     assert np.array_equal(again["height"], read(out)["height"])
 
 
-@pytest.mark.parametrize("name", sample_shapes())
+@pytest.mark.parametrize("name", list_shapes())
 def test_every_sample_shape_can_be_pressed_by_name(
     tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -108,10 +114,10 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh: str, preset: str) -> 
     }
     bare = resolve(table)
     system = assemble(bare)
-    display = display_of(system)
+    display = find_display(system)
     assert display
-    ready = display_time(display)
-    scene = shaped(bare, system, "away")
+    ready = compute_display_time(display)
+    scene = make_forming_scene(bare, system, "away")
     height = run(scene).history["height"]
     stands = np.abs(height - display.heights).max(axis=1) <= 10e-6 + 1e-12
     # Within the time, and not after a small part of it: nobody waits for nothing.
@@ -122,13 +128,13 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh: str, preset: str) -> 
 def test_the_finger_finds_the_highest_part_nearest_to_the_middle() -> None:
     heights = np.full(169, 40e-3)
     heights[[0, 60, 84]] = 50e-3, 49.9e-3, 41e-3
-    assert summit(BED, heights) == (float(BED.x[60]), float(BED.y[60]))
+    assert find_summit(BED, heights) == (float(BED.x[60]), float(BED.y[60]))
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (7.3e-3, -2.1e-3)])
 def test_the_finger_touches_at_the_height_it_is_said_to(x: float, y: float) -> None:
-    heights = fitted_to(Shape(file="crater"), BED, Actuator()).heights
-    touch = touch_height(BED, heights, Fingertip(), x, y)
+    heights = fit_shape(Shape(file="crater"), BED, Actuator()).heights
+    touch = find_touch_height(BED, heights, Fingertip(), x, y)
     finger = Fingertip()
     # The ellipsoid by its own equation, as far out as it reaches.
     square = ((BED.x - x) / finger.length) ** 2 + ((BED.y - y) / finger.width) ** 2

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from digiclay.commands.gallery import Card, page
 from digiclay.commands.thumbnail import height_map
-from digiclay.core.base.png import png
+from digiclay.core.base.png import encode_png
 
 
 class Reader(HTMLParser):
@@ -48,7 +48,7 @@ def read(made: str) -> Reader:
 
 
 def test_the_page_refers_to_nothing_but_files_beside_it() -> None:
-    picture = png(np.zeros((2, 2, 3), np.uint8))
+    picture = encode_png(np.zeros((2, 2, 3), np.uint8))
     done = Card("a", picture, [("lag", "1 mm")], [("film", "runs/a b/film #1.mp4")], leads="f.mp4")
     failed = Card("b", error="it broke", links=[("log", "l")])
     reader = read(page("Batch", "1 of 2 jobs done.", [done, failed]))
@@ -64,7 +64,7 @@ def test_names_and_errors_are_shown_as_they_are_and_never_as_html() -> None:
 
 
 def test_a_thumbnail_within_the_page_is_the_file_it_was() -> None:
-    data = png(np.full((3, 5, 3), 77, np.uint8))
+    data = encode_png(np.full((3, 5, 3), 77, np.uint8))
     source = read(page("", "", [Card("a", data)])).references[0]
     assert base64.b64decode(source.partition(",")[2]) == data
 
@@ -72,7 +72,7 @@ def test_a_thumbnail_within_the_page_is_the_file_it_was() -> None:
 @pytest.mark.parametrize("shape", [(1, 1), (7, 3), (40, 61)])
 def test_a_png_is_read_back_by_another_program_as_it_was(shape: tuple[int, int]) -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (*shape, 3), np.uint8)
-    back = matplotlib.image.imread(BytesIO(png(pixels)), format="png")
+    back = matplotlib.image.imread(BytesIO(encode_png(pixels)), format="png")
     np.testing.assert_array_equal(np.round(back[..., :3] * 255.0).astype(np.uint8), pixels)
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes import heightmap
-from digiclay.core.shapes.heightmap import averaged, height_map
-from digiclay.core.shapes.picture_heights import pixels
+from digiclay.core.shapes.heightmap import average_blocks, make_height_map
+from digiclay.core.shapes.picture_heights import read_pixels
 from digiclay.core.shapes.relief import Placement
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,15 +26,17 @@ def middle(rows: int, columns: int, factor: float) -> Placement:
 
 def test_a_map_with_a_pixel_for_every_pin_gives_every_pin_its_pixel() -> None:
     values = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
-    found = height_map("x", values).tops(grid(Layout(5, 7, PITCH)), middle(5, 7, PITCH))
+    found = make_height_map("x", values).tops(make_grid(Layout(5, 7, PITCH)), middle(5, 7, PITCH))
     assert np.abs(found.value - values.ravel()).max() < 1e-12  # places between 0 and 7, rounded
     assert found.covered.all()
 
 
 def test_a_plane_stays_a_plane_between_the_pixels() -> None:
     row, column = np.mgrid[0:20, 0:30]
-    found = height_map("x", 2.0 * row - column).tops(grid(Layout(9, 13, PITCH)), middle(20, 30, 2.1e-3))
-    bed = grid(Layout(9, 13, PITCH))
+    found = make_height_map("x", 2.0 * row - column).tops(
+        make_grid(Layout(9, 13, PITCH)), middle(20, 30, 2.1e-3)
+    )
+    bed = make_grid(Layout(9, 13, PITCH))
     wanted = 2.0 * (bed.y / 2.1e-3 + 9.5) - (bed.x / 2.1e-3 + 14.5)
     assert np.abs(found.value - wanted).max() < 1e-10  # rounding of numbers up to 60
 
@@ -42,14 +44,14 @@ def test_a_plane_stays_a_plane_between_the_pixels() -> None:
 def test_a_fine_map_is_averaged_over_the_square_of_a_pin() -> None:
     # Eight by eight pixels to a pin, one of them white: every pin sees their mean.
     row, column = np.indices((72, 72)) % 8
-    found = height_map("x", (row == 1) & (column == 6)).tops(
-        grid(Layout(9, 9, PITCH)), middle(72, 72, PITCH / 8)
+    found = make_height_map("x", (row == 1) & (column == 6)).tops(
+        make_grid(Layout(9, 9, PITCH)), middle(72, 72, PITCH / 8)
     )
     assert np.abs(found.value - 1 / 64).max() < 1e-12
 
 
 def test_pins_beside_the_map_are_not_covered() -> None:
-    found = height_map("x", np.ones((3, 3))).tops(grid(Layout(9, 9, PITCH)), middle(3, 3, PITCH))
+    found = make_height_map("x", np.ones((3, 3))).tops(make_grid(Layout(9, 9, PITCH)), middle(3, 3, PITCH))
     assert found.covered.reshape(9, 9)[3:6, 3:6].all()
     assert found.covered.sum() == 9
 
@@ -62,7 +64,7 @@ def test_means_keep_the_sum(rows: int, columns: int, block: int, chunk: int, see
     kept = heightmap.CHUNK
     try:
         heightmap.CHUNK = chunk
-        means = averaged(values, block)
+        means = average_blocks(values, block)
     finally:
         heightmap.CHUNK = kept
     tall = np.diff([*range(0, rows, block), rows])
@@ -87,7 +89,7 @@ def test_means_keep_the_sum(rows: int, columns: int, block: int, chunk: int, see
 )
 def test_what_is_no_map_is_refused(values: np.ndarray, said: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        height_map("odd.npy", values)
+        make_height_map("odd.npy", values)
     assert said in str(caught.value)
 
 
@@ -100,7 +102,7 @@ def test_a_picture_is_read_as_it_was_written(tmp_path: Path, bits: int, kind: ty
     values = np.random.default_rng(bits).integers(0, 2**bits, (11, 7)).astype(kind)
     path = tmp_path / f"grün und weiß.{ending}"
     Image.fromarray(values).save(path)
-    assert np.array_equal(pixels(path), np.flipud(values))
+    assert np.array_equal(read_pixels(path), np.flipud(values))
 
 
 def test_a_colored_picture_is_read_by_its_brightness(tmp_path: Path) -> None:
@@ -108,7 +110,7 @@ def test_a_colored_picture_is_read_by_its_brightness(tmp_path: Path) -> None:
     colors[0] = 255, 255, 255
     colors[1, 1] = 255, 0, 0
     Image.fromarray(colors).save(tmp_path / "colors.png")
-    read = pixels(tmp_path / "colors.png")
+    read = read_pixels(tmp_path / "colors.png")
     assert read.shape == (2, 3)
     # 0.299 of 255: the weight of red in the brightness of the television standard Pillow follows.
     assert read.tolist() == [[0, 76, 0], [255, 255, 255]]
@@ -118,18 +120,18 @@ def test_a_picture_that_is_cut_off_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((99, 99), np.uint8)).save(tmp_path / "whole.png")
     (tmp_path / "half.png").write_bytes((tmp_path / "whole.png").read_bytes()[:60])
     with pytest.raises(ParameterError, match=r"must be a picture that can be read \(got .*half\.png: "):
-        pixels(tmp_path / "half.png")
+        read_pixels(tmp_path / "half.png")
 
 
 def test_an_exr_is_left_to_blender(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="Blender itself reads EXR"):
-        pixels(tmp_path / "x.exr")
+        read_pixels(tmp_path / "x.exr")
 
 
 def test_a_picture_of_a_hundred_megapixels_is_taken(tmp_path: Path) -> None:
     path = tmp_path / "large.png"
     Image.new("L", (10_000, 10_000), 7).save(path, compress_level=1)
-    found = height_map(path.name, pixels(path))
+    found = make_height_map(path.name, read_pixels(path))
     assert found.pixels == (10_000, 10_000)
     assert found.values.size <= heightmap.KEPT
     assert np.all(found.values == 7.0)
@@ -146,4 +148,4 @@ def test_a_picture_of_more_is_refused_before_it_is_read(tmp_path: Path) -> None:
     data[29:33] = zlib.crc32(bytes(data[12:29])).to_bytes(4, "big")
     path.write_bytes(bytes(data))
     with pytest.raises(ParameterError, match="must have at most 128 million pixels"):
-        pixels(path)
+        read_pixels(path)

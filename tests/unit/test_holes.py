@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.holes import SMALL, fill_holes
-from digiclay.core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from digiclay.core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from digiclay.core.shapes.relief import Placement
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import fitted_to
+from digiclay.core.shapes.source_file import fit_shape
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 #: Meshes here are in mm and stand where they are.
@@ -43,12 +43,12 @@ def scan(*holes: tuple[float, float, float], size: float = 60.0) -> trimesh.Trim
 
 def shape(mesh: trimesh.Trimesh) -> ShapeMesh:
     """Return a mesh of trimesh's as a shape."""
-    return shape_mesh("scan.stl", mesh.vertices, mesh.faces, "z", 1e-3)
+    return make_shape_mesh("scan.stl", mesh.vertices, mesh.faces, "z", 1e-3)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_hole_of_a_scan_is_as_high_as_what_is_around_it(arrangement: str) -> None:
-    bed = grid(Layout(25, 25, 3e-3, arrangement))
+    bed = make_grid(Layout(25, 25, 3e-3, arrangement))
     found = shape(scan((5.0, -8.0, 5.0), (-20.0, 14.0, 2.5))).tops(bed, IN_PLACE)
     assert found.covered.all()
     assert not found.overhang.any()
@@ -62,7 +62,7 @@ def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_throug
     top = scan((3.0, 4.0, 5.0), size=40.0)
     plate = trimesh.creation.box((80.0, 80.0, 2.0))
     lower = plate.submesh([np.flatnonzero(plate.face_normals[:, 2] < 0.5)], append=True)
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(trimesh.util.concatenate([top, lower])).tops(bed, IN_PLACE)
     assert found.filled > 5
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
@@ -70,7 +70,7 @@ def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_throug
 
 def test_a_large_opening_stays() -> None:
     # 18 mm across: more than a twentieth of the pins.
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(scan((0.0, 0.0, 12.0))).tops(bed, IN_PLACE)
     inside = np.hypot(bed.x, bed.y) < 11e-3
     assert not found.covered[inside].any()
@@ -79,28 +79,28 @@ def test_a_large_opening_stays() -> None:
 
 def test_the_opening_of_a_closed_mesh_stays() -> None:
     ring = trimesh.creation.annulus(3.0, 30.0, 10.0)
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(ring).tops(bed, IN_PLACE)
     assert not found.covered[np.hypot(bed.x, bed.y) < 2.5e-3].any()
     assert found.filled == 0
 
 
 def test_what_lies_beside_a_scan_is_no_hole() -> None:
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(scan((-20.0, 0.0, 4.0), size=21.0)).tops(bed, IN_PLACE)
     assert found.filled == 0
     assert found.covered.sum() < 15 * 15
 
 
 def test_a_bay_that_reaches_the_rim_of_the_bed_is_no_hole() -> None:
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     assert shape(scan((-36.0, 0.0, 4.0))).tops(bed, IN_PLACE).filled == 0
 
 
 def test_a_sheet_turned_inside_out_is_displayed_as_it_is() -> None:
     turned = scan()
     turned.invert()
-    bed = grid(Layout(25, 25, 3e-3))
+    bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(turned).tops(bed, IN_PLACE)
     assert found.filled == 0
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.02
@@ -110,12 +110,12 @@ def test_a_sheet_whose_faces_are_turned_at_random_has_no_holes() -> None:
     mixed = scan()
     turned = np.random.default_rng(2).random(len(mixed.faces)) < 0.85
     mixed.faces[turned] = mixed.faces[turned][:, ::-1]
-    assert shape(mixed).tops(grid(Layout(25, 25, 3e-3)), IN_PLACE).filled == 0
+    assert shape(mixed).tops(make_grid(Layout(25, 25, 3e-3)), IN_PLACE).filled == 0
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_slope_goes_on_through_a_hole(arrangement: str) -> None:
-    bed = grid(Layout(21, 21, 3e-3, arrangement))
+    bed = make_grid(Layout(21, 21, 3e-3, arrangement))
     slope = 7.0 + 300.0 * bed.x - 200.0 * bed.y
     missing = np.hypot(bed.x - 3e-3, bed.y) < 7e-3
     value, hole = fill_holes(bed, np.where(missing, -99.0, slope), missing)
@@ -125,7 +125,7 @@ def test_a_slope_goes_on_through_a_hole(arrangement: str) -> None:
 
 
 def test_a_hole_is_small_up_to_a_twentieth_of_the_covered_pins() -> None:
-    bed = grid(Layout(21, 21, 3e-3))
+    bed = make_grid(Layout(21, 21, 3e-3))
     for count in (20, 21, 22):
         missing = np.zeros(bed.count, np.bool_)
         missing[21 * 5 + 2 : 21 * 5 + 13] = missing[21 * 6 + 2 : 21 * 6 + 2 + count - 11] = True
@@ -134,7 +134,7 @@ def test_a_hole_is_small_up_to_a_twentieth_of_the_covered_pins() -> None:
 
 
 def test_a_bed_without_holes_and_one_that_is_missed_are_left_alone() -> None:
-    bed = grid(Layout(5, 5, 3e-3))
+    bed = make_grid(Layout(5, 5, 3e-3))
     value = np.arange(25.0)
     for missing in (np.zeros(25, np.bool_), np.ones(25, np.bool_)):
         kept, hole = fill_holes(bed, value, missing)
@@ -145,9 +145,9 @@ def test_a_bed_without_holes_and_one_that_is_missed_are_left_alone() -> None:
 def test_a_scan_with_holes_has_no_pits_and_says_so(tmp_path: Path) -> None:
     scan((5.0, -8.0, 5.0), size=36.0).export(tmp_path / "scan.stl")
     scan(size=36.0).export(tmp_path / "whole.stl")
-    bed = grid(Layout())
+    bed = make_grid(Layout())
     laid, whole = (
-        fitted_to(Shape(file=str(tmp_path / name), relief="true"), bed, Actuator())
+        fit_shape(Shape(file=str(tmp_path / name), relief="true"), bed, Actuator())
         for name in ("scan.stl", "whole.stl")
     )
     assert np.abs(laid.heights - whole.heights).max() < 0.1e-3

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError, SceneError
-from digiclay.core.model.layout import grid
+from digiclay.core.model.layout import make_grid
 from digiclay.core.scene.scene_source import SAMPLES, load
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.render_settings import Film, Still, Turntable
-from digiclay.core.shapes.source_file import fitted_to
+from digiclay.core.shapes.source_file import fit_shape
 from digiclay.core.studies.job_outputs import Outputs, make_outputs
 from digiclay.core.studies.job_table import read_jobs, read_outputs
 
@@ -139,11 +139,13 @@ def test_a_job_needs_no_other_file_for_its_shape(tmp_path: Path) -> None:
     assert job.scene.shape is not None
     (tmp_path / "far").mkdir()
     (tmp_path / "far" / "scene.toml").write_text(format_scene(job.scene), encoding="utf-8")
-    wanted = fitted_to(job.scene.shape, grid(job.scene.layout), job.scene.actuator).heights
+    wanted = fit_shape(job.scene.shape, make_grid(job.scene.layout), job.scene.actuator).heights
     (tmp_path / "own.npy").unlink()
     alone = load(tmp_path / "far" / "scene.toml")
     assert alone.shape is not None
-    np.testing.assert_array_equal(fitted_to(alone.shape, grid(alone.layout), alone.actuator).heights, wanted)
+    np.testing.assert_array_equal(
+        fit_shape(alone.shape, make_grid(alone.layout), alone.actuator).heights, wanted
+    )
     assert np.ptp(wanted) > 1e-3
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.model.delay import Delay, Queue, queue
+from digiclay.core.model.delay import Delay, Queue, split_delay
 from digiclay.core.model.lag import SHUT, ValveLag
 from digiclay.core.model.null_parts import InstantValve
 
@@ -27,7 +27,7 @@ def test_the_opening_is_the_analytic_exponential_at_any_time(time: float) -> Non
 
 @pytest.mark.parametrize("time", [0.2e-3, 1.3e-3, 1.4e-3, 5e-3])
 def test_the_opening_goes_over_to_the_next_command_at_the_cut(time: float) -> None:
-    waiting = queue(Delay(1.3e-3), 5e-3)
+    waiting = split_delay(Delay(1.3e-3), 5e-3)
     opening = ValveLag().response(waiting, [time]) @ np.array([START, COMMAND, NEXT])
     expected = after(START, COMMAND, min(time, 1.3e-3))
     if time > 1.3e-3:
@@ -36,13 +36,13 @@ def test_the_opening_goes_over_to_the_next_command_at_the_cut(time: float) -> No
 
 
 def test_commands_that_are_not_due_yet_do_not_matter() -> None:
-    response = ValveLag().response(queue(Delay(11.3e-3), 5e-3), [0.0, 2e-3, 5e-3])
+    response = ValveLag().response(split_delay(Delay(11.3e-3), 5e-3), [0.0, 2e-3, 5e-3])
     assert not response[:, 3:].any()
 
 
 def test_a_valve_at_its_command_stays_there() -> None:
     # What is in one opening or command out of three comes out again: each row adds up to 1.
-    response = ValveLag().response(queue(Delay(1e-3), 5e-3), [0.0, 0.5e-3, 1e-3, 3e-3])
+    response = ValveLag().response(split_delay(Delay(1e-3), 5e-3), [0.0, 0.5e-3, 1e-3, 3e-3])
     assert response.sum(axis=1) == pytest.approx(1.0, abs=1e-15)
 
 
@@ -69,6 +69,6 @@ def test_without_lag_the_opening_is_the_command() -> None:
 
 
 def test_without_lag_the_opening_jumps_at_the_cut() -> None:
-    waiting = queue(Delay(1.3e-3), 5e-3)
+    waiting = split_delay(Delay(1.3e-3), 5e-3)
     openings = InstantValve().response(waiting, [1.29e-3, 1.31e-3]) @ np.array([COMMAND, NEXT])
     assert np.array_equal(openings, [COMMAND, NEXT])

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 
 ARRANGEMENTS = ["aligned", "staggered", "hexagonal"]
 
 
 def table(arrangement: str, rows: int = 5, columns: int = 4) -> np.ndarray:
     """Return positions as (rows, columns, 2)."""
-    return grid(Layout(rows, columns, 3e-3, arrangement)).positions.reshape(rows, columns, 2)
+    return make_grid(Layout(rows, columns, 3e-3, arrangement)).positions.reshape(rows, columns, 2)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -46,7 +46,7 @@ def test_odd_rows_are_shifted(arrangement: str, shift: float) -> None:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (5, 4), (6, 7)])
 def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, int]) -> None:
-    positions = grid(Layout(*shape, 3e-3, arrangement)).positions
+    positions = make_grid(Layout(*shape, 3e-3, arrangement)).positions
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
 
 
@@ -57,20 +57,20 @@ def test_inner_cells_of_a_hexagonal_bed_have_six_neighbors_a_pitch_away() -> Non
 
 
 def test_the_default_bed_is_72_mm_wide() -> None:
-    bed = grid(Layout())
+    bed = make_grid(Layout())
     assert (bed.count, bed.x.max(), bed.y.max()) == (625, pytest.approx(36e-3), pytest.approx(36e-3))
 
 
 def test_a_disc_counts_cells_exactly_on_its_rim() -> None:
-    assert grid(Layout(5, 5)).disc(0.0, 0.0, 3e-3).tolist() == [7, 11, 12, 13, 17]
+    assert make_grid(Layout(5, 5)).disc(0.0, 0.0, 3e-3).tolist() == [7, 11, 12, 13, 17]
 
 
 def test_a_disc_beside_the_bed_is_empty() -> None:
-    assert grid(Layout(5, 5)).disc(1.0, 0.0, 0.1).size == 0
+    assert make_grid(Layout(5, 5)).disc(1.0, 0.0, 0.1).size == 0
 
 
 def test_a_disc_partly_beside_the_bed_has_the_cells_there_are() -> None:
-    assert grid(Layout(5, 5)).disc(-6e-3, -6e-3, 3e-3).tolist() == [0, 1, 5]
+    assert make_grid(Layout(5, 5)).disc(-6e-3, -6e-3, 3e-3).tolist() == [0, 1, 5]
 
 
 def test_zero_rows_are_refused() -> None:

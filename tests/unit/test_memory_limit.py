@@ -10,7 +10,7 @@ from digiclay.core.engine.state import Rows
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.memory_limit import bytes_needed, count_busy_cells
+from digiclay.core.session.memory_limit import count_busy_cells, count_bytes_needed
 from digiclay.core.session.run_scene import run
 
 #: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.
@@ -26,7 +26,9 @@ def measured_and_estimated(**changes: Any) -> tuple[float, float]:
         scene = resolve({**bed, "simulation": {"duration": 0.05}, **changes})
         system = assemble(scene)
         told.append(
-            bytes_needed(scene.recorder, system.rows, scene.cells, scene.periods, count_busy_cells(scene))
+            count_bytes_needed(
+                scene.recorder, system.rows, scene.cells, scene.periods, count_busy_cells(scene)
+            )
         )
         tracemalloc.start()
         try:
@@ -49,7 +51,7 @@ def test_a_row_of_a_cell_takes_as_many_bytes_as_is_said() -> None:
     assert history is not None
     rows, cells = history["height"].shape
     kept = sum(array.nbytes for array in history.values() if array.shape == (rows, cells)) / (rows * cells)
-    told = [bytes_needed(Recorder(), Rows(2, 2), 1000, periods) for periods in (500, 501)]
+    told = [count_bytes_needed(Recorder(), Rows(2, 2), 1000, periods) for periods in (500, 501)]
     # One byte more stands for what the metrics need, which is a truth value.
     assert (told[1] - told[0]) / 1000 == kept + 1
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
-from digiclay.core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from digiclay.core.shapes.relief import Placement, Tops
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,12 +24,12 @@ ROUNDING = 1e-12
 
 def shape(mesh: trimesh.Trimesh, up: str = "z") -> ShapeMesh:
     """Return a mesh of trimesh's as a shape."""
-    return shape_mesh("test.stl", mesh.vertices, mesh.faces, up, 1e-3)
+    return make_shape_mesh("test.stl", mesh.vertices, mesh.faces, up, 1e-3)
 
 
 def tops(mesh: trimesh.Trimesh, arrangement: str = "aligned", side: int = 21) -> Tops:
     """Return a mesh's tops on a bed 2 mm apart."""
-    return shape(mesh).tops(grid(Layout(side, side, 2e-3, arrangement)), IN_PLACE)
+    return shape(mesh).tops(make_grid(Layout(side, side, 2e-3, arrangement)), IN_PLACE)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
@@ -39,8 +39,8 @@ def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement: str, seed:
     chance = np.random.default_rng(seed)
     plan, z = chance.uniform(-25.0, 25.0, (60, 2)), chance.uniform(-5.0, 5.0, 60)
     cut = Delaunay(plan)
-    bed = grid(Layout(21, 17, 2e-3, arrangement))
-    found = shape_mesh("x", np.column_stack([plan, z]), cut.simplices, "z", 1e-3).tops(bed, IN_PLACE)
+    bed = make_grid(Layout(21, 17, 2e-3, arrangement))
+    found = make_shape_mesh("x", np.column_stack([plan, z]), cut.simplices, "z", 1e-3).tops(bed, IN_PLACE)
     wanted = LinearNDInterpolator(cut, z)(bed.x * 1e3, bed.y * 1e3)
     # The rim belongs to either: rounding decides.
     inside = np.isfinite(wanted) & found.covered
@@ -52,7 +52,7 @@ def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement: str, seed:
 
 def test_the_top_of_a_sphere_is_its_upper_half() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=15.0)
-    found, bed = tops(ball), grid(Layout(21, 21, 2e-3))
+    found, bed = tops(ball), make_grid(Layout(21, 21, 2e-3))
     square = 225.0 - (bed.x**2 + bed.y**2) * 1e6
     well_inside = square > 60.0
     # Chords of 10 000 triangles: a sagitta of 15 mm (1 - cos 1°).
@@ -83,9 +83,9 @@ def test_a_table_overhangs_where_there_is_room_below_its_top() -> None:
 def test_an_open_surface_above_another_overhangs() -> None:
     sheet = np.array([[-9.0, -9.0], [9.0, -9.0], [0.0, 9.0]])
     lower, upper = (np.column_stack([sheet, np.full(3, z)]) for z in (0.0, 4.0))
-    single = shape_mesh("x", lower, np.array([[0, 1, 2]]), "z", 1e-3)
-    double = shape_mesh("x", np.concatenate([lower, upper]), np.array([[0, 1, 2], [3, 4, 5]]), "z", 1e-3)
-    bed = grid(Layout(9, 9, 2e-3))
+    single = make_shape_mesh("x", lower, np.array([[0, 1, 2]]), "z", 1e-3)
+    double = make_shape_mesh("x", np.concatenate([lower, upper]), np.array([[0, 1, 2], [3, 4, 5]]), "z", 1e-3)
+    bed = make_grid(Layout(9, 9, 2e-3))
     assert not single.tops(bed, IN_PLACE).overhang.any()
     found = double.tops(bed, IN_PLACE)
     assert np.array_equal(found.overhang, found.covered)
@@ -97,7 +97,7 @@ def test_every_direction_of_a_mesh_can_be_up(up: str) -> None:
     # A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
     vertices = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    turned = shape_mesh("x", vertices, faces, up, 1e-3).vertices
+    turned = make_shape_mesh("x", vertices, faces, up, 1e-3).vertices
     axis, sign = "xyz".index(up[-1]), -1 if up[0] == "-" else 1
     assert np.array_equal(turned[:, 2], sign * vertices[:, axis])
     assert trimesh.Trimesh(turned, faces, process=False).volume == pytest.approx(5 * 7 * 11 / 6)
@@ -124,8 +124,8 @@ def test_three_faces_at_an_edge_are_displayed_all_the_same() -> None:
     # Non-manifold: a roof with a keel hanging from its ridge.
     vertices = [[-9.0, -9, 0], [-9, 9, 0], [9, -9, 0], [9, 9, 0], [0, -9, 5], [0, 9, 5], [0.5, 0, -5]]
     faces = [[0, 4, 5], [0, 5, 1], [2, 5, 4], [2, 3, 5], [4, 5, 6]]
-    found = shape_mesh("x", np.array(vertices), np.array(faces), "z", 1e-3).tops(
-        grid(Layout(5, 5, 2e-3)), IN_PLACE
+    found = make_shape_mesh("x", np.array(vertices), np.array(faces), "z", 1e-3).tops(
+        make_grid(Layout(5, 5, 2e-3)), IN_PLACE
     )
     assert found.covered.all()
     assert found.value.max() == 5.0
@@ -151,12 +151,12 @@ def test_three_faces_at_an_edge_are_displayed_all_the_same() -> None:
 )
 def test_what_is_no_surface_is_refused(vertices: Any, faces: Any, said: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        shape_mesh("odd.stl", np.array(vertices, float), np.array(faces), "z", 1e-3)
+        make_shape_mesh("odd.stl", np.array(vertices, float), np.array(faces), "z", 1e-3)
     assert said in str(caught.value)
 
 
 def test_a_face_on_edge_covers_nothing() -> None:
-    upright = shape_mesh(
+    upright = make_shape_mesh(
         "x", np.array([[-9.0, 0, 0], [9, 0, 0], [0, 0, 9]]), np.array([[0, 1, 2]]), "z", 1e-3
     )
-    assert not upright.tops(grid(Layout(9, 9, 2e-3)), IN_PLACE).covered.any()
+    assert not upright.tops(make_grid(Layout(9, 9, 2e-3)), IN_PLACE).covered.any()

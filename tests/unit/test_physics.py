@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fluid import Fluid
 from digiclay.core.model.layout import Layout
-from digiclay.core.model.physics import Speeds, speeds
+from digiclay.core.model.physics import Speeds, find_speeds
 from digiclay.core.model.supply import Supply
 
 from tests.assemble import AWAY, make_system, one_cell, path, record, scripted
@@ -25,19 +25,19 @@ def test_a_free_pin_under_a_wide_open_valve_goes_at_exactly_the_speed_that_is_sa
 ) -> None:
     system = one_cell(dead_time=0.0, valve_lag=None, control=scripted(lambda t, x, y: opening), **parts)
     height = record(system, AWAY, 3).height[:, 0]
-    said = speeds(system.cell)
+    said = find_speeds(system.cell)
     speed = (height[3] - height[2]) / system.period
     assert speed == pytest.approx(said.rise if opening > 0.0 else said.fall, rel=1e-9)
     assert system.fastest == said.rise > 0.0 > said.fall
 
 
 def test_reservoirs_above_the_air_let_no_pin_fall() -> None:
-    assert speeds(one_cell(supply=Supply(0.8e5, 0.2e5)).cell).fall == 0.0
+    assert find_speeds(one_cell(supply=Supply(0.8e5, 0.2e5)).cell).fall == 0.0
 
 
 def test_reservoirs_below_the_air_let_no_pin_rise() -> None:
     system = one_cell(supply=Supply(-0.2e5, -0.8e5))
-    assert system.fastest == speeds(system.cell).rise == 0.0
+    assert system.fastest == find_speeds(system.cell).rise == 0.0
 
 
 def test_a_finger_is_not_missed_by_pins_that_rise_towards_it_as_fast_as_they_can() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.base.picture_size import told_size
-from digiclay.core.shapes.picture_heights import pixels
+from digiclay.core.base.picture_size import read_size
+from digiclay.core.shapes.picture_heights import read_pixels
 from PIL import Image
 
 
@@ -27,18 +27,18 @@ def hdr(width: int, height: int) -> bytes:
 @pytest.mark.parametrize("mode", ["L", "RGB"])
 def test_the_size_is_the_one_pillow_finds(tmp_path: Path, name: str, mode: str) -> None:
     Image.new(mode, (37, 21)).save(tmp_path / name)
-    assert told_size(tmp_path / name) == (37, 21)
+    assert read_size(tmp_path / name) == (37, 21)
 
 
 def test_a_jpeg_with_other_segments_before_its_size_is_measured(tmp_path: Path) -> None:
     Image.new("RGB", (37, 21)).save(tmp_path / "a.jpg", exif=b"Exif\0\0" + bytes(60_000), progressive=True)
-    assert told_size(tmp_path / "a.jpg") == (37, 21)
+    assert read_size(tmp_path / "a.jpg") == (37, 21)
 
 
 @pytest.mark.parametrize(("name", "head"), [("a.exr", exr(37, 21)), ("a.hdr", hdr(37, 21))])
 def test_pictures_only_blender_reads_are_measured(tmp_path: Path, name: str, head: bytes) -> None:
     (tmp_path / name).write_bytes(head)
-    assert told_size(tmp_path / name) == (37, 21)
+    assert read_size(tmp_path / name) == (37, 21)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_pictures_only_blender_reads_are_measured(tmp_path: Path, name: str, hea
 )  # fmt: skip
 def test_a_head_that_does_not_tell_is_no_error(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.png").write_bytes(content)
-    assert told_size(tmp_path / "a.png") is None
+    assert read_size(tmp_path / "a.png") is None
 
 
 @pytest.mark.parametrize(
@@ -57,11 +57,11 @@ def test_a_head_that_does_not_tell_is_no_error(tmp_path: Path, content: bytes) -
 def test_a_picture_of_huge_dimensions_is_refused_by_its_head(tmp_path: Path, name: str, head: bytes) -> None:
     (tmp_path / name).write_bytes(head)
     with pytest.raises(ParameterError, match="must have at most 128 million pixels"):
-        pixels(tmp_path / name)
+        read_pixels(tmp_path / name)
 
 
 def test_a_file_of_another_kind_is_not_opened_by_its_ending(tmp_path: Path) -> None:
     # Pillow hands PostScript over to another program.
     (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n%%EndComments\n")
     with pytest.raises(ParameterError, match="not a picture, or cut off"):
-        pixels(tmp_path / "a.png")
+        read_pixels(tmp_path / "a.png")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
 from hypothesis import given
@@ -16,7 +16,7 @@ ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
 def formed(heights_mm, rows: int, columns: int, arrangement: str = "aligned") -> Formed:
-    place = grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     return Formed.of(place, np.asarray(heights_mm, float) * 1e-3, 0.04, 0.0, 0)
 
 
@@ -32,7 +32,7 @@ def beds(draw):
     levels = draw(st.sampled_from([1, 2, 3, 5, 1000]))
     height = 0.03 + 1e-3 * random.integers(0, levels, layout.rows * layout.columns)
     turned = draw(st.sampled_from([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]))
-    return Formed.of(grid(layout).positions * turned, height, 0.04, 0.0, 0)
+    return Formed.of(make_grid(layout).positions * turned, height, 0.04, 0.0, 0)
 
 
 @given(beds())

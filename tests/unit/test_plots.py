@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.set_point import SetPoint
 from digiclay.plots import run as plots
 from digiclay.plots.relief import hidden
@@ -22,7 +22,7 @@ from tests.timeouts import TIMEOUT
 def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
     """A finger that touches down at 1 s, draws a ridge along x and lifts at 9 s."""
     time = np.linspace(0.0, 10.0, 201)
-    place = grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     reach = place[:, 0].max()
     fingertip = np.zeros((201, 7))
     fingertip[:, 0], fingertip[:, 2], fingertip[:, 3] = np.interp(time, [1, 9], [-reach, reach]), 0.05, 1.0

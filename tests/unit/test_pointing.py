@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.model.fingertip import LEVEL, Fingertip, forms, matrices, underside
-from digiclay.core.model.layout import Grid, Layout, grid
+from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside, make_matrices
+from digiclay.core.model.layout import Grid, Layout, make_grid
 from digiclay.core.surface.pointing import (
     find_contact_outline,
     find_ground_height,
@@ -21,7 +21,7 @@ ARRANGEMENTS = ["aligned", "staggered", "hexagonal"]
 
 def bed(arrangement: str = "aligned") -> tuple[Grid, np.ndarray]:
     """Return a bed of 12 x 15 cells whose heights all differ."""
-    cells = grid(Layout(rows=12, columns=15, arrangement=arrangement))
+    cells = make_grid(Layout(rows=12, columns=15, arrangement=arrangement))
     return cells, 0.04 + 0.01 * np.sin(7.0 * np.arange(cells.count))
 
 
@@ -83,7 +83,7 @@ def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out() -
 
 
 def test_one_pin_alone_is_a_bed_too() -> None:
-    cells = grid(Layout(rows=1, columns=1))
+    cells = make_grid(Layout(rows=1, columns=1))
     found = intersect_surface(cells, np.array([0.04]), np.array([1e-3, -1e-3, 1.0]), DOWN)
     np.testing.assert_allclose(found, [1e-3, -1e-3, 0.04], rtol=0, atol=1e-12)
 
@@ -98,7 +98,7 @@ LENSES = {
 def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None:
     projection = np.array(LENSES[lens])
     seen = np.eye(4)
-    seen[:3, :3] = 3.0 * matrices(np.array([[0.8, 0.4, -0.3, 0.33]]))[0]
+    seen[:3, :3] = 3.0 * make_matrices(np.array([[0.8, 0.4, -0.3, 0.33]]))[0]
     seen[:3, 3] = 1.0, -2.0, -15.0
     for place in ([0.0, 0.0, 0.0], [0.3, -0.2, 0.5], [-1.0, 1.0, 0.1]):
         clip = projection @ seen @ [*place, 1.0]
@@ -126,7 +126,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
     rim = find_contact_outline(finger, np.array(turn), depth)
     x, y = rim.T
     place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
-    height = underside(*forms(outline), place)[0]
+    height = compute_underside(*compute_forms(outline), place)[0]
     np.testing.assert_allclose(height, depth, rtol=0, atol=1e-12)
 
 
@@ -147,5 +147,5 @@ def test_a_finger_that_is_not_pressed_in_has_the_patch_of_its_lowest_point() -> 
 
 def test_the_matrices_of_quaternions_turn_a_finger_about() -> None:
     half = np.sqrt(0.5)
-    turned = matrices(np.array([[half, 0.0, 0.0, half]]))[0]
+    turned = make_matrices(np.array([[half, 0.0, 0.0, half]]))[0]
     np.testing.assert_allclose(turned @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], rtol=0, atol=1e-15)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.base.quantity import UNITS, Parameters, nearest, parse, quantities, quantity
+from digiclay.core.base.quantity import UNITS, Parameters, find_nearest_name, list_quantities, parse, quantity
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def test_bounds_that_are_included_are_allowed() -> None:
 
 
 def test_quantities_tell_what_is_known_of_a_field() -> None:
-    known = quantities(Lever)["length"]
+    known = list_quantities(Lever)["length"]
     assert (known.doc, known.unit, known.symbol, known.source) == ("length", "m", "l", "P")
 
 
@@ -116,8 +116,8 @@ def test_a_quantity_that_cannot_be_read_names_the_rule(text: str, rule: str) -> 
 
 
 def test_the_nearest_name_is_suggested() -> None:
-    assert nearest("viscosty", ["density", "viscosity"]) == "viscosity"
+    assert find_nearest_name("viscosty", ["density", "viscosity"]) == "viscosity"
 
 
 def test_nothing_is_suggested_for_a_name_unlike_all() -> None:
-    assert nearest("qqq", ["density", "viscosity"]) == ""
+    assert find_nearest_name("qqq", ["density", "viscosity"]) == ""

@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import Rows, State, at_rest
+from digiclay.core.engine.state import Rows, State, make_initial_state
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
-from digiclay.core.session.memory_limit import available_memory, bytes_needed, refuse_what_cannot_fit
+from digiclay.core.session.memory_limit import (
+    count_bytes_needed,
+    measure_available_memory,
+    refuse_what_cannot_fit,
+)
 
 from tests.assemble import sample
 
@@ -31,7 +35,7 @@ def after(start: State, period: int) -> State:
 
 def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:
     """Record a session that may be cut short; return the first cell's column of each array."""
-    start = at_rest(ROWS, CELLS, 0.04, None)
+    start = make_initial_state(ROWS, CELLS, 0.04, None)
     recording = RunRecording(Recorder(every), ROWS, start, periods)
     last = start
     for period in range(1, (stop or periods) + 1):
@@ -112,7 +116,7 @@ def fits(recorder: Recorder, cells: int, periods: int, free: int) -> bool:
 
 
 def test_a_history_fits_to_the_byte() -> None:
-    needed = bytes_needed(Recorder(1), ROWS, 1000, 100)
+    needed = count_bytes_needed(Recorder(1), ROWS, 1000, 100)
     assert [fits(Recorder(1), 1000, 100, free) for free in (needed - 1, needed)] == [False, True]
 
 
@@ -136,7 +140,7 @@ def test_a_bed_too_large_for_any_history_is_refused_as_such() -> None:
 
 def test_this_machine_has_some_memory() -> None:
     # Less than this could not have started the interpreter that runs the test.
-    assert available_memory() > 10_000_000
+    assert measure_available_memory() > 10_000_000
 
 
 @pytest.mark.parametrize("every", [1, 3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.batch.broadcasting import Floats
-from digiclay.core.model.physics import speeds
+from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.steppers.richardson import extrapolate
@@ -19,7 +19,7 @@ def extrapolated(coarse: float, fine: float, period: float = 10.0, under: float 
     In a period as long as this a valve lets a pin go anywhere.
     """
     height, unders = np.full((1, 1), 40e-3), np.full((3, 1, 1), under)
-    reach = speeds(CELL).reach(height, unders, np.array([period]))
+    reach = find_speeds(CELL).reach(height, unders, np.array([period]))
     fines, coarses = (np.full((CELL.rows + 1, 1, 1), value) for value in (fine, coarse))
     extrapolate(CELL, fines, coarses, reach)
     rows: Floats = fines[:, 0, 0]
@@ -45,6 +45,6 @@ def test_no_filter_of_the_pulp_pulls() -> None:
 
 
 def test_no_pin_goes_beyond_where_its_valve_and_the_finger_can_take_it() -> None:
-    way = speeds(CELL).rise * 5e-3
+    way = find_speeds(CELL).rise * 5e-3
     assert extrapolated(40e-3, 40e-3 + way, period=5e-3)[0] == pytest.approx(40e-3 + way, rel=1e-12)
     assert extrapolated(40e-3, 30e-3, period=5e-3, under=30e-3)[0] == pytest.approx(30e-3 - way, rel=1e-12)

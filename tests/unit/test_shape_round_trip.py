@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.core.mesh_io.export_model import Model, make_bodies
-from digiclay.core.mesh_io.mesh_writer import FORMATS, suffix, write
+from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Grid, Layout, grid
-from digiclay.core.shapes.fitting import Fitted, fitted
-from digiclay.core.shapes.mesh_relief import shape_mesh
+from digiclay.core.model.layout import Grid, Layout, make_grid
+from digiclay.core.shapes.fitting import Fitted, fit_relief
+from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.relief import Placement
 from digiclay.core.shapes.request import Shape
 from digiclay.core.shapes.source_file import read
@@ -27,7 +27,7 @@ EXACT = 1e-7
 
 def bed(pitch: float, arrangement: str) -> tuple[Grid, Formed]:
     """A bed with pins anywhere between 30 and 50 mm."""
-    cells = grid(Layout(9, 8, pitch * 1e-3, arrangement))
+    cells = make_grid(Layout(9, 8, pitch * 1e-3, arrangement))
     height = np.random.default_rng(3).uniform(0.03, 0.05, cells.count)
     return cells, Formed.of(cells.positions, height, 0.04, 0.0, 0)
 
@@ -36,13 +36,13 @@ def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str
     """Write a surface, and lay the file onto the bed it came from."""
     write(make_bodies(formed, model), path, unit, format)
     shape = Shape(file=str(path), fit="placed", unit="auto" if format in ("glb", "3mf") else unit)
-    return fitted(shape, read(shape), cells, Actuator())
+    return fit_relief(shape, read(shape), cells, Actuator())
 
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_formed_bed_comes_back_cell_by_cell(tmp_path: Path, arrangement: str, format: str) -> None:
-    path = tmp_path / f"formed{suffix(format)}"
+    path = tmp_path / f"formed{find_suffix(format)}"
     for pitch in PITCHES:
         cells, formed = bed(pitch, arrangement)
         for kind in ("solid", "surface", "pins"):
@@ -62,7 +62,7 @@ def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None
 @pytest.mark.parametrize("format", [kind for kind in FORMATS if kind != "glb"])
 def test_a_file_in_meters_comes_back_too(tmp_path: Path, format: str) -> None:
     cells, formed = bed(2.3, "staggered")
-    path = tmp_path / f"formed{suffix(format)}"
+    path = tmp_path / f"formed{find_suffix(format)}"
     back = read_back(cells, formed, Model(), path, format, unit="m")
     assert back.covered == cells.count
     assert np.abs(back.heights - formed.height).max() < EXACT
@@ -73,24 +73,24 @@ def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement: str) -> No
     cells, formed = bed(2.3, arrangement)
     (body,) = make_bodies(formed, Model(kind="surface"))
     rounded = np.array([[float(f"{value * 1e3:.6g}") for value in row] for row in body.vertices])
-    tops = shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
+    tops = make_shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
     assert tops.covered.all()
     # 50 nm off, at a slope of up to 20.
     assert np.abs(tops.value * 1e-3 - formed.height).max() < 2e-6
 
 
 def test_a_pin_a_hundredth_of_a_pitch_beside_a_shape_is_not_covered() -> None:
-    cells = grid(Layout(5, 5, 3e-3))
+    cells = make_grid(Layout(5, 5, 3e-3))
     plate = np.array([[-5.97, -5.97, 1.0], [5.97, -5.97, 1.0], [5.97, 5.97, 1.0], [-5.97, 5.97, 1.0]])
-    tops = shape_mesh("x", plate, [[0, 1, 2], [0, 2, 3]], "z", 1e-3).tops(
+    tops = make_shape_mesh("x", plate, [[0, 1, 2], [0, 2, 3]], "z", 1e-3).tops(
         cells, Placement(1e-3, 1e-3, 0.0, 0.0)
     )
     assert tops.covered.sum() == 9  # the inner pins
 
 
 def test_a_needle_covers_no_pin_ahead_of_its_tip() -> None:
-    cells = grid(Layout(5, 5, 3e-3))
+    cells = make_grid(Layout(5, 5, 3e-3))
     # It ends a quarter of a pitch before the middle pin, at an angle of 1e-4.
     needle = np.array([[-6.0, -3e-4, 1.0], [-6.0, 3e-4, 1.0], [-0.75, 0.0, 1.0]])
-    tops = shape_mesh("x", needle, [[0, 2, 1]], "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
+    tops = make_shape_mesh("x", needle, [[0, 2, 1]], "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
     np.testing.assert_array_equal(np.flatnonzero(tops.covered), [10, 11])

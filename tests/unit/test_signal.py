@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.metrics.signal import amplitude, deviation, frequency, mean, overshoot, settling_time
+from digiclay.core.metrics.signal import (
+    compute_deviation,
+    compute_mean,
+    measure_amplitude,
+    measure_frequency,
+    measure_overshoot,
+    measure_settling_time,
+)
 
 TIME = np.linspace(0.0, 10.0, 10001)
 #: A second-order step response with damping 0.5 and 1 rad/s.
@@ -14,63 +21,70 @@ RESPONSE = 1.0 - np.exp(-0.5 * TIME) * (np.cos(DAMPED * TIME) + 0.5 / DAMPED * n
 
 def test_a_second_order_system_overshoots_by_its_formula() -> None:
     # exp(-π ζ / √(1-ζ²)); the peak is flat, a row of 1 ms misses it by 1e-7.
-    assert overshoot(RESPONSE, 1.0) == pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
+    assert measure_overshoot(RESPONSE, 1.0) == pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
 
 
 def test_a_falling_signal_overshoots_like_its_mirror_image() -> None:
-    assert overshoot(-RESPONSE, -1.0) == overshoot(RESPONSE, 1.0)
+    assert measure_overshoot(-RESPONSE, -1.0) == measure_overshoot(RESPONSE, 1.0)
 
 
 def test_the_overshoot_is_a_share_of_the_way() -> None:
-    assert overshoot([2.0, 7.0], 4.0) == 1.5
+    assert measure_overshoot([2.0, 7.0], 4.0) == 1.5
 
 
 def test_a_signal_that_never_passes_its_target_does_not_overshoot() -> None:
-    assert overshoot(1.0 - np.exp(-TIME), 1.0) == 0.0
+    assert measure_overshoot(1.0 - np.exp(-TIME), 1.0) == 0.0
 
 
 def test_a_signal_that_starts_at_its_target_has_no_overshoot_to_speak_of() -> None:
-    assert overshoot([1.0, 2.0], 1.0) is None
+    assert measure_overshoot([1.0, 2.0], 1.0) is None
 
 
 def test_an_exponential_settles_at_the_logarithm_of_its_band() -> None:
-    assert settling_time(TIME, 1.0 - np.exp(-TIME), 1.0, 0.05) == pytest.approx(np.log(20.0), abs=1e-3)
+    assert measure_settling_time(TIME, 1.0 - np.exp(-TIME), 1.0, 0.05) == pytest.approx(
+        np.log(20.0), abs=1e-3
+    )
 
 
 def test_a_signal_that_leaves_its_band_again_has_not_settled_before() -> None:
     signal = np.where((TIME > 4.0) & (TIME < 5.0), 1.2, 1.0)
-    assert settling_time(TIME, signal, 1.0, 0.1) == pytest.approx(5.0, abs=1e-9)
+    assert measure_settling_time(TIME, signal, 1.0, 0.1) == pytest.approx(5.0, abs=1e-9)
 
 
 def test_a_signal_outside_its_band_at_the_end_never_settles() -> None:
-    assert settling_time(TIME, np.sin(TIME), 0.0, 0.1) is None
+    assert measure_settling_time(TIME, np.sin(TIME), 0.0, 0.1) is None
 
 
 def test_a_signal_that_is_not_a_number_never_settles() -> None:
-    assert settling_time([0.0, 1.0], [1.0, np.nan], 1.0, 0.1) is None
+    assert measure_settling_time([0.0, 1.0], [1.0, np.nan], 1.0, 0.1) is None
 
 
 def test_a_signal_always_in_its_band_settles_at_once() -> None:
-    assert settling_time(TIME, np.ones(10001), 1.0, 0.1) == 0.0
+    assert measure_settling_time(TIME, np.ones(10001), 1.0, 0.1) == 0.0
 
 
 def test_the_amplitude_of_a_sine_about_an_offset_is_its_own() -> None:
-    assert amplitude(3.0 + 0.2 * np.sin(8.0 * TIME)) == pytest.approx(0.2, rel=1e-4)
+    assert measure_amplitude(3.0 + 0.2 * np.sin(8.0 * TIME)) == pytest.approx(0.2, rel=1e-4)
 
 
 def test_the_frequency_of_a_sine_is_its_own() -> None:
     # Ten rises; each is found to a row of 1 ms.
-    assert frequency(TIME, np.sin(2.0 * np.pi * 1.3 * TIME + 0.3)) == pytest.approx(1.3, rel=1e-3)
+    assert measure_frequency(TIME, np.sin(2.0 * np.pi * 1.3 * TIME + 0.3)) == pytest.approx(1.3, rel=1e-3)
 
 
 def test_a_drift_has_no_frequency() -> None:
-    assert frequency(TIME, TIME) is None
+    assert measure_frequency(TIME, TIME) is None
 
 
 def test_the_deviation_is_weighted() -> None:
     # A value for 3 s and another, 4 higher, for 1 s: mean 1, variance (3·1 + 1·9)/4.
-    assert deviation(np.array([0.0, 4.0]), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(3.0), rel=1e-12)
+    assert compute_deviation(np.array([0.0, 4.0]), np.array([3.0, 1.0])) == pytest.approx(
+        np.sqrt(3.0), rel=1e-12
+    )
 
 
 def test_nothing_has_no_mean_and_no_deviation() -> None:
-    assert (mean(np.empty(0), np.empty(0)), deviation(np.empty(0), np.empty(0))) == (None, None)
+    assert (compute_mean(np.empty(0), np.empty(0)), compute_deviation(np.empty(0), np.empty(0))) == (
+        None,
+        None,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.skin_mesh import (
     BASE_THICKNESS,
     find_base_level,
@@ -21,7 +21,7 @@ ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 def pins(rows: int, columns: int, arrangement: str = "aligned") -> np.ndarray:
     """Positions of a bed with the default pitch of 3 mm."""
-    return grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    return make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse
-from digiclay.core.base.spline import monotone
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.base.spline import interpolate_monotone
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skin_grid import SurfaceGrid, fit_skin
 from digiclay.core.surface.skins import SKINS
@@ -23,7 +23,7 @@ ROUNDING = 1e-15
 
 def bed(arrangement: str = "aligned", rows: int = 7, columns: int = 9, seed: int = 1) -> Formed:
     """A bed with pins anywhere between 20 and 80 mm."""
-    place = grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     return Formed.of(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)), 0.04, 0.0, 0)
 
 
@@ -120,7 +120,7 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
     value, at = random.integers(-2, 3, size=(count, 30)) * 1.0, np.linspace(knot.min(), knot.max(), 101)
     order = np.argsort(knot)
     known = PchipInterpolator(knot[order], value[order])(at)
-    np.testing.assert_allclose(monotone(knot, value, at), known, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(interpolate_monotone(knot, value, at), known, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("skin", SKINS)
@@ -141,7 +141,7 @@ def test_a_skin_is_nowhere_above_or_below_the_pins_about_it(skin, arrangement):
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("skin", SKINS)
 def test_beside_a_ridge_the_bed_stays_as_level_as_it_is(skin, arrangement):
-    place = grid(Layout(rows=15, columns=15, arrangement=arrangement)).positions
+    place = make_grid(Layout(rows=15, columns=15, arrangement=arrangement)).positions
     ridge = 0.012 * (np.abs(place[:, 1]) < 4e-3) * (np.abs(place[:, 0]) < 12.1e-3)
     sheet = covered(Formed.of(place, 0.04 + ridge, 0.04, 0.0, 0), skin, 5)
     assert sheet.height.min() >= 0.04 - ROUNDING

@@ -13,15 +13,15 @@ import trimesh
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.scene_source import load
 from digiclay.core.shapes.mesh_relief import ShapeMesh
 from digiclay.core.shapes.request import Shape
-from digiclay.core.shapes.source_file import SAMPLES, find_shape, fitted_to, read, sample_shapes
+from digiclay.core.shapes.source_file import SAMPLES, find_shape, fit_shape, list_shapes, read
 from digiclay.core.surface.body import Body
 
 ROOT = Path(__file__).parents[2]
-BED = grid(Layout(13, 13, 3e-3))
+BED = make_grid(Layout(13, 13, 3e-3))
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def maker() -> ModuleType:
 
 def heights(file: Path | str, **known: object) -> np.ndarray:
     """Return the heights a file makes on a bed of 13 x 13 cells."""
-    return fitted_to(Shape(file=str(file), **known), BED, Actuator()).heights
+    return fit_shape(Shape(file=str(file), **known), BED, Actuator()).heights
 
 
 def test_the_sample_shapes_are_those_the_program_makes(maker: ModuleType, tmp_path: Path) -> None:
@@ -51,24 +51,24 @@ def test_the_sample_shapes_are_those_the_program_makes(maker: ModuleType, tmp_pa
 
 def test_every_sample_shape_has_a_note_of_its_origin() -> None:
     notes = (SAMPLES / "README.md").read_text(encoding="utf-8")
-    assert len(sample_shapes()) >= 12
-    assert [name for name in sample_shapes() if f"| `{find_shape(name).name}` |" not in notes] == []
+    assert len(list_shapes()) >= 12
+    assert [name for name in list_shapes() if f"| `{find_shape(name).name}` |" not in notes] == []
 
 
 def test_the_sample_shapes_are_small() -> None:
     assert sum(path.stat().st_size for path in SAMPLES.iterdir()) < 1e6
 
 
-@pytest.mark.parametrize("name", sample_shapes())
+@pytest.mark.parametrize("name", list_shapes())
 def test_every_sample_shape_fits_a_bed_without_clipping(name: str) -> None:
-    laid = fitted_to(Shape(file=name), grid(Layout()), Actuator())
+    laid = fit_shape(Shape(file=name), make_grid(Layout()), Actuator())
     assert np.ptp(laid.heights) == pytest.approx(15e-3, abs=1e-12)
     assert laid.too_low + laid.too_high == 0
     assert (laid.overhanging > 0) == (name == "knot")
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in sample_shapes() if find_shape(n).suffix in (".stl", ".obj", ".ply")]
+    "name", [n for n in list_shapes() if find_shape(n).suffix in (".stl", ".obj", ".ply")]
 )
 def test_every_sample_mesh_is_closed_and_turned_outwards(name: str) -> None:
     mesh = trimesh.load_mesh(find_shape(name))

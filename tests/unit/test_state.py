@@ -7,7 +7,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import Rows, State, at_rest
+from digiclay.core.engine.state import Rows, State, make_initial_state
 from digiclay.core.model.layout import Layout
 
 from tests.assemble import make_system, one_cell, path, record
@@ -29,14 +29,14 @@ def test_the_newest_command_is_the_last_of_the_queue() -> None:
 
 def test_at_rest_every_pin_is_at_its_target_and_every_valve_shut() -> None:
     rows = Rows(5, 2)
-    state = at_rest(rows, 4, 40e-3, None)
+    state = make_initial_state(rows, 4, 40e-3, None)
     assert np.all(state.rows[[0, rows.target]] == 40e-3)
     others = np.delete(state.rows, [0, rows.target], axis=0)
     assert not others.any()
 
 
 def test_at_rest_nothing_moves() -> None:
-    state = at_rest(Rows(5, 2), 4, 40e-3, None)
+    state = make_initial_state(Rows(5, 2), 4, 40e-3, None)
     assert (state.active.cells.size, state.mode().tolist()) == (0, [Mode.REST] * 4)
 
 

@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.live.stroke import DEEPEST, SYMMETRIES, Stroke, deepen, draw, start
 from digiclay.live.stroke_motion import APPROACH, DRAG, SPEED, follow
 from numpy.typing import NDArray
 
-CELLS = grid(Layout(rows=20, columns=20))
+CELLS = make_grid(Layout(rows=20, columns=20))
 PERIOD = 5e-3
 #: A level bed with one pin that stands out, m.
 HEIGHT = np.full(CELLS.count, 0.040)

@@ -11,15 +11,15 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.metrics.finger_path import sum_cells
 from digiclay.core.metrics.summary import (
     METRICS,
-    cell_area,
+    compute_cell_area,
+    compute_contact_loss_share,
     compute_metrics,
-    contact_loss_share,
-    first_touch,
-    lag,
-    rfd,
-    weights,
+    compute_rfd,
+    compute_weights,
+    find_first_touch,
+    measure_lag,
 )
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.set_point import SetPoint
 
 TIME = np.linspace(0.0, 10.0, 2001)
@@ -37,17 +37,17 @@ def history(total: np.ndarray, time: np.ndarray = TIME) -> dict[str, np.ndarray]
     height = np.full((len(time), 9), 0.04)
     height[-1, :3] = 0.043, 0.039, 0.041
     mode = np.full((len(time), 9), Mode.FORCE_FOLLOW, dtype=np.int8)
-    position = grid(Layout(rows=3, columns=3)).positions
+    position = make_grid(Layout(rows=3, columns=3)).positions
     return {"time": time, "height": height, "force": force, "command": np.zeros_like(force), "mode": mode,
             "fingertip": fingertip, "total_force": total, "position": position}  # fmt: skip
 
 
 def test_the_rfd_of_a_force_at_its_set_point_is_zero():
-    assert rfd(TIME, np.full(2001, 0.4), 0.4) == 0.0
+    assert compute_rfd(TIME, np.full(2001, 0.4), 0.4) == 0.0
 
 
 def test_the_rfd_of_a_constant_offset_is_the_offset():
-    assert rfd(TIME, np.full(2001, 0.43), 0.4) == pytest.approx(
+    assert compute_rfd(TIME, np.full(2001, 0.43), 0.4) == pytest.approx(
         0.03, rel=1e-10
     )  # 0.43 - 0.4 loses two digits
 
@@ -55,12 +55,12 @@ def test_the_rfd_of_a_constant_offset_is_the_offset():
 def test_the_rfd_of_a_sine_is_its_amplitude_over_root_two():
     # The trapezium rule is exact for sin² over whole periods.
     total = 0.4 + 0.1 * np.sin(2.0 * np.pi * TIME)
-    assert rfd(TIME, total, 0.4) == pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING)
+    assert compute_rfd(TIME, total, 0.4) == pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING)
 
 
 def test_the_rfd_leaves_out_the_time_without_contact():
     total = np.where((TIME > 2.0) & (TIME < 6.0), 0.43, 0.0)
-    assert rfd(TIME, total, 0.4) == pytest.approx(0.03, rel=1e-10)
+    assert compute_rfd(TIME, total, 0.4) == pytest.approx(0.03, rel=1e-10)
 
 
 def test_the_rfd_of_the_whole_session_counts_the_time_without_contact():
@@ -76,7 +76,7 @@ def test_the_rfd_weighs_rows_by_their_time():
     time = np.concatenate([np.linspace(0.0, 1.0, 101), np.arange(2.0, 11.0)])
     total = np.where(time <= 1.0, 0.5, 0.4)
     # The row at 1 s stands for half a second after it as well: 1.5 s in all.
-    assert rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
+    assert compute_rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
 
 
 def test_the_rfd_while_shaping_leaves_out_touching_down():
@@ -137,17 +137,17 @@ def test_shaping_wants_contact_and_a_cell_that_follows_the_force():
 
 def test_the_weights_add_up_to_the_duration():
     uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
-    assert weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
+    assert compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
 
 
 def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact():
     touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
-    assert contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
+    assert compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
 
 
 def test_lifting_at_the_end_is_no_contact_loss():
-    assert contact_loss_share(TIME, np.where(TIME < 4.0, 0.4, 0.0)) == 0.0
+    assert compute_contact_loss_share(TIME, np.where(TIME < 4.0, 0.4, 0.0)) == 0.0
 
 
 def test_the_contact_share_is_the_time_in_contact():
@@ -162,7 +162,7 @@ def test_the_lag_is_the_distance_from_finger_to_force_centroid():
     # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
     case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
     sums = sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
-    np.testing.assert_allclose(lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
+    np.testing.assert_allclose(measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
 
 
 def test_the_summary_finds_the_lag_of_a_finger_beside_the_force():
@@ -196,7 +196,9 @@ def test_volumes_above_and_below_the_initial_surface_are_told_apart():
     ],
 )
 def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimeters):
-    assert cell_area(grid(layout).positions) == pytest.approx(square_millimeters * 1e-6, rel=1e-9)
+    assert compute_cell_area(make_grid(layout).positions) == pytest.approx(
+        square_millimeters * 1e-6, rel=1e-9
+    )
 
 
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():
@@ -212,7 +214,7 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
 
 def test_the_first_touch_ends_where_contact_does_and_begins_a_row_before_it():
     total = np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.4])
-    assert first_touch(total) == slice(1, 4)
+    assert find_first_touch(total) == slice(1, 4)
 
 
 def test_the_overshoot_of_the_first_touch_is_its_peak_over_the_set_point():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.physics import rates
+from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.supply import Supply
 
 from tests.assemble import one_cell
@@ -25,7 +25,7 @@ def speed_under(force: float, opening: float) -> float:
     contact = cell.touch.contact
     depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
     y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
-    return float(rates(cell, y, under, np.array([opening]))[0, 0])
+    return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
 
 
 def test_a_cell_pressed_harder_than_the_high_reservoir_lifts_sinks_through_the_open_raise_valve() -> None:

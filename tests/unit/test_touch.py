@@ -7,10 +7,10 @@ import pytest
 from digiclay.core.engine.simulation import begin, step
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import LEVEL, Fingertip
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.null_parts import Unrelaxed
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.touch import MOST, Touch, force, reached, trace_finger
+from digiclay.core.model.touch import MOST, Touch, compute_force, find_reached_disc, trace_finger
 
 from tests.assemble import AWAY, make_system, path, record
 
@@ -20,24 +20,27 @@ ELASTIC, RELAXING = (Touch(Fingertip(), Contact(), pulp) for pulp in (Unrelaxed(
 def test_force_is_the_share_of_tension_less_what_relaxed() -> None:
     under, filters = np.array([48e-3]), np.array([[0.3], [0.2], [0.1]])
     expected = 0.34 * (0.125 * np.expm1(2.0) - (0.62 * 0.3 + 0.20 * 0.2 + 0.10 * 0.1))
-    assert force(RELAXING, np.array([49e-3]), under, filters) == pytest.approx(
+    assert compute_force(RELAXING, np.array([49e-3]), under, filters) == pytest.approx(
         expected, rel=1e-13
     )  # rounding
 
 
 def test_the_pulp_does_not_stick() -> None:
     filters = np.array([[3.0], [2.0], [1.0]])
-    assert force(RELAXING, np.array([48.1e-3]), np.array([48e-3]), filters).tolist() == [0.0]
+    assert compute_force(RELAXING, np.array([48.1e-3]), np.array([48e-3]), filters).tolist() == [0.0]
 
 
 def test_there_is_no_force_across_a_gap() -> None:
-    assert force(ELASTIC, np.array([47e-3]), np.array([48e-3]), np.empty((0, 1))).tolist() == [0.0]
+    assert compute_force(ELASTIC, np.array([47e-3]), np.array([48e-3]), np.empty((0, 1))).tolist() == [0.0]
 
 
 def near(*poses: tuple[float, float, float]) -> np.ndarray:
     """Return the cells a level finger may touch while it is at some places, mm; pins stand at 40 mm."""
-    bed, table = grid(Layout()), np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]])
-    disc = reached(trace_finger(Fingertip(), table)[0].window, 40e-3)
+    bed, table = (
+        make_grid(Layout()),
+        np.array([[[x * 1e-3, y * 1e-3, z * 1e-3, *LEVEL] for x, y, z in poses]]),
+    )
+    disc = find_reached_disc(trace_finger(Fingertip(), table)[0].window, 40e-3)
     return bed.disc(*disc) if disc else np.empty(0, int)
 
 
@@ -73,14 +76,14 @@ def dragged(periods: int) -> np.ndarray:
 
 
 def test_undersides_worked_out_several_periods_at_a_time_are_those_of_each_to_the_last_bit() -> None:
-    poses, places = dragged(70), grid(Layout()).compute_basis(np.arange(100, 400))
+    poses, places = dragged(70), make_grid(Layout()).compute_basis(np.arange(100, 400))
     together = [one.under(places) for one in trace_finger(Fingertip(), poses)]
     alone = [trace_finger(Fingertip(), poses[i : i + 1])[0].under(places) for i in range(len(poses))]
     assert np.array_equal(np.array(together), np.array(alone))
 
 
 def test_other_places_in_mid_way_have_their_own_undersides() -> None:
-    bed, coming = grid(Layout()), trace_finger(Fingertip(), dragged(8))
+    bed, coming = make_grid(Layout()), trace_finger(Fingertip(), dragged(8))
     first, second = bed.compute_basis(np.arange(50)), bed.compute_basis(np.arange(300, 350))
     coming[0].under(first)
     fresh = trace_finger(Fingertip(), dragged(8))[1].under(second)

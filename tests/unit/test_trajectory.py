@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.trajectory import Trajectory, interpolate_poses, level
+from digiclay.core.model.trajectory import Trajectory, interpolate_poses, make_level
 from scipy.spatial.transform import Rotation
 
 RANDOM = np.random.default_rng(3)
@@ -51,7 +51,7 @@ def test_the_smooth_path_starts_and_ends_at_rest() -> None:
 
 
 def test_a_smooth_path_through_equal_values_stays() -> None:
-    path = level(
+    path = make_level(
         np.array([0.0, 1.0, 2.0, 3.0]), np.array([[0, 0, 1], [0, 0, 2], [0, 0, 2], [0, 0, 3]]) * 1e-2
     )
     assert np.ptp(path.poses(np.linspace(1, 2, 50))[:, 2]) == 0.0
@@ -63,7 +63,7 @@ def test_the_linear_path_is_straight() -> None:
 
 
 def test_a_smooth_path_of_two_waypoints_is_half_way_at_half_time() -> None:
-    path = level(np.array([0.0, 1.0]), np.array([[0, 0, 0], [1, 2, 3.0]]))
+    path = make_level(np.array([0.0, 1.0]), np.array([[0, 0, 0], [1, 2, 3.0]]))
     assert path.poses(np.array([0.5]))[0, :3] == pytest.approx([0.5, 1.0, 1.5], abs=1e-15)
 
 
@@ -100,7 +100,7 @@ def test_orientations_need_not_be_given_at_unit_length() -> None:
 
 
 def test_a_single_waypoint_is_a_finger_that_stays() -> None:
-    path = level(np.array([1.0]), np.array([[1e-3, 2e-3, 3e-3]]))
+    path = make_level(np.array([1.0]), np.array([[1e-3, 2e-3, 3e-3]]))
     assert path.poses(np.array([0.0, 9.0]))[:, :3].tolist() == [[1e-3, 2e-3, 3e-3]] * 2
 
 
@@ -119,19 +119,19 @@ def test_times_that_fall_back_are_refused() -> None:
     with pytest.raises(
         ParameterError, match=r"^Trajectory\.times must increase from waypoint to waypoint .*waypoint 3"
     ):
-        level(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3)))
+        make_level(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3)))
 
 
 def test_a_path_without_waypoints_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"^Trajectory\.waypoints must have at least one waypoint"):
-        level(np.empty(0), np.empty((0, 3)))
+        make_level(np.empty(0), np.empty((0, 3)))
 
 
 def test_a_position_that_is_not_finite_is_refused() -> None:
     with pytest.raises(
         ParameterError, match=r"^Trajectory\.positions must be finite numbers \(got nan at waypoint 2\)\.$"
     ):
-        level(np.array([0.0, 1.0]), np.array([[0, 0, 0], [0, np.nan, 0]]))
+        make_level(np.array([0.0, 1.0]), np.array([[0, 0, 0], [0, np.nan, 0]]))
 
 
 def test_a_quaternion_of_no_length_is_refused() -> None:
@@ -143,4 +143,4 @@ def test_an_unknown_interpolation_is_refused() -> None:
     with pytest.raises(
         ParameterError, match=r"^Trajectory\.interpolation must be one of smooth, linear \(got 'cubic'\)\.$"
     ):
-        level(np.array([0.0]), np.zeros((1, 3)), "cubic")
+        make_level(np.array([0.0]), np.zeros((1, 3)), "cubic")

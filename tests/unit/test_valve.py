@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.fluid import Fluid
-from digiclay.core.model.valve import Orifice, Valve, orifice
+from digiclay.core.model.valve import Orifice, Valve, make_orifice
 
 OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.
@@ -31,7 +31,7 @@ def coefficient(valve: Valve, fluid: Fluid, flow: np.ndarray, drop: np.ndarray) 
 def parts(request: pytest.FixtureRequest) -> tuple[Valve, Fluid, Orifice]:
     """A valve, a fluid and the law they make."""
     valve, fluid = request.param
-    return valve, fluid, orifice(valve, fluid)
+    return valve, fluid, make_orifice(valve, fluid)
 
 
 def test_flow_is_continuous_where_the_branches_meet(parts: tuple[Valve, Fluid, Orifice]) -> None:
@@ -66,11 +66,11 @@ def test_above_the_critical_drop_the_flow_grows_with_its_root(parts: tuple[Valve
 
 
 def test_the_default_valve_stays_laminar_between_the_reservoirs() -> None:
-    assert orifice(Valve(), Fluid()).knee > 1e5
+    assert make_orifice(Valve(), Fluid()).knee > 1e5
 
 
 def test_a_wide_valve_with_a_thin_fluid_is_turbulent_at_supply_pressure() -> None:
-    assert orifice(WIDE, THIN).knee < 0.5e5
+    assert make_orifice(WIDE, THIN).knee < 0.5e5
 
 
 def test_the_knee_is_the_critical_drop_of_the_open_valve(parts: tuple[Valve, Fluid, Orifice]) -> None:
@@ -127,28 +127,28 @@ def test_the_laminar_discharge_coefficient_falls_with_the_reynolds_number(
 
 
 def test_with_the_opening_as_gap_laminar_flow_is_linear_in_the_opening() -> None:
-    law = orifice(Valve(gap="opening"), Fluid())
+    law = make_orifice(Valve(gap="opening"), Fluid())
     flow = law.flow(OPENINGS, np.full(OPENINGS.size, 1e4))
     assert flow / OPENINGS == pytest.approx(flow[-1], rel=1e-12)  # rounding
 
 
 def test_with_the_opening_as_gap_the_critical_drop_is_the_same_for_all_openings() -> None:
     valve = Valve(orifice_diameter=0.8e-3, gap="opening")
-    law = orifice(valve, THIN)
+    law = make_orifice(valve, THIN)
     drop = np.full(OPENINGS.size, law.knee)
     reynolds = np.sqrt(law.flow(OPENINGS, drop) / (THIN.viscosity * valve.stroke * OPENINGS))
     assert reynolds == pytest.approx(200.0, rel=1e-12)  # rounding
 
 
 def test_with_the_opening_as_gap_flow_is_continuous_too() -> None:
-    law = orifice(Valve(gap="opening"), THIN)
+    law = make_orifice(Valve(gap="opening"), THIN)
     below, above = (law.flow(OPENINGS, np.full(5, law.knee * side)) for side in (1.0 - 2e-13, 1.0 + 2e-13))
     assert np.abs(above / below - 1.0).max() < 1e-12  # as above
 
 
 def test_both_gaps_agree_on_the_fully_open_valve() -> None:
     drop = np.array([1e3, 1e5, 1e7])
-    flows = [orifice(Valve(gap=gap), Fluid()).flow(np.ones(3), drop) for gap in ("stroke", "opening")]
+    flows = [make_orifice(Valve(gap=gap), Fluid()).flow(np.ones(3), drop) for gap in ("stroke", "opening")]
     assert np.array_equal(*flows)
 
 

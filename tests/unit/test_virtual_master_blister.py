@@ -10,11 +10,11 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.model.control_interface import Commands, Measurement
-from digiclay.core.model.layout import Layout, grid
+from digiclay.core.model.layout import Layout, make_grid
 
 from tests.assemble import make_system, master, path, record
 
-BED = grid(Layout(15, 15))
+BED = make_grid(Layout(15, 15))
 #: A little beside a cell, so that no cell lies exactly on a circle.
 BESIDE = {"x": 0.4e-3, "y": 0.2e-3}
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.scene.schema import Scene
-from ..core.studies.omissions import Fitted, fitted
+from ..core.studies.omissions import Fitted, find_omissions
 from .arguments import told_as_options
 from .progress import Line
 from .tables import table
@@ -30,7 +30,7 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     with Line(sys.stderr) as line:
         told = None if quiet else lambda said: line.draw(f"trying: {said}")
         with told_as_options("run"):
-            found = fitted(scene, budget, told=told)
+            found = find_omissions(scene, budget, told=told)
     if not quiet:
         print("\n".join(report(found)))
     return found

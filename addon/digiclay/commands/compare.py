@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.base.errors import ParameterError, SceneError
-from ..core.base.quantity import nearest
+from ..core.base.quantity import find_nearest_name
 from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
 from ..core.control.methods import METHODS
@@ -73,7 +73,7 @@ def _methods(text: str) -> tuple[str, ...]:
         raise argparse.ArgumentTypeError(f"must name at least one method (got {text!r})")
     for name in names:
         if name not in METHODS:
-            close = nearest(name, list(METHODS))
+            close = find_nearest_name(name, list(METHODS))
             asked = f"; did you mean {close}" if close else ""
             raise argparse.ArgumentTypeError(f"must be among {', '.join(METHODS)} (got {name!r}{asked})")
     return names

@@ -8,13 +8,13 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from ..core.base.quantity import Parameters, quantities
+from ..core.base.quantity import Parameters, list_quantities
 from ..core.control.master_cell import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
-from ..core.session.memory_limit import available_memory, bytes_needed, count_busy_cells
-from ..core.shapes.source_file import fitted_to
+from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
+from ..core.shapes.source_file import fit_shape
 from .arguments import add_command, add_scene, scene_of
 
 __all__ = ["add", "description"]
@@ -65,7 +65,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         method = f"{scene.method}: " if section == "control" else ""
         yield _filled(place, "left out" if part is None else method + _parameters(part))
     if scene.shape:
-        yield _filled("shape", fitted_to(scene.shape, system.grid, scene.actuator).told())
+        yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).told())
     simulation = scene.simulation
     yield _filled("stepper", f"{system.stepper.name}, order {system.stepper.order}")
     yield "\nThe bed"
@@ -85,7 +85,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
-    needed, free = bytes_needed(scene.recorder, system.rows, *sizes), available_memory()
+    needed, free = count_bytes_needed(scene.recorder, system.rows, *sizes), measure_available_memory()
     kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
     yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"
 
@@ -135,7 +135,7 @@ def _filled(place: str, text: str) -> str:
 def _parameters(part: Parameters) -> str:
     """Write a part's parameters on one line."""
     shown = []
-    for name, known in quantities(part).items():
+    for name, known in list_quantities(part).items():
         value = getattr(part, name)
         values = value if isinstance(value, tuple) else (value,)
         shown.append(f"{name.replace('_', ' ')} {' '.join(human(one, known.unit) for one in values)}")

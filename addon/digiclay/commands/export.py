@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..core.base.errors import OutputError
 from ..core.base.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, make_bodies
-from ..core.mesh_io.mesh_writer import FORMATS, UNITS, known_format, suffix, write
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import read_run
 from ..core.surface.body import Body
@@ -61,7 +61,7 @@ def add(commands: Any) -> None:
 def formats(text: str) -> list[str]:
     """Read a list of mesh formats."""
     try:
-        return list(dict.fromkeys(known_format(name.strip()) for name in text.split(",")))
+        return list(dict.fromkeys(find_format(name.strip()) for name in text.split(",")))
     except OutputError as error:
         raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
@@ -76,7 +76,7 @@ def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
     kind : str
         Of the mesh.
     """
-    return [f"{STEMS[kind]}{suffix(one)}" for one in kinds]
+    return [f"{STEMS[kind]}{find_suffix(one)}" for one in kinds]
 
 
 def exported(
@@ -122,7 +122,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         files = [(body.name, [body]) for body in made]
     folder = arguments.out or arguments.run
     targets = [
-        (some, kind, folder / f"{stem}{suffix(kind)}") for stem, some in files for kind in arguments.format
+        (some, kind, folder / f"{stem}{find_suffix(kind)}")
+        for stem, some in files
+        for kind in arguments.format
     ]
     with claim_files([path for _, _, path in targets]):
         for some, kind, path in targets:

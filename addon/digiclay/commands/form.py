@@ -16,15 +16,15 @@ from .. import __version__
 from ..core.base.errors import OutputError
 from ..core.base.run_folder import check_folder, claim_folder
 from ..core.base.safe_names import find_name
-from ..core.model.layout import grid
+from ..core.model.layout import make_grid
 from ..core.scene.assembly import assemble
-from ..core.scene.forming import GESTURES, shaped
+from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import Result, run, save
 from ..core.shapes.fitting import Fitted
-from ..core.shapes.height_text import packed
-from ..core.shapes.source_file import find_shape, fitted_to, import_reader, sample_shapes
+from ..core.shapes.height_text import pack
+from ..core.shapes.source_file import find_shape, fit_shape, import_reader, list_shapes
 from .arguments import add_command, add_scene, scene_of
 from .exit_codes import STOPPED
 from .export import formats
@@ -42,7 +42,7 @@ examples:
   digiclay form part.stl --set shape.fit=actual --set shape.unit=inch --out part
   digiclay form letters --finger scene --scene my.toml   the fingertip path of the scene
 
-{textwrap.fill("sample shapes: " + ", ".join(sample_shapes()), 100)}
+{textwrap.fill("sample shapes: " + ", ".join(list_shapes()), 100)}
 
 The result is a run folder: scene.toml (with the heights of the shape), history.npz, metrics.json. It has the
 formed surface, and the displayed one in the folder 'displayed'.
@@ -89,7 +89,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if not arguments.quiet:
             print(laid.told())
         if arguments.finger != "scene":
-            scene = shaped(scene, assemble(scene), arguments.finger)
+            scene = make_forming_scene(scene, assemble(scene), arguments.finger)
     with claim_folder(out, overwrite=arguments.overwrite) as claim, Stop() as stop:
         with Bar(sys.stderr, scene.name, scene.simulation.control_period) as bar:
             versions = {"digiclay": __version__}
@@ -114,9 +114,9 @@ def _laid(scene: Scene) -> tuple[Scene, Fitted]:
         raise OutputError("form needs a recorder, and the scene has recorder = 'absent'.")
     if scene.shape is None:
         raise OutputError("form needs a shape, and the scene has shape = 'absent'.")
-    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
+    laid = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
     # The run's folder says all there is to say, whatever becomes of the shape's file.
-    shape = replace(scene.shape, heights=packed(laid.heights))
+    shape = replace(scene.shape, heights=pack(laid.heights))
     name = Path(scene.shape.file).stem
     return replace(scene, shape=shape, name=name, description=f"{name}, displayed and then formed."), laid
 

@@ -17,7 +17,7 @@ from typing import Any
 from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, one_line
 from ..core.base.run_folder import write_folder
-from ..core.base.whole_files import as_json, write_whole
+from ..core.base.whole_files import format_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
@@ -147,7 +147,7 @@ def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Te
         for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
             shutil.copyfile(folder / file, staged / file)
         timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
-        write_whole(staged / TIMING, as_json(timing))
+        write_whole(staged / TIMING, format_json(timing))
     return out
 
 

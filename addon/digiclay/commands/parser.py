@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from .. import __version__
 from ..core.base.errors import one_line
-from ..core.base.quantity import nearest
+from ..core.base.quantity import find_nearest_name
 from . import (
     batch,
     compare,
@@ -91,7 +91,7 @@ def _asked(word: str, known: Sequence[str]) -> str:
     bare = {one.lstrip("-").lower(): one for one in known}  # dashes say nothing about who is near
     meant = word.lstrip("-").lower()
     longer = [one for one in bare if len(meant) > 1 and one.startswith(meant)]
-    close = longer[0] if len(longer) == 1 else nearest(meant, list(bare), alike=0.6)
+    close = longer[0] if len(longer) == 1 else find_nearest_name(meant, list(bare), alike=0.6)
     return f" Did you mean {bare[close]}?" if close else ""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
-from ..core.base.png import png
+from ..core.base.png import encode_png
 from ..core.base.whole_files import write_whole
 from ..device.heat import COLORS
 
@@ -56,7 +56,7 @@ def of_heights(height: NDArray[np.float64], rows: int, columns: int, folder: Pat
         Of the thumbnail.
     """
     out = folder / NAMES[1]
-    write_whole(out, png(height_map(height.reshape(rows, columns))))
+    write_whole(out, encode_png(height_map(height.reshape(rows, columns))))
     return out
 
 

@@ -14,7 +14,7 @@ from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
 from ..core.model.fingertip import LEVEL, Fingertip, require_one
-from ..core.model.layout import Layout, grid
+from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import Scene
 from ..core.session import finished_run
 
@@ -116,7 +116,7 @@ class Instant:
             By default `Fingertip()`.
         """
         actuator, finger = actuator or Actuator(), finger or Fingertip()
-        bed = grid(layout)
+        bed = make_grid(layout)
         rest = actuator.rest_height
         return cls(
             position=bed.positions,

@@ -12,18 +12,18 @@ from .. import bridge
 from ..core.base.errors import DigiclayError, ParameterError
 from ..core.engine.simulation import begin, periods
 from ..core.model.fingertip import LEVEL
-from ..core.model.layout import grid
-from ..core.model.trajectory import level
+from ..core.model.layout import make_grid
+from ..core.model.trajectory import make_level
 from ..core.scene.assembly import assemble
-from ..core.scene.forming import display_of, display_time, touch_height
+from ..core.scene.forming import compute_display_time, find_display, find_touch_height
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
-from ..core.shapes.fitting import Fitted, fitted
-from ..core.shapes.height_text import packed
-from ..core.shapes.mesh_relief import ShapeMesh, shape_mesh
+from ..core.shapes.fitting import Fitted, fit_relief
+from ..core.shapes.height_text import pack
+from ..core.shapes.mesh_relief import ShapeMesh, make_shape_mesh
 from ..core.shapes.relief import Relief
 from ..core.shapes.request import Shape
-from ..core.shapes.source_file import fitted_to
+from ..core.shapes.source_file import fit_shape
 from ..device import view
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import bed_state, sculpting
@@ -73,7 +73,9 @@ def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
         evaluated.to_mesh_clear()
     way = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
     vertices = places.reshape(-1, 3) @ way[:3, :3].T + way[:3, 3]
-    return shape_mesh(thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3).astype(np.int64), "z", 1.0)
+    return make_shape_mesh(
+        thing.name, vertices / bridge.SCALE, faces.reshape(-1, 3).astype(np.int64), "z", 1.0
+    )
 
 
 def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
@@ -87,7 +89,7 @@ def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
         How it is fitted.
     """
     scene = properties.scene_of(bed)
-    return _show(bed, scene, shape, fitted(shape, relief, grid(scene.layout), scene.actuator))
+    return _show(bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator))
 
 
 def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
@@ -99,25 +101,25 @@ def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
     shape : Shape
     """
     scene = properties.scene_of(bed)
-    return _show(bed, scene, shape, fitted_to(shape, grid(scene.layout), scene.actuator))
+    return _show(bed, scene, shape, fit_shape(shape, make_grid(scene.layout), scene.actuator))
 
 
 def embed_heights(scene: Scene) -> Scene:
     """Return a scene that has the heights of its shape in it, so that a .blend needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene
-    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
-    return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
+    laid = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=pack(laid.heights)))
 
 
 def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
     """Drive the pins of a bed to a shape, and keep shape and state in the bed."""
-    scene = replace(scene, shape=replace(shape, heights=packed(laid.heights)))
+    scene = replace(scene, shape=replace(shape, heights=pack(laid.heights)))
     system = assemble(scene)
-    display = display_of(system)
+    display = find_display(system)
     assert display is not None
-    finger = level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))
-    count = min(display_time(display), LONGEST) / system.period
+    finger = make_level(np.zeros(1), np.array([[0.0, 0.0, AWAY]]))
+    count = min(compute_display_time(display), LONGEST) / system.period
     (state,) = deque(periods(system, [finger], begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
     pose = _lift_finger(bed, scene, state.row(0))
@@ -140,6 +142,6 @@ def _lift_finger(bed: Any, scene: Scene, heights: Any) -> Any:
     """Return the pose of the bed's fingertip, raised to above the shape where it is not already."""
     tip, finger = view.fingertip_of(bed), find_ellipsoid(scene)
     pose = np.array([0.0, 0.0, 0.0, *LEVEL]) if tip is None else bridge.pose(tip)
-    touch = touch_height(grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
+    touch = find_touch_height(make_grid(scene.layout), heights, finger, float(pose[0]), float(pose[1]))
     pose[2] = max(pose[2], touch + CLEARANCE)
     return pose

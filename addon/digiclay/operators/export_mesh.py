@@ -5,7 +5,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.mesh_io.export_model import make_bodies
-from ..core.mesh_io.mesh_writer import FORMATS, UNITS, suffix, write
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
 from .mesh_options import SurfaceOptions, chosen_bed, sentence
@@ -57,7 +57,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         """Open the file browser, with the name of the bed."""
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         name = bpy.path.clean_name(bed_of(context).name)
-        self.filepath = str(folder / f"{name}{suffix(self.file_format)}")
+        self.filepath = str(folder / f"{name}{find_suffix(self.file_format)}")
         self.shown = self.file_format
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -95,7 +95,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         made = make_bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
         files = [(target, made)]
         if self.separate and self.kind == "features":
-            ending = suffix(self.file_format)
+            ending = find_suffix(self.file_format)
             stem = target.name.removesuffix(ending)
             files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
         for path, some in files:
@@ -106,23 +106,23 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     def _file(self) -> Path:
         """Return the file with the ending of its format, in place of that of another format."""
         path = Path(bpy.path.abspath(self.filepath or "digital_clay"))
-        ending = suffix(self.file_format)
+        ending = find_suffix(self.file_format)
         if path.name.lower().endswith(ending) and not (ending == ".stl" and _is_text(path)):
             return path
         told = _told_by(path.name)
-        other = suffix(told) if told else ""
+        other = find_suffix(told) if told else ""
         return path.with_name(path.name[: len(path.name) - len(other)] + ending)
 
 
 def _told_by(name: str) -> str:
     """Return the format of a name's extension; empty without one."""
-    by_length = sorted(FORMATS, key=lambda one: len(suffix(one)), reverse=True)
-    return next((one for one in by_length if name.lower().endswith(suffix(one))), "")
+    by_length = sorted(FORMATS, key=lambda one: len(find_suffix(one)), reverse=True)
+    return next((one for one in by_length if name.lower().endswith(find_suffix(one))), "")
 
 
 def _is_text(path: Path) -> bool:
     """Return whether a name is that of an STL as text, which ends like that of a binary one."""
-    return path.name.lower().endswith(suffix("stl_ascii"))
+    return path.name.lower().endswith(find_suffix("stl_ascii"))
 
 
 class ExportMenu(bpy.types.Menu):

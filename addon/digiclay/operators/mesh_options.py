@@ -4,7 +4,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import OutputError
-from ..core.base.quantity import quantities
+from ..core.base.quantity import list_quantities
 from ..core.mesh_io.export_model import KINDS, Model
 from ..core.surface.features import Finding
 from ..core.surface.skins import SKINS
@@ -15,7 +15,7 @@ from .poll_messages import no_surface
 
 __all__ = ["FindingOptions", "SurfaceAction", "SurfaceOptions", "chosen_bed", "sentence"]
 
-MODEL, FINDING = quantities(Model), quantities(Finding)
+MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 
 
 def sentence(text: str) -> str:

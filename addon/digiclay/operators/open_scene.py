@@ -11,7 +11,7 @@ from ..core.scene.scene_source import find, list_samples, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
 from ..core.shapes.request import Shape
-from ..core.shapes.source_file import sample_shapes
+from ..core.shapes.source_file import list_shapes
 from ..device import view
 from ..device.instant import find_ellipsoid, pick_pose
 from ..exchange import shape_show
@@ -95,7 +95,7 @@ class AddSample(AddSceneAction, bpy.types.Operator):
         name="Sample",
         items=[
             *((f"session:{name}", title(name), "A session") for name in list_samples()),
-            *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in sample_shapes()),
+            *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in list_shapes()),
         ],
     )
 
@@ -125,7 +125,7 @@ class Entries:
 
     def draw(self, context: Any) -> None:
         """Draw an entry for each."""
-        for name in list_samples() if self.kind == "session" else sample_shapes():
+        for name in list_samples() if self.kind == "session" else list_shapes():
             entry = self.layout.operator(AddSample.bl_idname, text=title(name))
             entry.sample = f"{self.kind}:{name}"
 

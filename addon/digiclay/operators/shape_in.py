@@ -5,7 +5,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.shapes.request import LENGTHS, UPWARDS, Shape
-from ..core.shapes.source_file import KINDS, sample_shapes
+from ..core.shapes.source_file import KINDS, list_shapes
 from ..device.view import bed_of
 from ..exchange import shape_show
 from ..live import running
@@ -183,7 +183,7 @@ class ShapeSample(Shaped, bpy.types.Operator):
     bl_idname = "digiclay.shape_sample"
     bl_label = "Sample Shape"
 
-    sample: bpy.props.EnumProperty(name="Shape", items=[(name, title(name), "") for name in sample_shapes()])
+    sample: bpy.props.EnumProperty(name="Shape", items=[(name, title(name), "") for name in list_shapes()])
 
     def displayed(self, context: Any, bed: Any) -> Any:
         """Display the sample."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.shapes.height_text import packed
+from ..core.shapes.height_text import pack
 from ..core.shapes.request import Shape
 from ..device.view import bed_of
 from ..settings import properties
@@ -33,7 +33,7 @@ class KeepShape(Action, bpy.types.Operator):
         scene = properties.scene_of(bed)
         heights = bridge.read_cells(bed.data)["height"]
         before = scene.shape or Shape()
-        shape = replace(before, file="Formed", fit="placed", heights=packed(heights))
+        shape = replace(before, file="Formed", fit="placed", heights=pack(heights))
         properties.write_scene(bed, replace(scene, shape=shape))
         self.report({"INFO"}, f"{bed.name} has a shape of {heights.size} heights: sessions begin with it")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..core.base.quantity import quantities
+from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS
 from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
 from ..core.scene.toml_table import PRESETS
@@ -153,7 +153,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
             column = self.layout.column(align=True)
             column.active = in_use(settings, section)
             group = part_group(settings, section)
-            for name in quantities(import_parameters(section, settings.method)):
+            for name in list_quantities(import_parameters(section, settings.method)):
                 place = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.
                 place.use_property_split = group.bl_rna.properties[name].type in BESIDE

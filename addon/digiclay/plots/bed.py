@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.metrics.summary import in_contact
+from ..core.metrics.summary import find_contact_rows
 from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
 from .relief import fit_relief
@@ -74,7 +74,7 @@ def draw_path(axes: Axes, history: History) -> None:
     """
     from matplotlib.patheffects import withStroke
 
-    touching = in_contact(array(history, "total_force"))[:, None]
+    touching = find_contact_rows(array(history, "total_force"))[:, None]
     finger, frame = array(history, "fingertip")[:, :2] * MM, axes.axis()
     lifted, pressed = np.where(touching, np.nan, finger).T, np.where(touching, finger, np.nan).T
     dots: dict[str, Any] = {"color": "white", "linestyle": (0, (0.1, 2.2)), "dash_capstyle": "round"}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.metrics.finger_path import sum_cells
-from ..core.metrics.summary import compute_metrics, in_contact
+from ..core.metrics.summary import compute_metrics, find_contact_rows
 from ..core.model.set_point import SetPoint
 from .bed import History, array, draw_map, draw_path, draw_relief, ends
 from .figure import INK, LINES, MM, SHADE, canvas, legend_above, save
@@ -66,7 +66,7 @@ def session_cells(history: History) -> list[int]:
     """
     count = len(LETTERS)
     position, height = array(history, "position"), array(history, "height")
-    touching = np.flatnonzero(in_contact(array(history, "total_force")))
+    touching = np.flatnonzero(find_contact_rows(array(history, "total_force")))
     if not len(touching):
         return sorted(np.argsort(-np.ptp(height, axis=0), kind="stable")[:count].tolist())
     finger = array(history, "fingertip")[touching, :2]
@@ -101,7 +101,9 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         force, figures = place("force", 0.8, 0.65, 6.95, 1.7), place("figures", 8.62, 0.65, 3.78, 1.7)
         for axes in (heights, force):
             across = axes.get_xaxis_transform()
-            axes.fill_between(time, 0, 1, where=in_contact(total), transform=across, color=SHADE, linewidth=0)
+            axes.fill_between(
+                time, 0, 1, where=find_contact_rows(total), transform=across, color=SHADE, linewidth=0
+            )
         draw_map(plan, history, "Where the cells are")
         for name, color, cell in zip(LETTERS, LINES, session_cells(history), strict=False):
             heights.plot(time, height[:, cell] * MM, color=color, label=name)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import bridge
 from ..bridge import SCALE
 from ..core.base.errors import DigiclayError
-from ..core.model.layout import Grid, grid
+from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
 from ..live import running
@@ -93,7 +93,7 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
     session = running.find(bed)
     if session is not None:
         return session.system.grid, session.state.row(0)
-    return grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
+    return make_grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
 
 
 def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import bridge
 from ..compat import bpy
-from ..core.base.quantity import quantities
+from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS
 from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
@@ -61,7 +61,7 @@ def take_method(settings: Any, context: Any) -> None:
     if values is None:
         return
     kind = import_parameters("blister", settings.method)
-    for name in quantities(kind):
+    for name in list_quantities(kind):
         if name in values:
             assign(settings.blister, kind, name, values[name])
         else:

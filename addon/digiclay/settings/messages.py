@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from ..core.base.errors import ParameterError
-from ..core.base.quantity import quantities
+from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS
 from ..core.scene.schema import SECTIONS, import_parameters
 from .declared import title
@@ -37,4 +37,4 @@ def relabel(error: ParameterError) -> ParameterError:
 def _known(section: str) -> set[str]:
     """Return the names of a section's parameters."""
     methods = METHODS if section == "control" else ("virtual_master",)
-    return {name for method in methods for name in quantities(import_parameters(section, method))}
+    return {name for method in methods for name in list_quantities(import_parameters(section, method))}

@@ -17,7 +17,7 @@ from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters
 from ..core.control.methods import METHODS
-from ..core.model.layout import Layout, grid
+from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
 from .groups import CLASSES, SETTINGS
@@ -188,6 +188,6 @@ def _layout_mismatch(bed: Any, layout: Layout) -> str:
 @lru_cache(maxsize=32)
 def _told_apart(layout: Layout) -> tuple[tuple[int, NDArray[np.float64]], ...]:
     """Return index and place of the pins that tell layouts of as many pins apart, m."""
-    places = grid(layout).positions
+    places = make_grid(layout).positions
     last = layout.rows * layout.columns - 1
     return tuple((index, places[index]) for index in sorted({0, min(layout.columns, last), last}))

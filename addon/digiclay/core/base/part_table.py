@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from .errors import ParameterError
-from .quantity import Parameters, nearest, parse, quantities
+from .quantity import Parameters, find_nearest_name, list_quantities, parse
 
 __all__ = ["read_part", "refuse_unknown", "shorten", "show_value"]
 
@@ -30,7 +30,7 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
         if key in names:
             continue
         owner = section and f"{section}."
-        close = nearest(key, list(names))
+        close = find_nearest_name(key, list(names))
         asked = f"Did you mean {owner}{close}?" if close else f"Known here: {', '.join(names)}."
         name = key if re.fullmatch(r"[\w-]+", key) else repr(key)
         raise ParameterError(f"{owner}{name}", "", "must be a known key", show_value(value), asked)
@@ -50,7 +50,7 @@ def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Pa
     own : mapping
         What the section says.
     """
-    known = quantities(kind)
+    known = list_quantities(kind)
     refuse_unknown(section, own, (*known, "method") if section == "control" else tuple(known))
     given = {key: _measured(section, key, value, known[key].unit) for key, value in own.items()}
     try:

@@ -6,7 +6,7 @@ import re
 import struct
 from pathlib import Path
 
-__all__ = ["told_size"]
+__all__ = ["read_size"]
 
 #: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
 HEAD = 1 << 20
@@ -14,7 +14,7 @@ HEAD = 1 << 20
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
-def told_size(path: Path) -> tuple[int, int] | None:
+def read_size(path: Path) -> tuple[int, int] | None:
     """Return width and height of a picture in pixels, None if they are not in its header.
 
     PNG, JPEG, BMP, TIFF, EXR and HDR are known, by what they begin with.

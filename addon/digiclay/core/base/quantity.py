@@ -16,7 +16,9 @@ from typing import Any
 
 from .errors import ParameterError
 
-__all__ = ["EXTENTS", "UNITS", "Parameters", "Quantity", "nearest", "parse", "quantities", "quantity"]
+__all__ = [
+    "EXTENTS", "UNITS", "Parameters", "Quantity", "find_nearest_name", "list_quantities", "parse", "quantity",
+]  # fmt: skip
 
 #: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
 UNITS: dict[str, tuple[float, str]] = {
@@ -111,7 +113,7 @@ def quantity(default: Any, doc: str, **known: Any) -> Any:
     return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **known)})
 
 
-def quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quantity]:
+def list_quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quantity]:
     """Return the declared quantities of a part, by field name."""
     return {f.name: f.metadata["quantity"] for f in dataclasses.fields(parameters)}
 
@@ -195,7 +197,7 @@ def parse(text: str, unit: str) -> float:
     return value * factor
 
 
-def nearest(name: str, known: list[str], alike: float = 0.5) -> str:
+def find_nearest_name(name: str, known: list[str], alike: float = 0.5) -> str:
     """Return the known name a misspelt one is nearest to, or ``""``; `alike` is the least share in common.
 
     Parameters

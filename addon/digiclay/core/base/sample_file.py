@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .errors import SceneError
-from .quantity import nearest
+from .quantity import find_nearest_name
 
-__all__ = ["found", "named"]
+__all__ = ["find_file", "list_files"]
 
 
-def named(folder: Path, *kinds: str) -> dict[str, Path]:
+def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
     """Return the samples of a folder by their names: its files that end with one of `kinds`.
 
     Parameters
@@ -24,7 +24,7 @@ def named(folder: Path, *kinds: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
 
 
-def found(word: str, samples: Mapping[str, Path], kind: str) -> Path:
+def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
     """Return the file a word stands for.
 
     Parameters
@@ -46,6 +46,6 @@ def found(word: str, samples: Mapping[str, Path], kind: str) -> Path:
         return Path(word)
     if Path(word).suffix or Path(word).name != word:
         raise SceneError(f"{word}: there is no such file.")
-    close = nearest(word, list(samples))
+    close = find_nearest_name(word, list(samples))
     asked = f" Did you mean {close}?" if close else ""
     raise SceneError(f"{word or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}")

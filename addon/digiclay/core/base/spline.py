@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["inner_slopes", "monotone"]
+__all__ = ["compute_inner_slopes", "interpolate_monotone"]
 
 Floats = NDArray[np.float64]
 
 
-def monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
+def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     """Return monotone cubic splines through some knots at some places.
 
     Parameters
@@ -49,7 +49,7 @@ def monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     return whole
 
 
-def inner_slopes(width: Floats, value: Floats) -> Floats:
+def compute_inner_slopes(width: Floats, value: Floats) -> Floats:
     """Return the slopes at the inner knots, and 0 at both ends, shape of `value`.
 
     Parameters
@@ -75,7 +75,7 @@ def _slopes(width: Floats, value: Floats) -> Floats:
     secant = np.diff(value, axis=0) / width[:, None]
     if len(value) == 2:
         return np.repeat(secant, 2, axis=0)
-    slopes = inner_slopes(width, value)
+    slopes = compute_inner_slopes(width, value)
     slopes[0] = _end(width[0], width[1], secant[0], secant[1])
     slopes[-1] = _end(width[-1], width[-2], secant[-1], secant[-2])
     return slopes

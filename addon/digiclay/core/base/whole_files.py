@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 from .errors import OutputError
 from .unfinished import name_unfinished
 
-__all__ = ["as_json", "open_whole", "read_json", "write_whole"]
+__all__ = ["format_json", "open_whole", "read_json", "write_whole"]
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -62,6 +62,6 @@ def read_json(path: Path) -> dict[str, Any] | None:
     return read if isinstance(read, dict) else None
 
 
-def as_json(value: object) -> bytes:
+def format_json(value: object) -> bytes:
     """Return a value as JSON with a line's end."""
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

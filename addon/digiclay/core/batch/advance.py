@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import DivergenceError
 from ..engine.simulation import find_divergence, simulate_period
-from ..engine.state import State, at_rest
+from ..engine.state import State, make_initial_state
 from ..engine.system import System
 from .broadcasting import list_numbers
 from .finger_paths import Fingers
@@ -36,7 +36,7 @@ def begin(batch: Batch) -> State:
     """Return the state before the sessions."""
     memory = [system.controller.begin() if system.controller else None for system in batch.systems]
     heights = list_numbers([system.cell.actuator.rest_height for system in batch.systems])
-    return at_rest(batch.rows, batch.grid.count, heights, memory)
+    return make_initial_state(batch.rows, batch.grid.count, heights, memory)
 
 
 def advance(batch: Batch, state: State, coming: Fingers | None) -> State:

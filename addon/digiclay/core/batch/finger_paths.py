@@ -18,12 +18,7 @@ from ..model.trajectory import Trajectory
 from .broadcasting import Floats
 
 __all__ = [
-    "Fingers",
-    "FingersPeriod",
-    "SampledPath",
-    "compute_undersides",
-    "extend_fingers",
-    "make_fingers",
+    "Fingers", "FingersPeriod", "SampledPath", "compute_undersides", "extend_fingers", "make_fingers",
     "make_path",
 ]  # fmt: skip
 
@@ -136,7 +131,7 @@ def _trace_finger(system: System, path: Trajectory, first: int, count: int) -> t
 
 
 def compute_undersides(coming: Fingers, period: int, basis: Floats) -> Floats:
-    """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.underside`.
+    """Return the undersides over some cells, shape (p, k, b), m; see `fingertip.compute_underside`.
 
     Parameters
     ----------

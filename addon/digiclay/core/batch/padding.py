@@ -36,7 +36,7 @@ def compute_reach(window: Floats, peak: Floats) -> Disc:
     window : ndarray (6, b) or (6, 1)
         See `touch.Window`.
     peak : ndarray (b,)
-        No pin top is higher than this, m; see `fingertip.reach`.
+        No pin top is higher than this, m; see `fingertip.compute_reach`.
     """
     x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)

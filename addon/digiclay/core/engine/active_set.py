@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..model.layout import Disc, Grid
 from ..model.physics import Cell
-from ..model.touch import FingerPeriod, reached
+from ..model.touch import FingerPeriod, find_reached_disc
 from .state import ActiveSet, Rows, State
 
 __all__ = ["KEPT", "Selection"]
@@ -122,7 +122,7 @@ class Selection:
 
 def _reach(finger: FingerPeriod | None, peak: float) -> Disc | None:
     """Return the disc the finger may touch while no pin is above `peak`, m; None without a finger."""
-    return reached(finger.window, peak) if finger else None
+    return find_reached_disc(finger.window, peak) if finger else None
 
 
 def _wider(disc: Disc | None, margin: float) -> Disc | None:

@@ -16,7 +16,7 @@ from ..model.fingertip import require_one
 from ..model.interfaces import Movement, Truth
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
-from .state import ActiveSet, CellGroup, State, at_rest
+from .state import ActiveSet, CellGroup, State, make_initial_state
 from .system import System
 
 __all__ = ["advance", "begin", "periods", "repeat_period", "step", "trace_fingers"]
@@ -30,7 +30,7 @@ CHUNK = 256
 def begin(system: System) -> State:
     """Return the state before a session."""
     memory = system.controller.begin() if system.controller else None
-    return at_rest(system.rows, system.grid.count, system.cell.actuator.rest_height, memory)
+    return make_initial_state(system.rows, system.grid.count, system.cell.actuator.rest_height, memory)
 
 
 def trace_fingers(system: System, poses: Floats) -> list[FingerPeriod | None]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 
-__all__ = ["ActiveSet", "CellGroup", "Rows", "State", "at_rest"]
+__all__ = ["ActiveSet", "CellGroup", "Rows", "State", "make_initial_state"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -236,7 +236,7 @@ class State(NamedTuple):
         )
 
 
-def at_rest(rows: Rows, count: int, height: Any, memory: Any) -> State:
+def make_initial_state(rows: Rows, count: int, height: Any, memory: Any) -> State:
     """Return the state before a session, or before b sessions: every valve shut.
 
     Parameters

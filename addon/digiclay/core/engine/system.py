@@ -16,7 +16,7 @@ from ..model.physics import Cell
 from .active_set import Selection
 from .state import Rows
 
-__all__ = ["System", "segments"]
+__all__ = ["System", "make_segments"]
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,9 @@ class System:
     rows: Rows
 
 
-def segments(stepper: Stepper, cut: float, period: float, count: int) -> tuple[tuple[Segment, ...], Floats]:
+def make_segments(
+    stepper: Stepper, cut: float, period: float, count: int
+) -> tuple[tuple[Segment, ...], Floats]:
     """Cut a control period into physics steps.
 
     Parameters

@@ -18,7 +18,7 @@ from ..surface.skin_grid import SurfaceGrid, fit_skin
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS
 
-__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_grid"]
+__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_skin_grid"]
 
 #: Kinds of mesh, by name, with what is said of them in the help.
 KINDS: dict[str, str] = {
@@ -55,7 +55,7 @@ class Model(Parameters):
         return self.resolution or (1 if self.skin == "bilinear" else CURVED)
 
 
-def make_grid(formed: Formed, model: Model) -> SurfaceGrid:
+def make_skin_grid(formed: Formed, model: Model) -> SurfaceGrid:
     """Return the skin of a model.
 
     Parameters
@@ -87,7 +87,7 @@ def find_features(formed: Formed, model: Model, finding: Finding) -> list[Featur
         Its skin and resolution.
     finding : Finding
     """
-    return find(make_grid(formed, model), finding)
+    return find(make_skin_grid(formed, model), finding)
 
 
 def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
@@ -108,7 +108,7 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
     ParameterError
         When there would be too many points.
     """
-    skin = make_grid(formed, model)
+    skin = make_skin_grid(formed, model)
     if model.kind == "features":
         found = find(skin, finding)
         if not found:

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
-from .mesh_limits import refusal, refuse_many_triangles, refuse_size
-from .placed_meshes import IDENTITY, joined, nested
+from .mesh_limits import make_refusal, refuse_many_triangles, refuse_size
+from .placed_meshes import IDENTITY, join_meshes, nest_placement
 
 __all__ = ["read"]
 
@@ -63,7 +63,7 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         # Vertices that no triangle uses are copied as well.
         vertices = sum(file.size(one["attributes"]["POSITION"]) for one, _ in parts)
         refuse_many_triangles(path.name, vertices // 3)
-        return joined(((*file.mesh(one), placement) for one, placement in parts), path.name)
+        return join_meshes(((*file.mesh(one), placement) for one, placement in parts), path.name)
     except ParameterError:
         raise
     except RecursionError:
@@ -72,7 +72,7 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         said = f"{error} is missing"
     except (ValueError, TypeError, IndexError, AttributeError, OverflowError, struct.error) as error:
         said = " ".join(str(error).split())[:100]
-    raise refusal(UNREADABLE, path.name, said)
+    raise make_refusal(UNREADABLE, path.name, said)
 
 
 def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
@@ -81,12 +81,12 @@ def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
     if version != 2:
         raise ValueError(f"its version is {version}")
     if length > len(data):
-        raise refusal("must be whole", name, f"{len(data):,} of its {length:,} bytes")
+        raise make_refusal("must be whole", name, f"{len(data):,} of its {length:,} bytes")
     at, chunks = 12, []
     while at + 8 <= length:
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > length:
-            raise refusal("must be whole", name, f"a part of {size:,} bytes that are not there")
+            raise make_refusal("must be whole", name, f"a part of {size:,} bytes that are not there")
         chunks.append((kind, at + 8, size))
         at += 8 + size
     if not chunks or chunks[0][0] != b"JSON":
@@ -132,7 +132,7 @@ class _File:
             if index in seen:
                 raise ValueError(f"node {index} stands in two places")
             seen.add(index)
-            placement = nested(_placement(node), outer)
+            placement = nest_placement(_placement(node), outer)
             waiting += [(child, placement) for child in reversed(node.get("children", []))]
             if "mesh" in node:
                 yield self._entry("meshes", node["mesh"]), placement
@@ -172,7 +172,7 @@ class _File:
         """Return the items of an accessor, (count, numbers an item)."""
         known = self._entry("accessors", accessor)
         if "bufferView" not in known or "sparse" in known:
-            raise refusal(
+            raise make_refusal(
                 "must not hold compressed or sparse vertices", self._path.name, f"accessor {accessor}"
             )
         if known["type"] != kind or known["componentType"] not in NUMBERS:
@@ -186,7 +186,9 @@ class _File:
         if stride < item or (count and offset + (count - 1) * stride + item > length):
             raise ValueError(f"accessor {accessor} reaches beyond its view")
         if start + length > len(buffer):
-            raise refusal("must be whole", self._path.name, f"{len(buffer):,} bytes of {start + length:,}")
+            raise make_refusal(
+                "must be whole", self._path.name, f"{len(buffer):,} bytes of {start + length:,}"
+            )
         items: NDArray[Any] = np.ndarray(
             (count, width), number, buffer, start + offset, (stride, number.itemsize)
         )
@@ -211,12 +213,12 @@ class _File:
         # What begins with a drive or a scheme, an absolute path and a share are no names of files beside.
         name, folder = unquote(uri), self._path.parent.resolve()
         if ":" in name or "\\" in name or "\0" in name or name.startswith("/"):
-            raise refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
+            raise make_refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
         file = (folder / name).resolve()
         if not file.is_relative_to(folder):
-            raise refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
+            raise make_refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
         if not file.is_file():
-            raise refusal("must have its files beside it", self._path.name, f"no {uri[:60]!r}")
+            raise make_refusal("must have its files beside it", self._path.name, f"no {uri[:60]!r}")
         self._bytes += file.stat().st_size
         refuse_size(self._path.name, self._bytes)
         return file.read_bytes()

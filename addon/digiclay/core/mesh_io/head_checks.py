@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .mesh_limits import refusal, refuse_many_triangles
+from .mesh_limits import make_refusal, refuse_many_triangles
 
 __all__ = ["check_off", "check_ply", "check_stl", "stl_is_text"]
 
@@ -40,7 +40,7 @@ def check_stl(data: bytes, name: str) -> None:
         lower = data.lower()
         begun, ended = lower.count(b"facet normal"), lower.count(b"endfacet")
         if begun != ended or not lower[lower.rstrip().rfind(b"\n") + 1 :].strip().startswith(b"endsolid"):
-            raise refusal(
+            raise make_refusal(
                 WHOLE, name, f"{begun:,} facets begin, {ended:,} end, and the last line no endsolid"
             )
         refuse_many_triangles(name, ended)
@@ -48,7 +48,7 @@ def check_stl(data: bytes, name: str) -> None:
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
     if len(data) < 84 + 50 * count:
         there = max(0, (len(data) - 84) // 50)
-        raise refusal(WHOLE, name, f"{there:,} of its {count:,} triangles")
+        raise make_refusal(WHOLE, name, f"{there:,} of its {count:,} triangles")
     refuse_many_triangles(name, count)
 
 
@@ -64,7 +64,7 @@ def check_ply(data: bytes, name: str) -> None:
     """
     end = re.search(rb"^end_header[ \t]*\r?$\n?", data[:LONGEST_HEAD], re.MULTILINE)
     if not data.startswith(b"ply") or end is None:
-        raise refusal("must be a PLY file that can be read", name, "no head, or no end of it")
+        raise make_refusal("must be a PLY file that can be read", name, "no head, or no end of it")
     lines = data[: end.start()].decode("ascii", errors="replace").splitlines()
     text = any(line.split()[:2] == ["format", "ascii"] for line in lines)
     elements: list[tuple[str, int, int]] = []
@@ -79,20 +79,24 @@ def check_ply(data: bytes, name: str) -> None:
                 own = 2 if text else SIZES[words[2] if words[1] == "list" else words[1]]
                 elements[-1] = (kind, count, size + own)
         except (ValueError, IndexError, KeyError):
-            raise refusal("must be a PLY file that can be read", name, f"{line[:60]!r} in its head") from None
+            raise make_refusal(
+                "must be a PLY file that can be read", name, f"{line[:60]!r} in its head"
+            ) from None
     needed, rest = 0, len(data) - end.end() + 1  # the last line of a text may have no end
     for kind, count, size in elements:
         if count < 0 or (count and not size):
-            raise refusal("must be a PLY file that can be read", name, f"{count} {kind} without properties")
+            raise make_refusal(
+                "must be a PLY file that can be read", name, f"{count} {kind} without properties"
+            )
         needed += count * size
         if kind == "face":
             refuse_many_triangles(name, count)
     if needed > rest:
-        raise refusal(WHOLE, name, f"{rest:,} bytes where its elements take at least {needed:,}")
+        raise make_refusal(WHOLE, name, f"{rest:,} bytes where its elements take at least {needed:,}")
     if text:
         wanted, there = sum(count for _, count, _ in elements), len(data[end.end() :].split(b"\n"))
         if there < wanted:
-            raise refusal(WHOLE, name, f"{there:,} of its {wanted:,} lines")
+            raise make_refusal(WHOLE, name, f"{there:,} of its {wanted:,} lines")
 
 
 def check_off(data: bytes, name: str) -> None:
@@ -111,10 +115,10 @@ def check_off(data: bytes, name: str) -> None:
     try:
         vertices, faces = int(head[0]), int(head[1])
     except (IndexError, ValueError):
-        raise refusal(
+        raise make_refusal(
             "must be an OFF file that can be read", name, "no counts of vertices and faces"
         ) from None
     refuse_many_triangles(name, max(faces, vertices // 3))
     there = len(lines) - (2 if len(lines[0].split()) == 1 else 1)
     if there < vertices + faces:
-        raise refusal(WHOLE, name, f"{there:,} of its {vertices + faces:,} lines")
+        raise make_refusal(WHOLE, name, f"{there:,} of its {vertices + faces:,} lines")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..base.errors import ParameterError
 
-__all__ = ["MOST_BYTES", "MOST_TRIANGLES", "refusal", "refuse_many_triangles", "refuse_size"]
+__all__ = ["MOST_BYTES", "MOST_TRIANGLES", "make_refusal", "refuse_many_triangles", "refuse_size"]
 
 #: Most triangles of a mesh: as many as a bed may have cells. They take some 5 GB while they are laid onto it.
 MOST_TRIANGLES = 20_000_000
@@ -13,7 +13,7 @@ MOST_BYTES = 2_000_000_000
 SMALLER = "Make the mesh coarser first."
 
 
-def refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterError:
+def make_refusal(rule: str, name: str, said: str, hint: str = "") -> ParameterError:
     """Return the error of an unusable mesh: the rule, the file, and its content.
 
     Parameters
@@ -44,7 +44,7 @@ def refuse_many_triangles(name: str, count: int) -> None:
         rule = f"must have at most {MOST_TRIANGLES // 1_000_000} million triangles"
         # Copies of copies can come to a number of any length.
         shown = f"{count:,}" if count < 10**15 else "more than 10^15"
-        raise refusal(rule, name, shown, SMALLER)
+        raise make_refusal(rule, name, shown, SMALLER)
 
 
 def refuse_size(name: str, size: int, what: str = "") -> None:
@@ -61,4 +61,4 @@ def refuse_size(name: str, size: int, what: str = "") -> None:
     """
     if size > MOST_BYTES:
         rule = f"must have at most {MOST_BYTES / 1e9:g} GB{' unpacked' if what else ''}"
-        raise refusal(rule, name, f"{what} {size / 1e9:.3g} GB".strip(), SMALLER)
+        raise make_refusal(rule, name, f"{what} {size / 1e9:.3g} GB".strip(), SMALLER)

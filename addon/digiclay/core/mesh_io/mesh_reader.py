@@ -18,7 +18,7 @@ from . import gltf_reader, obj_reader, threemf_reader
 from .head_checks import check_off, check_ply, check_stl, stl_is_text
 from .mesh_limits import refuse_size
 
-__all__ = ["MESHES", "Read", "read", "reader"]
+__all__ = ["MESHES", "Read", "find_library", "read"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -51,7 +51,7 @@ class Read(NamedTuple):
     up: str
 
 
-def reader(kind: str) -> str:
+def find_library(kind: str) -> str:
     """Return the library that reads a format, ``""`` where none is needed."""
     return "trimesh" if kind in CHECKS else ""
 

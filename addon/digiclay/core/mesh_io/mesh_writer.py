@@ -11,7 +11,7 @@ from ..base.whole_files import open_whole
 from ..surface.body import Body
 from . import glb_writer, obj_writer, ply_writer, stl_writer, threemf_writer
 
-__all__ = ["FORMATS", "UNITS", "known_format", "suffix", "write"]
+__all__ = ["FORMATS", "UNITS", "find_format", "find_suffix", "write"]
 
 #: File formats, by name, with what is said of them in the help.
 FORMATS: dict[str, str] = {
@@ -35,7 +35,7 @@ WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
 UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
 
 
-def known_format(name: str) -> str:
+def find_format(name: str) -> str:
     """Return the format called `name` (``"stl"``, ``".STL"``) as a key of `FORMATS`.
 
     Raises
@@ -49,7 +49,7 @@ def known_format(name: str) -> str:
     return key
 
 
-def suffix(kind: str) -> str:
+def find_suffix(kind: str) -> str:
     """Return how the name of a file of a format ends; text and binary STL do not share a name."""
     return ".ascii.stl" if kind == "stl_ascii" else f".{kind}"
 
@@ -82,7 +82,7 @@ def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str 
         On an unknown unit.
     """
     target = Path(path)
-    writer = WRITERS[known_format(target.suffix if kind is None else kind)]
+    writer = WRITERS[find_format(target.suffix if kind is None else kind)]
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
     if not any(len(body.faces) for body in bodies):

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh_limits import refusal, refuse_many_triangles
+from .mesh_limits import make_refusal, refuse_many_triangles
 
 __all__ = ["read"]
 
@@ -58,7 +58,7 @@ def read(data: bytes, name: str) -> tuple[Floats, Indices]:
     places, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
     if faces.size and (faces.min() < 0 or faces.max() >= len(places)):
         rule = "must have faces whose corners are among its vertices"
-        raise refusal(rule, name, f"vertex {faces.max() + 1} of {len(places)}", "Is the file cut off?")
+        raise make_refusal(rule, name, f"vertex {faces.max() + 1} of {len(places)}", "Is the file cut off?")
     _refuse_cut(data, name, places, faces)
     return places, faces
 
@@ -110,7 +110,7 @@ def _taken(lines: list[bytes], first: int, name: str, vertices: array[float], co
                 _add_fan(words[1:], len(vertices) // 3, corners)
         except (ValueError, OverflowError) as error:
             said = f"line {number}: {' '.join(str(error).split())[:80]}"
-            raise refusal(UNREADABLE, name, said) from None
+            raise make_refusal(UNREADABLE, name, said) from None
 
 
 def _add_fan(words: list[bytes], count: int, corners: array[int]) -> None:
@@ -133,7 +133,9 @@ def _refuse_cut(data: bytes, name: str, places: Floats, faces: Indices) -> None:
     # All corners of a face are given alike, with or without texture and normal.
     ways = {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
     if last in ([b"v"], [b"f"]) or (last[:1] == [b"f"] and (len(last) < 4 or len(ways) > 1)):
-        raise refusal(CUT, name, f"{b' '.join(last)[:40].decode(errors='replace')!r}")
+        raise make_refusal(CUT, name, f"{b' '.join(last)[:40].decode(errors='replace')!r}")
     unused = len(places) - np.unique(faces).size
     if unused and len(faces):
-        raise refusal(CUT, name, f"no end of line, and {unused:,} of {len(places):,} vertices without a face")
+        raise make_refusal(
+            CUT, name, f"no end of line, and {unused:,} of {len(places):,} vertices without a face"
+        )

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh_limits import refusal
+from .mesh_limits import make_refusal
 
-__all__ = ["IDENTITY", "joined", "nested"]
+__all__ = ["IDENTITY", "join_meshes", "nest_placement"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -18,7 +18,7 @@ Indices = NDArray[np.int64]
 IDENTITY: Floats = np.vstack([np.eye(3), np.zeros(3)])
 
 
-def nested(inner: Floats, outer: Floats) -> Floats:
+def nest_placement(inner: Floats, outer: Floats) -> Floats:
     """Return the placement, (4, 3), of what is placed in something that is placed itself.
 
     Parameters
@@ -31,7 +31,7 @@ def nested(inner: Floats, outer: Floats) -> Floats:
     return placement
 
 
-def joined(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple[Floats, Indices]:
+def join_meshes(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple[Floats, Indices]:
     """Return all vertices (v, 3) and triangles (f, 3) of meshes, each given with its placement.
 
     Triangles of a mesh that is mirrored are turned, so that outside stays outside.
@@ -52,7 +52,7 @@ def joined(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple
     for vertices, faces, placement in meshes:
         if faces.size and (faces.min() < 0 or faces.max() >= len(vertices)):
             rule = "must have faces whose corners are among its vertices"
-            raise refusal(rule, name, f"corner {faces.max()} of {len(vertices)}")
+            raise make_refusal(rule, name, f"corner {faces.max()} of {len(vertices)}")
         mirrored = np.linalg.det(placement[:3]) < 0.0
         places.append(vertices @ placement[:3] + placement[3])
         triangles.append((faces[:, ::-1] if mirrored else faces) + first)

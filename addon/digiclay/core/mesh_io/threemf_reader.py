@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.npz import BROKEN_ZIP
-from .mesh_limits import refusal, refuse_many_triangles, refuse_size
-from .placed_meshes import IDENTITY, joined, nested
+from .mesh_limits import make_refusal, refuse_many_triangles, refuse_size
+from .placed_meshes import IDENTITY, join_meshes, nest_placement
 
 __all__ = ["UNITS", "read"]
 
@@ -98,7 +98,7 @@ def read(path: Path) -> tuple[Floats, Indices, float]:
                 known |= named
     except (*BROKEN_ZIP, EOFError, KeyError) as error:
         said = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
-        raise refusal(UNREADABLE, name, said) from None
+        raise make_refusal(UNREADABLE, name, said) from None
     return *_placed(model, name), model.unit
 
 
@@ -112,7 +112,7 @@ def _model_part(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
 
     _parse(archive, "_rels/.rels", name, model, start)
     if not found:
-        raise refusal(UNREADABLE, name, "its relations name no model")
+        raise make_refusal(UNREADABLE, name, "its relations name no model")
     return found[0]
 
 
@@ -127,11 +127,11 @@ def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start:
     model.unpacked += entry.file_size  # no more than that is unpacked, whatever there is
     refuse_size(name, model.unpacked, part)
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise refusal("must be stored or deflated, as 3MF has it", name, part)
+        raise make_refusal("must be stored or deflated, as 3MF has it", name, part)
     parser = expat.ParserCreate(namespace_separator=" ")
 
     def refuse(*_: object) -> None:
-        raise refusal("must not have a document type (<!DOCTYPE ...>)", name, part)
+        raise make_refusal("must not have a document type (<!DOCTYPE ...>)", name, part)
 
     parser.StartDoctypeDeclHandler = refuse
     parser.StartElementHandler = start
@@ -143,10 +143,10 @@ def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start:
                 fed += len(piece)
                 if fed - max(parser.CurrentByteIndex, 0) > LONGEST_TAG:
                     rule = f"must have tags of at most {LONGEST_TAG // 2**20} MB"
-                    raise refusal(rule, name, f"{part}, byte {parser.CurrentByteIndex}")
+                    raise make_refusal(rule, name, f"{part}, byte {parser.CurrentByteIndex}")
             parser.Parse(b"", True)
     except expat.ExpatError as error:
-        raise refusal(UNREADABLE, name, f"{part}: {error}") from None
+        raise make_refusal(UNREADABLE, name, f"{part}: {error}") from None
 
 
 def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root: str) -> set[str]:
@@ -179,7 +179,9 @@ def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root
         if kind in ("object", "component", "item"):
             model.counted += 1
             if model.counted > MOST_PARTS:
-                raise refusal(f"must have at most {MOST_PARTS:,} objects, components and items", name, "more")
+                raise make_refusal(
+                    f"must have at most {MOST_PARTS:,} objects, components and items", name, "more"
+                )
         try:
             taken(kind, given)
         except KeyError as error:
@@ -188,7 +190,7 @@ def _take_in(archive: zipfile.ZipFile, part: str, name: str, model: _Model, root
             said = f"{kind}: {error}"[:100]
         else:
             return
-        raise refusal(UNREADABLE, name, f"{part}, {said}")
+        raise make_refusal(UNREADABLE, name, f"{part}, {said}")
 
     _parse(archive, part, name, model, start)
     refuse_many_triangles(name, sum(len(one.triangles) // 3 for one in model.objects.values()))
@@ -214,8 +216,8 @@ def _placed(model: _Model, name: str) -> tuple[Floats, Indices]:
     refuse_many_triangles(name, sum(extent.triangles for extent in extents))
     meshes = sum(extent.meshes for extent in extents)
     if meshes > MOST_PARTS:
-        raise refusal(f"must place at most {MOST_PARTS:,} meshes", name, f"{meshes:,}")
-    return joined(_meshes(model, known), name)
+        raise make_refusal(f"must place at most {MOST_PARTS:,} meshes", name, f"{meshes:,}")
+    return join_meshes(_meshes(model, known), name)
 
 
 def _meshes(model: _Model, known: dict[Key, _Extent]) -> Iterator[tuple[Floats, Indices, Floats]]:
@@ -225,7 +227,7 @@ def _meshes(model: _Model, known: dict[Key, _Extent]) -> Iterator[tuple[Floats, 
         key, placement = waiting.pop()
         if known[key].meshes:
             one = model.objects[key]
-            waiting += [(inner, nested(own, placement)) for inner, own in reversed(one.components)]
+            waiting += [(inner, nest_placement(own, placement)) for inner, own in reversed(one.components)]
             if one.triangles:
                 corners = np.array(one.triangles, np.int64).reshape(-1, 3)
                 yield np.array(one.vertices).reshape(-1, 3), corners, placement
@@ -236,14 +238,14 @@ def _extent(model: _Model, key: Key, name: str, known: dict[Key, _Extent], depth
     if key not in known:
         one = model.objects.get(key)
         if one is None:
-            raise refusal("must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}")
+            raise make_refusal("must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}")
         below = DEEPEST + 1
         if depth <= DEEPEST:
             inside = [_extent(model, inner, name, known, depth + 1) for inner, _ in one.components]
             below = 1 + max((extent.depth for extent in inside), default=-1)
         if below > DEEPEST:
             rule = f"must have components at most {DEEPEST} deep, and none in itself"
-            raise refusal(rule, name, f"object {key[1]}")
+            raise make_refusal(rule, name, f"object {key[1]}")
         own = len(one.triangles) // 3
         triangles = own + sum(extent.triangles for extent in inside)
         meshes = (own > 0) + sum(extent.meshes for extent in inside)

@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.modes import Mode
 
-__all__ = ["AWAY", "CellSums", "in_contact", "lag", "ridge_errors", "sum_cells", "surface_under"]
+__all__ = [
+    "AWAY", "CellSums", "find_contact_rows", "measure_lag", "measure_ridge_errors", "measure_surface_under",
+    "sum_cells",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -22,7 +25,7 @@ AWAY = 12e-3
 AT_ONCE = 2**17
 
 
-def in_contact(total_force: ArrayLike) -> Rows:
+def find_contact_rows(total_force: ArrayLike) -> Rows:
     """Return which rows have contact, shape (t,), from the total force in N."""
     touching: Rows = np.asarray(total_force, dtype=np.float64) > 0.0
     return touching
@@ -58,7 +61,7 @@ class CellSums:
     @property
     def touching(self) -> Rows:
         """Which rows have contact, shape (t,)."""
-        return in_contact(self.total)
+        return find_contact_rows(self.total)
 
     @property
     def shaping(self) -> Rows:
@@ -85,7 +88,7 @@ def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
     return CellSums(total, x, y, lifted, force.max(axis=1), following, height[0], height[-1])
 
 
-def lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
+def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return how far the blister is behind the finger, in the rows in contact.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the fingertip's lowest
@@ -109,7 +112,7 @@ def lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     return distance
 
 
-def surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
+def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return how far the surface under the finger stands above its lowest point, in the rows in contact.
 
     ``d = sum F_j H_j / sum F_j - z``: a cell counts by the force on it.
@@ -131,7 +134,7 @@ def surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
     return above
 
 
-def ridge_errors(
+def measure_ridge_errors(
     position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Rows, away: float = AWAY
 ) -> Floats:
     """Return how far the cells the finger has passed over stand above its path at the end.

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .finger_path import Rows, in_contact
-from .signal import mean, overshoot, settling_time, weights
+from .finger_path import Rows, find_contact_rows
+from .signal import compute_mean, compute_weights, measure_overshoot, measure_settling_time
 
-__all__ = ["BAND", "contact_loss_share", "first_touch", "rfd", "touchdown"]
+__all__ = ["BAND", "compute_contact_loss_share", "compute_rfd", "find_first_touch", "measure_touchdown"]
 
 Floats = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 BAND = 0.1
 
 
-def rfd(
+def compute_rfd(
     time: ArrayLike, total_force: ArrayLike, set_point: ArrayLike, rows: Rows | None = None
 ) -> float | None:
     """Return the reference force deviation, N.
@@ -33,7 +33,7 @@ def rfd(
         Total force asked for, N; rows in which it is NaN are left out.
     rows : ndarray of bool, shape (t,), optional
         Rows to judge; those in contact by default. They include touching down, and leave out
-        the gaps when the finger is lost: read it next to `contact_loss_share`.
+        the gaps when the finger is lost: read it next to `compute_contact_loss_share`.
 
     Returns
     -------
@@ -42,12 +42,12 @@ def rfd(
     """
     force = np.asarray(total_force, dtype=np.float64)
     wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
-    chosen = (in_contact(force) if rows is None else rows) & ~np.isnan(wanted)
-    square = mean((force - wanted)[chosen] ** 2, weights(time)[chosen])
+    chosen = (find_contact_rows(force) if rows is None else rows) & ~np.isnan(wanted)
+    square = compute_mean((force - wanted)[chosen] ** 2, compute_weights(time)[chosen])
     return None if square is None else float(np.sqrt(square))
 
 
-def contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
+def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
     """Return the share of the time from first to last contact without contact.
 
     A pause the session makes on purpose, with the finger lifted, counts as well.
@@ -64,16 +64,16 @@ def contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
     float or None
         In [0, 1); None when the finger never touches.
     """
-    touching = in_contact(total_force)
+    touching = find_contact_rows(total_force)
     if not np.any(touching):
         return None
     first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
-    return mean(1.0 - touching[first:after], weights(time)[first:after])
+    return compute_mean(1.0 - touching[first:after], compute_weights(time)[first:after])
 
 
-def first_touch(total_force: ArrayLike) -> slice:
+def find_first_touch(total_force: ArrayLike) -> slice:
     """Return the rows from the last one before the first contact to the last one of that contact."""
-    touching = in_contact(total_force)
+    touching = find_contact_rows(total_force)
     if not np.any(touching):
         return slice(0, 0)
     start = int(np.argmax(touching))
@@ -81,7 +81,9 @@ def first_touch(total_force: ArrayLike) -> slice:
     return slice(max(0, start - 1), start + int(gone[0]) if gone.size else len(touching))
 
 
-def touchdown(time: Floats, total_force: Floats, set_point: Floats) -> tuple[float | None, float | None]:
+def measure_touchdown(
+    time: Floats, total_force: Floats, set_point: Floats
+) -> tuple[float | None, float | None]:
     """Return overshoot and settling time of the force at first touch; None without a set point.
 
     Parameters
@@ -98,14 +100,14 @@ def touchdown(time: Floats, total_force: Floats, set_point: Floats) -> tuple[flo
     settled : float or None
         s.
     """
-    first = first_touch(total_force)
+    first = find_first_touch(total_force)
     if first.stop == first.start:
         return None, None
     beyond, wanted = total_force[first] - set_point[first], set_point[first]
     known = ~np.isnan(wanted)
-    typical = mean(wanted[known], weights(time[first])[known])
+    typical = compute_mean(wanted[known], compute_weights(time[first])[known])
     if typical is None:
         return None, None
     # Without contact the force is below its set point by all of it.
-    passed = overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
-    return passed, settling_time(time[first], beyond / wanted, 0.0, BAND)
+    passed = measure_overshoot(np.concatenate([[-typical], beyond[known]]), 0.0)
+    return passed, measure_settling_time(time[first], beyond / wanted, 0.0, BAND)

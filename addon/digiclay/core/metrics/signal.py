@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["amplitude", "deviation", "frequency", "mean", "overshoot", "settling_time", "weights"]
+__all__ = [
+    "compute_deviation", "compute_mean", "compute_weights", "measure_amplitude", "measure_frequency",
+    "measure_overshoot", "measure_settling_time",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
 
-def weights(time: ArrayLike) -> Floats:
+def compute_weights(time: ArrayLike) -> Floats:
     """Return the time each row stands for, s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half of it at the ends.
 
     Parameters
@@ -31,7 +34,7 @@ def weights(time: ArrayLike) -> Floats:
     return each
 
 
-def mean(values: Floats, weight: Floats) -> float | None:
+def compute_mean(values: Floats, weight: Floats) -> float | None:
     """Return the weighted mean, or None when there is nothing to average.
 
     Parameters
@@ -42,21 +45,21 @@ def mean(values: Floats, weight: Floats) -> float | None:
     return float(np.sum(weight * values)) / total if total > 0.0 else None
 
 
-def deviation(values: Floats, weight: Floats) -> float | None:
+def compute_deviation(values: Floats, weight: Floats) -> float | None:
     """Return the weighted standard deviation about the weighted mean, or None without any rows.
 
     Parameters
     ----------
     values, weight : ndarray (t,)
     """
-    middle = mean(values, weight)
+    middle = compute_mean(values, weight)
     if middle is None:
         return None
-    square = mean((values - middle) ** 2, weight)
+    square = compute_mean((values - middle) ** 2, weight)
     return None if square is None else float(np.sqrt(square))
 
 
-def overshoot(values: ArrayLike, target: float) -> float | None:
+def measure_overshoot(values: ArrayLike, target: float) -> float | None:
     """Return how far a signal goes beyond its target, as a share of its way there.
 
     ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; a falling signal is judged alike.
@@ -79,7 +82,7 @@ def overshoot(values: ArrayLike, target: float) -> float | None:
     return max(0.0, float(np.max((signal - target) / way)))
 
 
-def settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
+def measure_settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
     """Return the time after which a signal stays within a band about its target, s.
 
     From the first row to the first one from which on ``|y_i - y_target| <= band`` to the end.
@@ -103,12 +106,12 @@ def settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float
     return float(moment[outside[-1] + 1] - moment[0]) if outside.size else 0.0
 
 
-def amplitude(values: ArrayLike) -> float:
+def measure_amplitude(values: ArrayLike) -> float:
     """Return half the distance from a signal's lowest to its highest value."""
     return 0.5 * float(np.ptp(np.asarray(values, dtype=np.float64)))
 
 
-def frequency(time: ArrayLike, values: ArrayLike) -> float | None:
+def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
     """Return how often a signal rises through its mean, Hz; None when it does so less than three times.
 
     Parameters

@@ -16,21 +16,28 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.errors import ParameterError
 from ..model.set_point import SetPoint, find_set_point
 from ..surface.skin_mesh import find_grid_shape
-from .finger_path import CellSums, in_contact, lag, ridge_errors, sum_cells, surface_under
-from .force import contact_loss_share, first_touch, rfd, touchdown
-from .signal import deviation, mean, weights
+from .finger_path import (
+    CellSums,
+    find_contact_rows,
+    measure_lag,
+    measure_ridge_errors,
+    measure_surface_under,
+    sum_cells,
+)
+from .force import compute_contact_loss_share, compute_rfd, find_first_touch, measure_touchdown
+from .signal import compute_deviation, compute_mean, compute_weights
 
 __all__ = [
     "METRICS",
-    "cell_area",
+    "compute_cell_area",
+    "compute_contact_loss_share",
     "compute_metrics",
     "compute_metrics_from_sums",
-    "contact_loss_share",
-    "first_touch",
-    "in_contact",
-    "lag",
-    "rfd",
-    "weights",
+    "compute_rfd",
+    "compute_weights",
+    "find_contact_rows",
+    "find_first_touch",
+    "measure_lag",
 ]
 
 Floats = NDArray[np.float64]
@@ -72,7 +79,7 @@ METRICS: dict[str, tuple[str, str]] = {
 }
 
 
-def cell_area(position: ArrayLike) -> float | None:
+def compute_cell_area(position: ArrayLike) -> float | None:
     """Return the area of the bed one cell stands for, m²: distance in a row times distance of the rows.
 
     Parameters
@@ -152,32 +159,32 @@ def compute_metrics_from_sums(
     dict
         See `compute_metrics`.
     """
-    total, weight, felt, rows = sums.total, weights(time), sums.touching, sums.shaping
+    total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
     # A finger straight above its blister is a rounding error away from it, not 1e-17 m.
-    behind = np.round(lag(sums, fingertip), 12)
-    above = surface_under(sums, fingertip)
-    ridge = ridge_errors(position[near], sums.last[near], fingertip, rows)
+    behind = np.round(measure_lag(sums, fingertip), 12)
+    above = measure_surface_under(sums, fingertip)
+    ridge = measure_ridge_errors(position[near], sums.last[near], fingertip, rows)
     each = np.ones(len(ridge))
     wanted = find_set_point(set_point, sums.following)
-    beyond, settled = touchdown(time, total, wanted)
-    formed, area = sums.last - sums.first, cell_area(position)
+    beyond, settled = measure_touchdown(time, total, wanted)
+    formed, area = sums.last - sums.first, compute_cell_area(position)
     found: dict[str, float | None] = {
         "duration": float(time[-1] - time[0]),
         "set_point": _typical(set_point, wanted[rows], weight[rows]),
-        "rfd": rfd(time, total, wanted),
-        "rfd_shaping": rfd(time, total, wanted, rows),
-        "rfd_session": rfd(time, total, wanted, np.ones(len(time), dtype=bool)),
-        "contact_share": mean(felt.astype(np.float64), weight),
-        "contact_loss_share": contact_loss_share(time, total),
-        "lag_mean": mean(behind, weight[felt]),
+        "rfd": compute_rfd(time, total, wanted),
+        "rfd_shaping": compute_rfd(time, total, wanted, rows),
+        "rfd_session": compute_rfd(time, total, wanted, np.ones(len(time), dtype=bool)),
+        "contact_share": compute_mean(felt.astype(np.float64), weight),
+        "contact_loss_share": compute_contact_loss_share(time, total),
+        "lag_mean": compute_mean(behind, weight[felt]),
         "lag_max": float(behind.max()) if len(behind) else None,
-        "force_deviation": deviation(total[rows], weight[rows]),
+        "force_deviation": compute_deviation(total[rows], weight[rows]),
         "force_overshoot": beyond,
         "settling_time": settled,
-        "height_deviation": deviation(above[rows[felt]], weight[rows]),
-        "ridge_offset": mean(ridge, each),
+        "height_deviation": compute_deviation(above[rows[felt]], weight[rows]),
+        "ridge_offset": compute_mean(ridge, each),
         "ridge_error": float(np.sqrt(np.mean(ridge**2))) if len(ridge) else None,
-        "ridge_unevenness": deviation(ridge, each),
+        "ridge_unevenness": compute_deviation(ridge, each),
         "max_cell_force": float(sums.strongest.max()),
         "max_total_force": float(total.max()),
         "lowest": float(sums.last.min()),
@@ -195,4 +202,4 @@ def _typical(set_point: SetPoint | None, wanted: Floats, weight: Floats) -> floa
     """Return a set point as one number, N: its mean in the rows that shape, if it changes."""
     if set_point is None:
         return None
-    return mean(wanted, weight) if set_point.per_cell else set_point.force
+    return compute_mean(wanted, weight) if set_point.per_cell else set_point.force

@@ -13,7 +13,7 @@ from ..base.quantity import Parameters, quantity
 from .fluid import Fluid
 from .valve import Orifice
 
-__all__ = ["Conduit", "OrificeAndConduit", "in_series"]
+__all__ = ["Conduit", "OrificeAndConduit", "connect_in_series"]
 
 Floats = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class OrificeAndConduit:
         return self.conductance(opening, drop) * drop
 
 
-def in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
+def connect_in_series(valve: Orifice, conduit: Conduit, fluid: Fluid) -> OrificeAndConduit:
     """Put a conduit behind a valve.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["Delay", "Queue", "queue"]
+__all__ = ["Delay", "Queue", "split_delay"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Queue:
         return 1 if self.cut > 0.0 and time >= self.cut * (1.0 - 1e-12) else 0
 
 
-def queue(delay: Delay, period: float) -> Queue:
+def split_delay(delay: Delay, period: float) -> Queue:
     """Split a dead time into whole control periods and the cut inside one.
 
     Parameters

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from .fingertip import Fingertip, forms, underside
+from .fingertip import Fingertip, compute_forms, compute_underside
 
 __all__ = ["MOST_FORCE", "MOST_INDENTATION", "describe_excess", "find_largest_indentation"]
 
@@ -43,7 +43,9 @@ def find_largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]
         rows = deepest_first[start : start + ROWS]
         if most[rows[0]] <= found:
             break
-        under = underside(*forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis)
+        under = compute_underside(
+            *compute_forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis
+        )
         part = np.ix_(rows, cells)
         depth = np.max(height[part] - under, where=felt[part], initial=0.0)
         found = max(found, float(depth))

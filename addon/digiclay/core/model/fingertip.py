@@ -22,12 +22,12 @@ from ..base.quantity import Parameters, quantity
 __all__ = [
     "LEVEL",
     "Fingertip",
-    "forms",
-    "matrices",
-    "reach",
-    "reaches",
+    "compute_forms",
+    "compute_reach",
+    "compute_reaches",
+    "compute_underside",
+    "make_matrices",
     "require_one",
-    "underside",
     "wrap_one",
 ]
 
@@ -97,7 +97,7 @@ class Fingertip(Parameters):
             the tilt of the mid surface t_x, t_y; the half thickness over the center, m; the
             smaller eigenvalue of S, 1/m².
         """
-        rotation = matrices(poses[:, 3:])
+        rotation = make_matrices(poses[:, 3:])
         axes = np.array([self.length, self.width, self.height])
         inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
         form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
@@ -113,8 +113,8 @@ class Fingertip(Parameters):
         return outline
 
 
-def reaches(outline: Floats) -> Floats:
-    """Return what `reach` needs of each outline (..., 10), shape (..., 3): base, m; tilt; bend, 1/m."""
+def compute_reaches(outline: Floats) -> Floats:
+    """Return what `compute_reach` needs of each outline (..., 10), (..., 3): base, m; tilt; bend, 1/m."""
     half = outline[..., 8]
     base = outline[..., 2] - half * (_ROOT + _SLOPE * JOIN)
     return np.stack(
@@ -122,7 +122,7 @@ def reaches(outline: Floats) -> Floats:
     )
 
 
-def reach(base: float, tilt: float, bend: float, peak: float) -> float:
+def compute_reach(base: float, tilt: float, bend: float, peak: float) -> float:
     """Return a radius about the center beyond which the underside is above `peak`, m.
 
     A paraboloid that nowhere lies above the underside gives a bound for every tilt; it
@@ -131,7 +131,7 @@ def reach(base: float, tilt: float, bend: float, peak: float) -> float:
     Parameters
     ----------
     base, tilt, bend : float
-        From `reaches`.
+        From `compute_reaches`.
     peak : float
         No pin top is higher than this, m.
 
@@ -144,8 +144,8 @@ def reach(base: float, tilt: float, bend: float, peak: float) -> float:
     return (tilt + math.sqrt(square)) / bend if square > 0.0 else -1.0
 
 
-def forms(outline: Floats) -> tuple[Floats, Floats]:
-    """Return what `underside` needs as quadratic forms of the position.
+def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
+    """Return what `compute_underside` needs as quadratic forms of the position.
 
     With r² the squared reduced radius, t the half thickness over the center, and
     ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
@@ -177,14 +177,14 @@ def forms(outline: Floats) -> tuple[Floats, Floats]:
     return rows, np.stack([join, np.sqrt(join)], -3)
 
 
-def underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
+def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     """Return the height of the finger's underside, shape (..., p, k), m.
 
     Parameters
     ----------
     forms : ndarray (..., 2 p, 6)
     join : ndarray (..., 2, p, 1)
-        From `forms`.
+        From `compute_forms`.
     basis : ndarray (6, k)
         Rows 1, x, y, x², x y, y² of the places asked for.
     """
@@ -195,7 +195,7 @@ def underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
 
 
 def join_surfaces(inner: Floats, tangent: Floats, least: Floats, root: Floats) -> Floats:
-    """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `forms`.
+    """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `compute_forms`.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def _smaller_eigenvalue(matrices: Floats) -> Floats:
     return smaller
 
 
-def matrices(quaternions: Floats) -> Floats:
+def make_matrices(quaternions: Floats) -> Floats:
     """Return rotation matrices (k, 3, 3) of quaternions (k, 4), w first."""
     w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
     return np.moveaxis(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "grid"]
+__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "make_grid"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -163,7 +163,7 @@ class Grid:
         return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
 
-def grid(layout: Layout) -> Grid:
+def make_grid(layout: Layout) -> Grid:
     """Lay out the cells of a bed, centered on the origin.
 
     Returns

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from .actuator import Actuator
 from .interfaces import Flow, Lag
 from .supply import Supply
-from .touch import Touch, force
+from .touch import Touch, compute_force
 
-__all__ = ["GAUSS", "Cell", "Speeds", "felt", "rates", "speeds"]
+__all__ = ["GAUSS", "Cell", "Speeds", "compute_rates", "find_contact_force", "find_speeds"]
 
 Floats = NDArray[np.float64]
 
@@ -88,14 +88,14 @@ class Speeds:
         return lowest, height + time * self.rise
 
 
-def speeds(cell: Cell) -> Speeds:
+def find_speeds(cell: Cell) -> Speeds:
     """Work out how fast a pin without load goes at most."""
     wide = np.array([-1.0, 1.0])
     ways = cell.flow.flow(wide, cell.supply.pressure(wide)) / cell.actuator.area
     return Speeds(min(float(ways.min()), 0.0), max(float(ways.max()), 0.0))
 
 
-def felt(cell: Cell, y: Floats, under: Floats) -> Floats:
+def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
     """Return the force on the first k cells of a block, shape (k,), N.
 
     Parameters
@@ -108,10 +108,10 @@ def felt(cell: Cell, y: Floats, under: Floats) -> Floats:
     """
     if cell.touch is None:
         return np.empty(0)
-    return force(cell.touch, y[0, : under.size], under, y[cell.pulp_rows, : under.size])
+    return compute_force(cell.touch, y[0, : under.size], under, y[cell.pulp_rows, : under.size])
 
 
-def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
+def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     """Return dy/dt of a block of cells.
 
     Parameters
@@ -128,7 +128,7 @@ def rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floats:
     pressure = np.zeros_like(height)
     change = np.zeros_like(y)
     if cell.touch and under.size:
-        pressure[: under.size] = cell.actuator.pressure(felt(cell, y, under))
+        pressure[: under.size] = cell.actuator.pressure(find_contact_force(cell, y, under))
         tension = cell.touch.contact.tension(height[: under.size] - under)
         change[cell.pulp_rows, : under.size] = cell.touch.pulp.rate(pulp, tension)
     opening = cell.lag.opening(lag, command)

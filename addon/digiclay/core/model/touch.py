@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Constants
 from .contact import ExponentialLaw
-from .fingertip import Fingertip, forms, reach, reaches, underside
+from .fingertip import Fingertip, compute_forms, compute_reach, compute_reaches, compute_underside
 from .interfaces import Pulp
 from .layout import Disc
 
-__all__ = ["FingerPath", "FingerPeriod", "Touch", "Window", "force", "reached", "trace_finger"]
+__all__ = [
+    "FingerPath", "FingerPeriod", "Touch", "Window", "compute_force", "find_reached_disc", "trace_finger",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ class Touch:
 
 
 #: Which cells the finger may touch in a period: center of its way x, y and half the length
-#: of it, m; then the arguments of `fingertip.reach`.
+#: of it, m; then the arguments of `fingertip.compute_reach`.
 Window = tuple[float, float, float, float, float, float]
 
 
@@ -50,7 +52,7 @@ class FingerPath:
     ----------
     forms : ndarray (t, 2 p, 6)
     join : ndarray (t, 2, p, 1)
-        From `fingertip.forms`.
+        From `fingertip.compute_forms`.
     windows : list of Window
         One a period.
     """
@@ -72,14 +74,14 @@ class FingerPath:
         ----------
         period : int
         basis : ndarray (6, k)
-            See `fingertip.underside`.
+            See `fingertip.compute_underside`.
         """
         known, first, unders = self._last
         if known is not basis or not first <= period < first + len(unders):
             # Not so many that a large bed under a large finger would not fit in memory.
             count = max(1, min(AHEAD, MOST // max(1, self.join.shape[2] * basis.shape[1])))
             several = slice(period, period + count)
-            first, unders = period, underside(self.forms[several], self.join[several], basis)
+            first, unders = period, compute_underside(self.forms[several], self.join[several], basis)
             self._last = (basis, first, unders)
         under: Floats = unders[period - first]
         return under
@@ -110,14 +112,14 @@ def trace_finger(fingertip: Fingertip, poses: Floats) -> list[FingerPeriod]:
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
     low, high = outline[:, :, :2].min(axis=1), outline[:, :, :2].max(axis=1)
     spread = np.hypot(*(0.5 * (high - low)).T)
-    shape = reaches(outline)
+    shape = compute_reaches(outline)
     farthest = [shape[:, :, 0].min(axis=1), shape[:, :, 1].max(axis=1), shape[:, :, 2].min(axis=1)]
     windows = np.column_stack([0.5 * (low + high), spread, *farthest]).tolist()
-    coming = FingerPath(*forms(outline), [tuple(window) for window in windows])
+    coming = FingerPath(*compute_forms(outline), [tuple(window) for window in windows])
     return [FingerPeriod(coming, period, window) for period, window in enumerate(coming.windows)]
 
 
-def reached(window: Window, peak: float) -> Disc | None:
+def find_reached_disc(window: Window, peak: float) -> Disc | None:
     """Return the disc x, y, radius that holds every cell the finger may touch in a period, m; None: no cell.
 
     Parameters
@@ -127,11 +129,11 @@ def reached(window: Window, peak: float) -> Disc | None:
         No pin top is higher than this, m.
     """
     x, y, spread, base, tilt, bend = window
-    radius = reach(base, tilt, bend, peak)
+    radius = compute_reach(base, tilt, bend, peak)
     return (x, y, radius + spread) if radius >= 0.0 else None
 
 
-def force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
+def compute_force(touch: Touch, height: Floats, under: Floats, filters: Floats) -> Floats:
     """Return the force on each cell, N, pressing down is positive.
 
     ``F = f_d max(T(x) - Σ ĉ_i z_i, 0)``: the pulp pushes but does not stick.

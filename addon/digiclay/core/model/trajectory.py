@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..base.spline import inner_slopes
+from ..base.spline import compute_inner_slopes
 from .fingertip import LEVEL
 
-__all__ = ["Path", "Trajectory", "Waypoint", "interpolate_poses", "level", "sample_poses"]
+__all__ = ["Path", "Trajectory", "Waypoint", "interpolate_poses", "make_level", "sample_poses"]
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ class Trajectory:
         start, end = self.positions[piece], self.positions[piece + 1]
         poses[:, :3] = start + (end - start) * part
         if self.interpolation == "smooth":
-            slopes = inner_slopes(np.diff(self.times), self.positions)
+            slopes = compute_inner_slopes(np.diff(self.times), self.positions)
             first, last = slopes[piece] * span[:, None], slopes[piece + 1] * span[:, None]
             bend = part * (1.0 - part)
             poses[:, :3] += bend * ((1.0 - part) * (first - end + start) - part * (last - end + start))
@@ -144,7 +144,7 @@ class Path:
         return Trajectory(times, positions, turns, self.interpolation)
 
 
-def level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
+def make_level(times: Floats, positions: Floats, interpolation: str = "smooth") -> Trajectory:
     """Return the trajectory of a level finger.
 
     Parameters

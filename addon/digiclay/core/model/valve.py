@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..base.quantity import Parameters, quantity
 from .fluid import Fluid
 
-__all__ = ["Orifice", "Valve", "orifice"]
+__all__ = ["Orifice", "Valve", "make_orifice"]
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Valve(Parameters):
 
     def flow_law(self, fluid: Fluid) -> Orifice:
         """Return the valve's flow law in a fluid."""
-        return orifice(self, fluid)
+        return make_orifice(self, fluid)
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Orifice:
         return self.conductance(opening, drop) * drop
 
 
-def orifice(valve: Valve, fluid: Fluid) -> Orifice:
+def make_orifice(valve: Valve, fluid: Fluid) -> Orifice:
     """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants.
 
     Parameters

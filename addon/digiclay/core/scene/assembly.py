@@ -10,14 +10,14 @@ from dataclasses import replace
 from ..control.methods import METHODS
 from ..engine.active_set import Selection
 from ..engine.state import Rows
-from ..engine.system import System, segments
+from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
-from ..model.delay import Queue, queue
+from ..model.delay import Queue, split_delay
 from ..model.fingertip import require_one
 from ..model.interfaces import Flow, Lag, Pulp, Sensors, Stepper
 from ..model.laws import select_law
-from ..model.layout import Grid, grid
-from ..model.physics import Cell, speeds
+from ..model.layout import Grid, make_grid
+from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
 from .schema import STEPPERS, Finger, Scene, import_part
@@ -30,14 +30,14 @@ def assemble(scene: Scene) -> System:
     stepper = _make_stepper(scene)
     period = scene.simulation.control_period
     cell = Cell(scene.actuator, _make_flow(scene), scene.supply, _make_lag(scene), _make_touch(scene))
-    line = queue(scene.delay, period) if scene.delay else Queue()
+    line = split_delay(scene.delay, period) if scene.delay else Queue()
     # An opening that lags has a kink where the next command comes through; one that does not, a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
-    steps, instants = segments(stepper, cut, period, scene.simulation.steps)
-    bed = grid(scene.layout)
+    steps, instants = make_segments(stepper, cut, period, scene.simulation.steps)
+    bed = make_grid(scene.layout)
     controller, sensors = _make_controller(scene, bed, cell), _make_sensors(scene, cell, line)
     rows = Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0)
-    fastest = speeds(cell).rise
+    fastest = find_speeds(cell).rise
     return System(
         grid=bed,
         cell=cell,
@@ -65,9 +65,9 @@ def _make_flow(scene: Scene) -> Flow:
     valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
     if scene.conduit is None:
         return valve
-    from ..model.conduit import in_series
+    from ..model.conduit import connect_in_series
 
-    return in_series(valve, scene.conduit, scene.fluid)
+    return connect_in_series(valve, scene.conduit, scene.fluid)
 
 
 def _make_lag(scene: Scene) -> Lag:
@@ -129,9 +129,9 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
     floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
     device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
     if scene.shape:
-        from ..shapes.source_file import fitted_to
+        from ..shapes.source_file import fit_shape
 
-        device = replace(device, heights=fitted_to(scene.shape, bed, cell.actuator).heights)
+        device = replace(device, heights=fit_shape(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
         controller = import_part(METHODS[scene.method].module, "build")(scene.control, device)

@@ -12,12 +12,15 @@ from ..base.errors import ParameterError
 from ..control.handover import Handover
 from ..control.shape_display import ShapeDisplayControl
 from ..engine.system import System
-from ..model.fingertip import LEVEL, Fingertip, forms, underside
+from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..model.layout import Grid
 from ..model.trajectory import Path, Waypoint
 from .schema import Scene
 
-__all__ = ["GESTURES", "display_of", "display_time", "shaped", "summit", "touch_height"]
+__all__ = [
+    "GESTURES", "compute_display_time", "find_display", "find_summit", "find_touch_height",
+    "make_forming_scene",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +39,7 @@ NEARLY = 0.1
 MARGIN = 0.5
 
 
-def display_of(system: System) -> ShapeDisplayControl | None:
+def find_display(system: System) -> ShapeDisplayControl | None:
     """Return what displays the shape of a scene, or None."""
     controller = system.controller
     if isinstance(controller, Handover):
@@ -44,7 +47,7 @@ def display_of(system: System) -> ShapeDisplayControl | None:
     return controller if isinstance(controller, ShapeDisplayControl) else None
 
 
-def display_time(display: ShapeDisplayControl) -> float:
+def compute_display_time(display: ShapeDisplayControl) -> float:
     """Return the time within which a free bed has displayed its shape, s, rounded up to a tenth.
 
     A move takes the way at the slower reservoir's speed, and the time its height control needs to come
@@ -60,7 +63,7 @@ def display_time(display: ShapeDisplayControl) -> float:
     return math.ceil(10.0 * (MARGIN + len(display.moves) * move)) / 10.0
 
 
-def summit(grid: Grid, heights: Floats) -> tuple[float, float]:
+def find_summit(grid: Grid, heights: Floats) -> tuple[float, float]:
     """Return the place of the highest cells that is nearest to the bed's middle, m.
 
     Parameters
@@ -74,7 +77,7 @@ def summit(grid: Grid, heights: Floats) -> tuple[float, float]:
     return float(grid.x[cell]), float(grid.y[cell])
 
 
-def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
+def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
     """Return the height at which a level finger that comes down over a place first touches, m.
 
     Parameters
@@ -87,11 +90,11 @@ def touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: fl
         The place, m.
     """
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
-    under = underside(*forms(outline), grid.compute_basis(np.arange(grid.count)))
+    under = compute_underside(*compute_forms(outline), grid.compute_basis(np.arange(grid.count)))
     return float(np.max(heights - under[0]))
 
 
-def shaped(scene: Scene, system: System, gesture: str) -> Scene:
+def make_forming_scene(scene: Scene, system: System, gesture: str) -> Scene:
     """Return a scene whose finger waits until the shape stands, and then forms its highest part.
 
     Parameters
@@ -108,14 +111,14 @@ def shaped(scene: Scene, system: System, gesture: str) -> Scene:
     ParameterError
         When the scene has no shape, or no finger.
     """
-    display = display_of(system)
+    display = find_display(system)
     if display is None:
         raise ParameterError("shape", "", "must be given to form it", "none")
     if system.cell.touch is None:
         raise ParameterError("fingertip", "", "must be given to form a shape", "absent")
-    x, y = summit(system.grid, display.heights)
-    touch = touch_height(system.grid, display.heights, system.cell.touch.fingertip, x, y)
-    ready = display_time(display)
+    x, y = find_summit(system.grid, display.heights)
+    touch = find_touch_height(system.grid, display.heights, system.cell.touch.fingertip, x, y)
+    ready = compute_display_time(display)
     points = [(ready + time, touch + above) for time, above in GESTURES[gesture]]
     way = tuple(Waypoint(time=time, position=(x, y, z)) for time, z in [(0.0, points[0][1]), *points])
     # Its own duration is that of the path.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError, SceneError
-from ..base.sample_file import found, named
+from ..base.sample_file import find_file, list_files
 from ..base.toml_text import LARGEST, parse_tables
 from .schema import Scene
 from .toml_table import merge_one_finger, resolve
@@ -22,7 +22,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
 
 def list_samples() -> list[str]:
     """Return the names of the sample scenes."""
-    return list(named(SAMPLES, ".toml"))
+    return list(list_files(SAMPLES, ".toml"))
 
 
 def find(word: str) -> Path:
@@ -33,10 +33,10 @@ def find(word: str) -> Path:
     SceneError
         When there is no such file, or sample.
     """
-    samples = named(SAMPLES, ".toml")
+    samples = list_files(SAMPLES, ".toml")
     if word not in samples and os.path.isdir(word):
         word = os.path.join(word, "scene.toml")
-    return found(word, samples, "sample")
+    return find_file(word, samples, "sample")
 
 
 class Setting(NamedTuple):

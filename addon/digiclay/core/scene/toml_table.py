@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.part_table import read_part, refuse_unknown, shorten, show_value
-from ..base.quantity import Parameters, quantities
+from ..base.quantity import Parameters, list_quantities
 from ..base.toml_text import format_value
 from ..control.methods import METHODS
 from ..model.trajectory import Path, Waypoint
@@ -198,7 +198,7 @@ def _read_path(owner: str, table: Any, rest_height: float) -> Path:
 
 def _read_waypoint(owner: str, row: Table) -> Waypoint:
     """Read one waypoint; where it is and when has no sensible default."""
-    refuse_unknown(owner, row, tuple(quantities(Waypoint)))
+    refuse_unknown(owner, row, tuple(list_quantities(Waypoint)))
     for key in ("time", "position"):
         if key not in row:
             raise ParameterError(owner, key, "must be given", "none")
@@ -243,7 +243,7 @@ def _write_part(section: str, part: Parameters | None, method: str = "") -> Iter
     yield f"\n[{section}]"
     if method:
         yield f"method = {format_value(method)}"
-    for key, known in quantities(part).items():
+    for key, known in list_quantities(part).items():
         note = f"{known.unit}: {known.doc}" if known.unit else known.doc
         yield f"{key} = {format_value(getattr(part, key))}  # {note}"
 

@@ -18,7 +18,7 @@ from ..base.whole_files import read_json
 from ..scene.recorder import Recorder
 from ..scene.scene_source import load
 from ..scene.schema import Scene
-from .memory_limit import available_memory
+from .memory_limit import measure_available_memory
 
 __all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "is_whole", "read_run"]
 
@@ -82,7 +82,7 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
         if head.kind.kind not in "if" or head.kind.itemsize > 8:
             raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
-    size, free = sum(head.size for head in held.values()), available_memory()
+    size, free = sum(head.size for head in held.values()), measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
         raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(held)}).")

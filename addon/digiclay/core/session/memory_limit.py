@@ -11,7 +11,13 @@ from ..engine.state import Rows
 from ..scene.recorder import CHUNK, Recorder
 from ..scene.schema import Scene
 
-__all__ = ["available_memory", "bytes_needed", "check_memory", "count_busy_cells", "refuse_what_cannot_fit"]
+__all__ = [
+    "check_memory",
+    "count_busy_cells",
+    "count_bytes_needed",
+    "measure_available_memory",
+    "refuse_what_cannot_fit",
+]
 
 #: Bytes one row takes for one cell: height, force and command as float64, mode as int8; and one while the
 #: metrics are computed, of which rows a cell follows the force in.
@@ -41,10 +47,10 @@ def check_memory(scene: Scene, rows: Rows) -> None:
         Of its state.
     """
     busy = count_busy_cells(scene)
-    refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, available_memory(), busy)
+    refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy)
 
 
-def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
+def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
     """Return about how much memory a session takes; compared in tests/unit/test_memory_limit.py.
 
     Parameters
@@ -64,7 +70,7 @@ def bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int
     return cells * held + busy * at_work
 
 
-def available_memory() -> int:
+def measure_available_memory() -> int:
     """Return how many bytes this machine can still give."""
     linux = Path("/proc/meminfo")
     told = (
@@ -86,7 +92,7 @@ def refuse_what_cannot_fit(
     Parameters
     ----------
     recorder, rows, cells, periods, busy
-        See `bytes_needed`.
+        See `count_bytes_needed`.
     available : int
         Bytes.
 
@@ -95,11 +101,11 @@ def refuse_what_cannot_fit(
     ParameterError
         With the numbers, and what to change.
     """
-    needed = bytes_needed(recorder, rows, cells, periods, busy)
+    needed = count_bytes_needed(recorder, rows, cells, periods, busy)
     if needed <= available:
         return
     memory = f"{available / 1e9:.3g} GB of free memory"
-    alone = bytes_needed(None, rows, cells, periods, busy)
+    alone = count_bytes_needed(None, rows, cells, periods, busy)
     begun = needed - (recorder.rows(periods) * BYTES_A_CELL * cells if recorder else 0)
     spare = (available - begun) // (cells * BYTES_A_CELL)
     if recorder is None or spare < 2:

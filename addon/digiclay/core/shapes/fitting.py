@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .height_text import unpacked
+from .height_text import unpack
 from .relief import Placement, Relief, Tops
 from .request import Shape
 
-__all__ = ["Fitted", "fitted", "given"]
+__all__ = ["Fitted", "fit_given", "fit_relief"]
 
 Floats = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def _cells(count: int) -> str:
     return f"{count} cell{'s' if count != 1 else ''}"
 
 
-def given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
+def fit_given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     """Return the shape whose heights stand in the scene itself.
 
     Parameters
@@ -93,10 +93,10 @@ def given(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
     ParameterError
         When they are not those of this bed.
     """
-    return _clipped(shape.file or "heights", unpacked(shape.heights, grid), _all_covered(grid), actuator)
+    return _clipped(shape.file or "heights", unpack(shape.heights, grid), _all_covered(grid), actuator)
 
 
-def fitted(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:
+def fit_relief(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> Fitted:
     """Lay a shape onto a bed.
 
     Parameters

@@ -12,31 +12,31 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..model.layout import Grid
 
-__all__ = ["packed", "unpacked"]
+__all__ = ["pack", "unpack"]
 
 Floats = NDArray[np.float64]
 
 HINT = "Take the shape in again."
 
 
-def packed(heights: Floats) -> str:
+def pack(heights: Floats) -> str:
     """Pack heights, shape (n,), m, as letters and digits; to 4 nm, as 32-bit numbers are."""
     return base64.b64encode(zlib.compress(heights.astype("<f4").tobytes(), 9)).decode("ascii")
 
 
-def unpacked(text: str, grid: Grid) -> Floats:
+def unpack(text: str, grid: Grid) -> Floats:
     """Return the heights of the cells of a bed, shape (n,), m.
 
     Parameters
     ----------
     text : str
-        From `packed`.
+        From `pack`.
     grid : Grid
 
     Raises
     ------
     ParameterError
-        When the text is not what `packed` made, or was made for another bed.
+        When the text is not what `pack` made, or was made for another bed.
     """
     wanted = 4 * grid.count
     try:

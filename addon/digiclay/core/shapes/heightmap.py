@@ -12,7 +12,7 @@ from ..model.layout import ON_THE_SIDE, Grid
 from .picture_heights import MOST
 from .relief import Placement, Tops
 
-__all__ = ["HeightMap", "averaged", "height_map"]
+__all__ = ["HeightMap", "average_blocks", "make_height_map"]
 
 Floats = NDArray[np.float64]
 
@@ -64,14 +64,14 @@ class HeightMap:
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
         block = max(1, int(min(under_a_pin / self.block, max(self.values.shape)) + ON_THE_SIDE))
-        values = averaged(self.values, block)
+        values = average_blocks(self.values, block)
         rows = _places(along, self.pixels[0], block * self.block, values.shape[0])
         columns = _places(across, self.pixels[1], block * self.block, values.shape[1])
         value = np.where(covered, _bilinear(values, rows, columns), 0.0)
         return Tops(value, covered, np.zeros(grid.count, np.bool_))
 
 
-def height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
+def make_height_map(name: str, values: NDArray[np.generic], value_length: float | None = None) -> HeightMap:
     """Make a map of an array of numbers, the first row at the lowest y.
 
     Parameters
@@ -98,7 +98,7 @@ def height_map(name: str, values: NDArray[np.generic], value_length: float | Non
         raise ParameterError("shape", "file", "must hold numbers", f"{name}: {values.dtype}")
     block = int(np.ceil(np.sqrt(values.size / KEPT)))
     with np.errstate(over="ignore", invalid="ignore"):
-        kept = averaged(values, block)
+        kept = average_blocks(values, block)
     bad = np.argwhere(~np.isfinite(kept))
     if bad.size:
         row, column = (bad[0] * block).tolist()
@@ -107,7 +107,7 @@ def height_map(name: str, values: NDArray[np.generic], value_length: float | Non
     return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length)
 
 
-def averaged(values: NDArray[np.generic], block: int) -> Floats:
+def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
     """Return the means over squares of `block` x `block` values; those at the end may be smaller.
 
     Parameters

@@ -15,7 +15,7 @@ from .holes import fill_holes
 from .relief import Placement, Tops
 from .request import UPWARDS
 
-__all__ = ["ShapeMesh", "shape_mesh"]
+__all__ = ["ShapeMesh", "make_shape_mesh"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -185,7 +185,7 @@ def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, In
     )
 
 
-def shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
+def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
     """Make a shape of triangles.
 
     Parameters

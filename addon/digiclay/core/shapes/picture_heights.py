@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
-from ..base.picture_size import told_size
+from ..base.picture_size import read_size
 
-__all__ = ["MOST", "PICTURES", "READERS", "pixels", "refuse_too_many"]
+__all__ = ["MOST", "PICTURES", "READERS", "read_pixels", "refuse_too_many"]
 
 Pixels = NDArray[np.generic]
 
@@ -32,11 +32,11 @@ BLENDER_ONLY = (".exr", ".hdr")
 GRAY = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F")
 #: Most pixels of a picture: 16 000 x 8 000. Some memory is needed for each, see docs/shapes.md.
 MOST = 128_000_000
-#: Who reads pictures in Pillow's place, the last one first; each takes a file and returns what `pixels` does.
+#: Readers of pictures in place of Pillow, the last one first; each has the signature of `read_pixels`.
 READERS: list[Callable[[Path], Pixels]] = []
 
 
-def pixels(path: Path) -> Pixels:
+def read_pixels(path: Path) -> Pixels:
     """Return the brightness of a picture's pixels, (rows, columns), the lowest row first.
 
     Raises
@@ -66,7 +66,7 @@ def pixels(path: Path) -> Pixels:
                 gray = opened if opened.mode in GRAY else opened.convert("L")
                 return np.flipud(np.asarray(gray))
         except image.DecompressionBombError:
-            raise too_large(path, "too many pixels to open") from None
+            raise make_size_error(path, "too many pixels to open") from None
         except OSError as error:
             said = error.strerror or "not a picture, or cut off"
         except (ValueError, SyntaxError, EOFError) as error:
@@ -77,7 +77,7 @@ def pixels(path: Path) -> Pixels:
 def _refuse_by_head(path: Path) -> None:
     """Refuse a picture whose header states too large a size, for all readers."""
     try:
-        size = told_size(path)
+        size = read_size(path)
     except OSError:
         return  # said by who reads it
     if size:
@@ -94,10 +94,10 @@ def refuse_too_many(path: Path, width: int, height: int) -> None:
         Pixels.
     """
     if width * height > MOST:
-        raise too_large(path, f"{width} x {height}")
+        raise make_size_error(path, f"{width} x {height}")
 
 
-def too_large(path: Path, size: str) -> ParameterError:
+def make_size_error(path: Path, size: str) -> ParameterError:
     """Return the error of a picture too large to be read.
 
     Parameters

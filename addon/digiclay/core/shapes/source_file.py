@@ -8,19 +8,19 @@ from pathlib import Path
 
 from ..base.errors import ParameterError, SceneError
 from ..base.npz import map_array
-from ..base.sample_file import found, named
+from ..base.sample_file import find_file, list_files
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_reader import MESHES
 from ..model.actuator import Actuator
 from ..model.layout import Grid
-from .fitting import Fitted, fitted, given
-from .heightmap import HeightMap, height_map
-from .mesh_relief import ShapeMesh, shape_mesh
-from .picture_heights import PICTURES, pixels
+from .fitting import Fitted, fit_given, fit_relief
+from .heightmap import HeightMap, make_height_map
+from .mesh_relief import ShapeMesh, make_shape_mesh
+from .picture_heights import PICTURES, read_pixels
 from .relief import Relief
 from .request import AUTO, LENGTHS, Shape
 
-__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fitted_to", "import_reader", "read", "sample_shapes"]
+__all__ = ["KINDS", "MESHES", "SAMPLES", "find_shape", "fit_shape", "import_reader", "list_shapes", "read"]
 
 #: Where the sample shapes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
@@ -29,9 +29,9 @@ ARRAY = ".npy"
 KINDS = (*MESHES, *PICTURES, ARRAY)
 
 
-def sample_shapes() -> list[str]:
+def list_shapes() -> list[str]:
     """Return the names of the sample shapes."""
-    return list(named(SAMPLES, *KINDS))
+    return list(list_files(SAMPLES, *KINDS))
 
 
 def find_shape(word: str) -> Path:
@@ -42,11 +42,11 @@ def find_shape(word: str) -> Path:
     SceneError
         When there is no such file, or sample.
     """
-    return found(word, named(SAMPLES, *KINDS), "sample shape")
+    return find_file(word, list_files(SAMPLES, *KINDS), "sample shape")
 
 
-def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
-    """Return the shape of a scene, laid onto its bed; errors as `read` and `fitting.fitted`.
+def fit_shape(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
+    """Return the shape of a scene, laid onto its bed; errors as `read` and `fitting.fit_relief`.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def fitted_to(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
         Its stroke limits the heights.
     """
     if shape.heights:
-        return given(shape, grid, actuator)
-    return fitted(shape, read(shape), grid, actuator)
+        return fit_given(shape, grid, actuator)
+    return fit_relief(shape, read(shape), grid, actuator)
 
 
 def read(shape: Shape) -> Relief:
@@ -78,7 +78,7 @@ def read(shape: Shape) -> Relief:
     if kind == ARRAY:
         return _array(path)
     if kind in PICTURES:
-        return height_map(path.name, pixels(path))
+        return make_height_map(path.name, read_pixels(path))
     return _mesh(path, shape)
 
 
@@ -88,7 +88,7 @@ def import_reader(path: Path) -> None:
     One that is missing is told of when the file is read.
     """
     kind = path.suffix.lower()
-    reader = "PIL.Image" if kind in PICTURES else mesh_reader.reader(kind)
+    reader = "PIL.Image" if kind in PICTURES else mesh_reader.find_library(kind)
     if reader:
         with suppress(ImportError):
             importlib.import_module(reader)
@@ -103,7 +103,7 @@ def _array(path: Path) -> HeightMap:
         raise ParameterError("shape", "file", "must be a file that can be read", f"{path}: {said}") from None
     except ValueError:
         raise ParameterError("shape", "file", "must hold one array of numbers", str(path)) from None
-    return height_map(path.name, values, value_length=1.0)
+    return make_height_map(path.name, values, value_length=1.0)
 
 
 def _mesh(path: Path, shape: Shape) -> ShapeMesh:
@@ -124,4 +124,4 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
         raise ParameterError("shape", "file", "must be a mesh that can be read", f"{path}: {said}") from None
     up = shape.up if shape.up != AUTO else mesh.up
     length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
-    return shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)
+    return make_shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..base.arrays import any_true
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
-from ..model.physics import Cell, Speeds, felt, speeds
+from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
 __all__ = ["Adaptive", "AdaptivePlan"]
@@ -91,7 +91,9 @@ class Adaptive:
         allowed = 3.0 * self.tolerance
         stiffness = cell.touch.contact.stiffness if cell.touch else 0.0
         period = sum(part.length for part in segments)
-        return AdaptivePlan(tuple(levels), tuple(between), allowed, stiffness * allowed, speeds(cell), period)
+        return AdaptivePlan(
+            tuple(levels), tuple(between), allowed, stiffness * allowed, find_speeds(cell), period
+        )
 
     def prepare(self, plan: AdaptivePlan, rows: Floats, near: int) -> Movement:
         """Prepare to move a block of cells; see `interfaces.Stepper`."""
@@ -127,7 +129,7 @@ class Adaptive:
         np.clip(rows[0], 0.0, cell.actuator.stroke, out=rows[0])
         pulp = rows[cell.pulp_rows]
         np.maximum(pulp, 0.0, out=pulp)
-        return felt(cell, rows, under[-1])
+        return find_contact_force(cell, rows, under[-1])
 
 
 def _prepare(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:

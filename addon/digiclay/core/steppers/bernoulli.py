@@ -20,9 +20,9 @@ from ..base.arrays import Constants, any_true, apply_map, per_row, prepare_map
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
-from .bernoulli_plan import BernoulliPlan, bernoulli_plan
-from .closed_form import crossed, pressed
-from .near_overflow import LoadedPath, StepStart, loaded_path
+from .bernoulli_plan import BernoulliPlan, make_plan
+from .closed_form import solve_crossing, solve_pressed
+from .near_overflow import LoadedPath, StepStart, find_loaded_path
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "StepWorkspace"]
 
@@ -40,7 +40,7 @@ class BernoulliExponential:
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
         """Work out once what all periods share."""
-        return bernoulli_plan(cell, queue, segments)
+        return make_plan(cell, queue, segments)
 
     def prepare(self, plan: BernoulliPlan, rows: Floats, near: int) -> StepWorkspace:
         """Prepare to move a block of cells; see `interfaces.Stepper`."""
@@ -167,7 +167,7 @@ class StepWorkspace:
                 _tension(end, zero, most, last)
                 rise += height
             else:
-                relief = pressed(np.exp(bent), growth, stiffness)
+                relief = solve_pressed(np.exp(bent), growth, stiffness)
                 np.divide(relief, stiffness, mean)
                 mean -= one
                 push -= relief
@@ -177,7 +177,7 @@ class StepWorkspace:
                 crossing ^= idle
                 if any_true(crossing):
                     parts = (values[crossing] for values in (exponent, deviation, slip, decay, relaxed))
-                    push[crossing], mean[crossing] = crossed(*parts)
+                    push[crossing], mean[crossing] = solve_crossing(*parts)
                     end = exponent + slip + push
                     _tension(end, zero, most, last)
                 push *= per_m
@@ -222,7 +222,7 @@ class StepWorkspace:
             relaxed=self.relaxed,
             idle=idle,
         )
-        return loaded_path(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], start)
+        return find_loaded_path(plan.cell, plan.numbers[0], plan.to_load, plan.shares[s], start)
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:

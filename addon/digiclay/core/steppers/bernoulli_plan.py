@@ -17,7 +17,7 @@ from ..model.physics import Cell
 from ..model.supply import Supply
 from .closed_form import LARGE, TINY
 
-__all__ = ["POINTS", "BernoulliPlan", "bernoulli_plan"]
+__all__ = ["POINTS", "BernoulliPlan", "make_plan"]
 
 Floats = NDArray[np.float64]
 
@@ -75,9 +75,9 @@ class BernoulliPlan:
     numbers : tuple of float
         The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`.
     limits : ndarray (5,)
-        What `closed_form.pressed` is for lies below all of them: the exponent at the start of a step, at its
-        end and with the chord deviation, where every flow is laminar; the growth, where nothing overflows
-        and what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`.
+        `closed_form.solve_pressed` holds below all of them: the exponent at the start of a step, at its end
+        and with the chord deviation, where every flow is laminar; the growth, where nothing overflows and
+        what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`.
     to_load : float
         Pressure that a unit of tension makes, Pa.
     """
@@ -99,7 +99,7 @@ class BernoulliPlan:
     to_load: float
 
 
-def bernoulli_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
+def make_plan(cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
     """Work out once what all periods share.
 
     Parameters

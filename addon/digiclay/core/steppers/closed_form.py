@@ -16,11 +16,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LARGE", "TINY", "careful", "crossed", "not_zero", "pressed"]
+__all__ = ["LARGE", "TINY", "replace_zeros", "solve_carefully", "solve_crossing", "solve_pressed"]
 
 Floats = NDArray[np.float64]
 
-#: Above this exponent sums have to be done on logarithms: `careful` instead of `pressed`.
+#: Above this exponent sums have to be done on logarithms: `solve_carefully` instead of `solve_pressed`.
 LARGE = 300.0
 #: Stands for zero where a ratio of two numbers that vanish together is wanted.
 TINY = 1e-200
@@ -31,7 +31,7 @@ _STILL = 1e-100
 _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 
 
-def pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
+def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
     Parameters
@@ -55,7 +55,7 @@ def pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     return q
 
 
-def careful(
+def solve_carefully(
     exponent: Floats, growth: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
     """Return the load's part of the way, and the mean of exp(e), of cells that stay under load, at any size.
@@ -90,7 +90,7 @@ def careful(
     return push, np.exp(np.minimum(log_mean, LARGE))
 
 
-def crossed(
+def solve_crossing(
     exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
     """Solve for cells that meet or leave the finger within the step.
@@ -110,7 +110,7 @@ def crossed(
     mean : ndarray (k,)
         Mean of ``max(exp(e) - 1, 0)``.
     """
-    growth = not_zero(slip + decay * pulp)
+    growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
     threshold = np.log(pulp)
     share = _loaded_share(threshold - exponent, slip, growth)
@@ -119,7 +119,7 @@ def crossed(
     share = _loaded_share(threshold - exponent, slip, growth)
     start = np.maximum(exponent, threshold)
     few = np.maximum(share * decay, TINY)
-    push, mean = careful(start, not_zero(share * growth), share * slip, few, pulp)
+    push, mean = solve_carefully(start, replace_zeros(share * growth), share * slip, few, pulp)
     # Without load the exponent goes straight, up to the threshold or down from it; below 0 is a gap.
     apart = np.maximum(np.abs((1.0 - share) * slip), TINY)
     closed = np.minimum(apart, np.maximum(threshold, 0.0))
@@ -136,6 +136,6 @@ def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
     return share
 
 
-def not_zero(values: Floats) -> Floats:
+def replace_zeros(values: Floats) -> Floats:
     """Return `values` with `TINY` for zeros."""
     return np.where(np.abs(values) < TINY, TINY, values)

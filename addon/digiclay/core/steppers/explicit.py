@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
-from ..model.physics import Cell, Speeds, felt, rates, speeds
+from ..model.physics import Cell, Speeds, compute_rates, find_contact_force, find_speeds
 
 __all__ = ["Explicit", "ExplicitPlan", "Rates"]
 
@@ -58,7 +58,7 @@ class Explicit:
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
         """Work out once what all periods share."""
-        return ExplicitPlan(cell, queue, segments, speeds(cell))
+        return ExplicitPlan(cell, queue, segments, find_speeds(cell))
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
         """Return how far the rows go in one step, s long.
@@ -98,7 +98,7 @@ class Explicit:
             def rates_at(
                 rows: Floats, node: int, command: Floats = command, instants: Floats = instants
             ) -> Floats:
-                return rates(cell, rows, instants[node], command)
+                return compute_rates(cell, rows, instants[node], command)
 
             lowest, highest = plan.speeds.reach(y[0], instants, part.length)
             lowest -= ASTRAY * stroke
@@ -108,4 +108,4 @@ class Explicit:
             np.clip(y[0], 0.0, stroke, out=y[0])
             thrown |= ~((lowest <= y[0]) & (y[0] <= highest))
         y[0][thrown] = np.inf
-        return felt(cell, y, under[-1])
+        return find_contact_force(cell, y, under[-1])

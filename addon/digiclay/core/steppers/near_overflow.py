@@ -1,9 +1,9 @@
 """Closed-form step under extreme loads, and with fingertip jumps.
 
-`closed_form.pressed` holds where every flow is laminar and no exponential overflows. Elsewhere the secant
-conductance is taken at the load of mid step, all is solved on logarithms, and what comes out is held within
-what the valve can do: a pin never goes farther than the flow under the largest load of the step takes it,
-nor deeper than the finger comes. A valve that is shut moves nothing, to the last bit.
+`closed_form.solve_pressed` holds where every flow is laminar and no exponential overflows. Elsewhere the
+secant conductance is taken at the load of mid step, all is solved on logarithms, and what comes out is held
+within what the valve can do: a pin never goes farther than the flow under the largest load of the step takes
+it, nor deeper than the finger comes. A valve that is shut moves nothing, to the last bit.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
-from .closed_form import TINY, careful, crossed, not_zero
+from .closed_form import TINY, replace_zeros, solve_carefully, solve_crossing
 
-__all__ = ["LoadedPath", "StepStart", "loaded_path"]
+__all__ = ["LoadedPath", "StepStart", "find_loaded_path"]
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class StepStart(NamedTuple):
     exponent : ndarray
         At the start of the step, see `closed_form`.
     deviation : ndarray
-        Chord deviation of the path without load, see `closed_form.crossed`.
+        Chord deviation of the path without load, see `closed_form.solve_crossing`.
     finger_deviation : ndarray
         The finger's part in it, with its sign changed.
     lift : ndarray
@@ -103,7 +103,7 @@ class _Valve:
         return rises
 
 
-def loaded_path(
+def find_loaded_path(
     cell: Cell, m: Floats | float, to_load: Floats | float, share: float, start: StepStart
 ) -> LoadedPath:
     """Return the paths of cells over a step in which some of them are near overflow.
@@ -130,7 +130,7 @@ def loaded_path(
     crossing = (_exponential(exponent + slip + push) <= start.relaxed) != idle
     if crossing.any():
         parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed))
-        push[crossing], mean[crossing] = crossed(*parts)
+        push[crossing], mean[crossing] = solve_crossing(*parts)
     rise = _limit(valve, m, to_load, start, free + push / m)
     return LoadedPath(rise, exponent + (m * rise - start.lift), mean)
 
@@ -156,7 +156,7 @@ def _mid_load(
 
 def _press(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
     """Return the load's part of the way, and the mean of exp(e), of cells that stay under load."""
-    return careful(exponent, not_zero(slip + decay * relaxed), slip, decay, relaxed)
+    return solve_carefully(exponent, replace_zeros(slip + decay * relaxed), slip, decay, relaxed)
 
 
 def _limit(

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
-from ..model.physics import Cell, Speeds, felt, speeds
+from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 
-__all__ = ["Richardson", "RichardsonPlan", "extrapolate", "halved"]
+__all__ = ["Richardson", "RichardsonPlan", "extrapolate", "halve_segments"]
 
 Floats = NDArray[np.float64]
 
@@ -56,8 +56,8 @@ class Richardson:
         whole = tuple(Segment(part.start, part.length, part.nodes[::2]) for part in segments)
         return RichardsonPlan(
             closed_form.plan(cell, queue, whole),
-            closed_form.plan(cell, queue, halved(segments)),
-            speeds(cell),
+            closed_form.plan(cell, queue, halve_segments(segments)),
+            find_speeds(cell),
             sum(part.length for part in segments),
         )
 
@@ -74,7 +74,7 @@ class Richardson:
             once(under)
             twice(under)
             extrapolate(cell, rows, coarse, reach)
-            return felt(cell, rows, under[-1])
+            return find_contact_force(cell, rows, under[-1])
 
         return advance
 
@@ -98,7 +98,7 @@ def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, F
     np.maximum(pulp, 0.0, out=pulp)
 
 
-def halved(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def halve_segments(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
     """Cut segments that have an instant in the middle of each half in two."""
     return tuple(
         Segment(part.start + part.length * i / 2, part.length / 2, part.nodes[2 * i : 2 * i + 3])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SceneError
-from ..base.quantity import quantities
+from ..base.quantity import list_quantities
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 
@@ -211,7 +211,7 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
         values = tuple(_find_value(scenes[word], one.key, word) for word in one.words)
         section, _, name = one.key.partition(".")
         part = next((scene.section(section) for scene in scenes.values()), None)
-        known = quantities(part).get(name) if name and part else None
+        known = list_quantities(part).get(name) if name and part else None
         columns.append(Column(one.key, known.unit if known else "", values, one.logarithmic))
     return columns
 

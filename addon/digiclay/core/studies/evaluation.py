@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
-from ..base.quantity import nearest
+from ..base.quantity import find_nearest_name
 from ..batch.packing import describe_structure, find_reason
 from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
@@ -68,7 +68,7 @@ def find_figure(word: str) -> str:
     name = SHORT.get(word, word)
     if name in FIGURES:
         return name
-    close = nearest(word, [*FIGURES, *SHORT])
+    close = find_nearest_name(word, [*FIGURES, *SHORT])
     hint = f"Did you mean {close}?" if close else f"Known: {', '.join(FIGURES)}."
     raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
 

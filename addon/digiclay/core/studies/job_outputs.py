@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.part_table import read_part, refuse_unknown, show_value
-from ..base.quantity import Parameters, quantities
+from ..base.quantity import Parameters, list_quantities
 from ..base.toml_text import format_value
 from ..mesh_io.export_model import Model
 from ..session.render_settings import Film, Still, Turntable
@@ -62,7 +62,7 @@ class Outputs:
             if part is None:
                 continue
             lines.append(f"\n[{section}]")
-            for key, known in quantities(part).items():
+            for key, known in list_quantities(part).items():
                 note = f"{known.unit}: {known.doc}" if known.unit else known.doc
                 lines.append(f"{key} = {format_value(getattr(part, key))}  # {note}")
         return "\n".join(lines) + "\n"

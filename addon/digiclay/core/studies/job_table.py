@@ -17,14 +17,14 @@ from typing import Any
 from ..base.errors import ParameterError, SceneError, one_line
 from ..base.part_table import refuse_unknown, show_value
 from ..base.safe_names import find_name, make_unique_names
-from ..base.sample_file import found, named
+from ..base.sample_file import find_file, list_files
 from ..base.toml_text import format_value
 from ..control.methods import METHODS
-from ..model.layout import grid
+from ..model.layout import make_grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
 from ..scene.schema import Scene
-from ..shapes.height_text import packed
-from ..shapes.source_file import fitted_to
+from ..shapes.height_text import pack
+from ..shapes.source_file import fit_shape
 from .job_outputs import KEYS, Outputs, make_outputs
 
 __all__ = ["JOB", "MOST", "SCENE", "Job", "JobSeries", "find_jobs_file", "read_jobs", "read_outputs"]
@@ -105,7 +105,7 @@ def find_jobs_file(said: str) -> Path:
     SceneError
         When there is none.
     """
-    return found(said, named(BATCHES, ".toml"), "sample batch")
+    return find_file(said, list_files(BATCHES, ".toml"), "sample batch")
 
 
 def read_outputs(path: Path) -> Outputs:
@@ -191,8 +191,8 @@ def _embed_heights(scene: Scene) -> Scene:
     """Return a scene with the heights of its shape in it, so that it needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene
-    laid = fitted_to(scene.shape, grid(scene.layout), scene.actuator)
-    return replace(scene, shape=replace(scene.shape, heights=packed(laid.heights)))
+    laid = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=pack(laid.heights)))
 
 
 def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:

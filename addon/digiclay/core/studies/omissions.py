@@ -26,7 +26,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors
 from ..session.run_scene import run
 
-__all__ = ["Fitted", "Omission", "Tried", "fitted", "omissions"]
+__all__ = ["Fitted", "Omission", "Tried", "find_omissions", "propose_omissions"]
 
 #: Parts that can be left out, and what is said of it.
 PARTS = {
@@ -115,7 +115,7 @@ class Fitted:
         return [one.said for one in self.tried if one.kept]
 
 
-def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
+def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
     """Give what a scene could do without: parts, physics steps, and cells that creep to their height.
 
     Parameters
@@ -140,7 +140,7 @@ def omissions(scene: Scene, budget: float) -> Iterator[Omission]:
             yield Omission("cells", said, partial(_with_dead_band, band=band))
 
 
-def fitted(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
+def find_omissions(scene: Scene, budget: float, *, told: Callable[[str], None] | None = None) -> Fitted:
     """Leave out of a scene what its results can do without.
 
     Parameters
@@ -168,7 +168,7 @@ def fitted(scene: Scene, budget: float, *, told: Callable[[str], None] | None = 
         rule = f"must be at least the error of the full scene's own integration, {own * 1e6:.2g} µm"
         raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm", hint)
     alone: list[tuple[Omission, Tried]] = []
-    for one in omissions(scene, budget):
+    for one in propose_omissions(scene, budget):
         say(one.said)
         alone.append((one, Tried(one.said, *_departure(scene, one.leave_out(scene), budget), False)))
     fits = [pair for pair in alone if pair[1].departure <= budget and pair[1].work < 1.0]

@@ -19,7 +19,7 @@ from ..base.errors import DigiclayError, OutputError, one_line
 from ..base.file_lock import hold_lock
 from ..base.run_folder import describe_claim, lock_name, resolve_inside
 from ..base.unfinished import is_unfinished, remove_abandoned
-from ..base.whole_files import as_json, read_json, write_whole
+from ..base.whole_files import format_json, read_json, write_whole
 
 __all__ = ["Kind", "describe_error", "finish", "open_series"]
 
@@ -75,7 +75,7 @@ def open_series(
                 if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
                     refuse_another(there)
                 if there != description:
-                    write_whole(path / kind.mark, as_json(description))
+                    write_whole(path / kind.mark, format_json(description))
                 for name in kind.folders:
                     resolve_inside(path, name).mkdir(exist_ok=True)
                     remove_abandoned(path / name)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..metrics.finger_path import lag, sum_cells
-from ..metrics.force import rfd
+from ..metrics.finger_path import measure_lag, sum_cells
+from ..metrics.force import compute_rfd
 from ..model.set_point import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.recorder import Recorder
@@ -161,8 +161,8 @@ def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result
     done = run(scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()))
     part = select_rows(done.history, start, end)
     sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
-    behind, wanted = lag(sums, part["fingertip"]), find_set_point(scene.set_point, sums.following)
-    deviates = rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
+    behind, wanted = measure_lag(sums, part["fingertip"]), find_set_point(scene.set_point, sums.following)
+    deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
     losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
     judged = Follows(
         speed,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
-from ..base.whole_files import as_json, read_json, write_whole
+from ..base.whole_files import format_json, read_json, write_whole
 from ..scene.toml_table import format_scene
 from .axes import Axis, Column, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
@@ -57,7 +57,7 @@ class Folder:
         record : Record
         """
         values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
-        write_whole(self.path / POINTS / f"{point.index:06d}.json", as_json({"values": values, **record}))
+        write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
 
 
 @contextmanager

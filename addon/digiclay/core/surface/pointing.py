@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.fingertip import Fingertip, matrices
+from ..model.fingertip import Fingertip, make_matrices
 from ..model.layout import Grid
 
 __all__ = ["find_contact_outline", "find_ground_height", "find_ray", "intersect_surface"]
@@ -147,7 +147,7 @@ def find_contact_outline(finger: Fingertip, turn: Floats, depth: float, count: i
     ndarray (count, 2)
         Counter-clockwise, m; the lowest point is the origin.
     """
-    rotation = matrices(np.asarray(turn, np.float64)[None])[0]
+    rotation = make_matrices(np.asarray(turn, np.float64)[None])[0]
     axes = np.array([finger.length, finger.width, finger.height])
     shape = rotation @ np.diag(axes**-2.0) @ rotation.T
     spread = rotation @ np.diag(axes**2) @ rotation.T

@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.spline import monotone
+from ..base.spline import interpolate_monotone
 from .formed import Formed
 from .membrane import relax_membrane
 
@@ -141,8 +141,8 @@ def _smooth(formed: Formed, pins: Floats, parts: int) -> Floats:
         at_rows = np.empty((formed.rows, point.shape[1]))
         for start in range(2 if formed.shift else 1):
             step = slice(start, None, 2 if formed.shift else 1)
-            at_rows[step] = monotone(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
-        fine[some] = monotone(first[:, 0, 1], at_rows, point[some, 0, 1])
+            at_rows[step] = interpolate_monotone(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
+        fine[some] = interpolate_monotone(first[:, 0, 1], at_rows, point[some, 0, 1])
     return _held(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
 
 
