@@ -17,6 +17,7 @@ from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import view
 from digiclay.settings import own_presets, properties
+from digiclay.settings.beds import BEDS
 
 from tests.timeouts import TIMEOUT
 
@@ -110,8 +111,29 @@ def test_two_beds_each_have_a_fingertip_and_settings_of_their_own() -> None:
     )
 
 
-def test_a_pitch_at_which_cylinders_would_overlap_cannot_be_chosen() -> None:
-    assert properties.scene_of(add(rows=6, columns=6, pitch=0.5)).layout.pitch == pytest.approx(2e-3)
+@pytest.mark.parametrize("name", BEDS)
+def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name: str) -> None:
+    scene, wanted = properties.scene_of(add(bed=name)), BEDS[name]
+    assert (scene.layout.rows, scene.layout.columns) == (wanted.rows, wanted.columns)
+    assert scene.layout.pitch == pytest.approx(wanted.pitch, rel=1e-12)
+    paper = resolve({})
+    (tip,), (usual,) = ([finger.fingertip for finger in one.fingers] for one in (scene, paper))
+    sizes = [(tip.length, usual.length), (scene.blister.radius, paper.blister.radius)]
+    # Properties hold 32 bits; what was written exactly is read exactly.
+    assert [size / of_paper for size, of_paper in sizes] == pytest.approx([wanted.share] * 2, rel=1e-9)
+    assert scene.actuator.bore <= scene.layout.pitch
+
+
+def test_a_bed_of_a_kind_may_have_another_plan() -> None:
+    scene = properties.scene_of(add(bed="design", rows=6, columns=30, pitch=2.0))
+    assert (scene.layout.rows, scene.layout.columns, scene.layout.pitch) == (6, 30, 2e-3)
+    assert scene.fingers[0].fingertip.length == 5e-3
+
+
+def test_a_pitch_at_which_cylinders_would_overlap_makes_them_narrower() -> None:
+    scene = properties.scene_of(add(rows=6, columns=6, pitch=0.5))
+    assert scene.actuator.bore == pytest.approx(2 / 3 * scene.layout.pitch)
+    assert properties.scene_of(add(rows=6, columns=6, pitch=2.5)).actuator.bore == 2e-3
 
 
 def test_a_preset_that_cannot_be_read_is_refused_in_one_line(preset: str) -> None:

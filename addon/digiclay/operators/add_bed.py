@@ -5,7 +5,6 @@ from typing import Any
 from .. import preferences
 from ..compat import bpy
 from ..core.control.methods import METHODS
-from ..core.model.actuator import Actuator
 from ..core.model.layout import Layout
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
@@ -14,6 +13,7 @@ from ..device.instant import Instant, find_ellipsoid
 from ..device.roles import BALL
 from ..device.view import bed_of
 from ..settings import own_presets, properties
+from ..settings.beds import BEDS, FIRST
 from ..settings.declared import title
 from ..settings.devices import make_scene
 from ..settings.groups import PRESET_WORDS, method_items
@@ -43,6 +43,19 @@ def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
     return OFFERED
 
 
+def take_bed(operator: Any, context: Any) -> None:
+    """Set the plan of the chosen bed.
+
+    Parameters
+    ----------
+    operator : bpy.types.Operator
+    context : bpy.types.Context
+    """
+    bed = BEDS[operator.bed]
+    operator.rows, operator.columns = bed.rows, bed.columns
+    operator.pitch = bed.pitch * 1e3
+
+
 class AddBed(Action, bpy.types.Operator):
     """Add a Digital Clay device: a bed of pins that a fingertip forms"""
 
@@ -50,6 +63,13 @@ class AddBed(Action, bpy.types.Operator):
     bl_label = "Digital Clay"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    bed: bpy.props.EnumProperty(
+        name="Bed",
+        description="Number and distance of the pins, and size of fingertip and blister",
+        items=[(name, title(name), bed.use) for name, bed in BEDS.items()],
+        default=FIRST,
+        update=take_bed,
+    )
     rows: bpy.props.IntProperty(
         name="Rows", description="Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST
     )
@@ -60,7 +80,7 @@ class AddBed(Action, bpy.types.Operator):
         name="Pitch (mm)",
         description="Distance between neighboring pins in a row, in mm",
         default=DEFAULT.pitch * 1e3,
-        min=Actuator().bore * 1e3,
+        min=0.5,
         soft_max=20.0,
         max=1000.0,
         precision=2,
@@ -115,13 +135,16 @@ class AddBed(Action, bpy.types.Operator):
 
     def perform(self, context: Any) -> None:
         """Build the device at the 3D cursor."""
+        for name in ("rows", "columns", "pitch"):
+            if not self.properties.is_property_set(name):  # called by a script
+                setattr(self, name, getattr(BEDS[self.bed], name) * (1e3 if name == "pitch" else 1))
         layout = Layout(
             rows=self.rows,
             columns=self.columns,
             pitch=to_si(self.pitch, SHOWN["m"][1]),
             arrangement=self.arrangement,
         )
-        bed = add(context, make_scene(self.preset, layout, self.method))
+        bed = add(context, make_scene(self.preset, layout, self.method, BEDS[self.bed].share))
         bed.scale = (self.scale,) * 3
         place_at_cursor(context, bed)
 

@@ -1,4 +1,4 @@
-"""Device of a new bed: preset, layout and method as one valid scene."""
+"""Device of a new bed: preset, layout, method and size of the fingertip as one valid scene."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load
-from ..core.scene.schema import Scene
+from ..core.scene.schema import Finger, Scene
 from ..core.scene.toml_table import PRESETS, resolve
 from .own_presets import path
 
@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = ["change_layout", "fit_blister", "make_scene"]
 
+#: Bore of the cylinders, as a share of the pitch, where a preset's would overlap.
+BORE = 2 / 3
 
-def make_scene(preset: str, layout: Layout, method: str) -> Scene:
-    """Return the scene of a preset, with another plan of the bed and another method.
+
+def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> Scene:
+    """Return the scene of a preset, with another plan of the bed, another method and another size of finger.
 
     Parameters
     ----------
@@ -27,6 +30,8 @@ def make_scene(preset: str, layout: Layout, method: str) -> Scene:
     layout : Layout
     method : str
         A preset of the user's own keeps its gains when it is of this method.
+    share : float, optional
+        Size of fingertip and blister, as a share of the preset's.
 
     Raises
     ------
@@ -35,24 +40,42 @@ def make_scene(preset: str, layout: Layout, method: str) -> Scene:
     """
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
-        return change_layout(resolve({"preset": preset, **control}), layout)
+        return change_layout(_scale_finger(resolve({"preset": preset, **control}), share), layout)
     scene = load(path(preset))
     if scene.method != method:
         plain = resolve(control)
         scene = replace(scene, method=method, control=plain.control, blister=plain.blister)
-    return change_layout(scene, layout)
+    return change_layout(_scale_finger(scene, share), layout)
 
 
 def change_layout(scene: Scene, layout: Layout) -> Scene:
-    """Return a scene with another plan of the bed; a blister wider than the bed is made to fit.
+    """Return a scene with another plan of the bed; a blister too wide, or cylinders, are made to fit.
 
     Parameters
     ----------
     scene : Scene
     layout : Layout
     """
+    actuator = scene.actuator
+    if actuator.bore > layout.pitch:
+        actuator = replace(actuator, bore=BORE * layout.pitch)
     blister = scene.blister and fit_blister(scene.blister, layout)
-    return replace(scene, layout=layout, blister=blister)
+    return replace(scene, layout=layout, actuator=actuator, blister=blister)
+
+
+def _scale_finger(scene: Scene, share: float) -> Scene:
+    """Return a scene with fingertip and blister of another size."""
+    fingers = tuple(_scale_tip(finger, share) for finger in scene.fingers)
+    return replace(scene, fingers=fingers, blister=scene.blister and _scale_blister(scene.blister, share))
+
+
+def _scale_tip(finger: Finger, share: float) -> Finger:
+    """Return a finger with a tip of another size."""
+    tip = finger.fingertip
+    if tip is None:
+        return finger
+    scaled = replace(tip, length=tip.length * share, width=tip.width * share, height=tip.height * share)
+    return replace(finger, fingertip=scaled)
 
 
 def fit_blister(blister: Blister, layout: Layout) -> Blister:
@@ -66,10 +89,14 @@ def fit_blister(blister: Blister, layout: Layout) -> Blister:
     widest = max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 2
     if blister.radius <= widest:
         return blister
-    share = widest / blister.radius
+    return _scale_blister(blister, widest / blister.radius)
+
+
+def _scale_blister(blister: Blister, share: float) -> Blister:
+    """Return a blister of another size, in the same proportions."""
     return replace(
         blister,
-        radius=widest,
+        radius=blister.radius * share,
         edge_radius=blister.edge_radius * share,
         flat_radius=blister.flat_radius * share,
         sigma=blister.sigma * share,
