@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
+import digiclay
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import live_periods
+from digiclay.core.session.run_scene import run
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
 from digiclay.live.stroke import DEEPEST, Brush, draw, start
@@ -101,6 +105,15 @@ def test_the_ridge_has_the_section_of_the_blister(ridge: Running) -> None:
     # 3 mm apart: the finger's path makes the flat top no wider than a pin's pitch.
     wanted = 15.0 * blister.evaluate_profile(np.abs(np.arange(-12, 13)) * 3e-3).clip(0.0)
     np.testing.assert_allclose(across, wanted, rtol=0, atol=1.0)
+
+
+def test_the_ridge_is_the_paper_sessions_to_half_a_millimetre() -> None:
+    # Its ridge is at y = -21 mm, drawn 13.5 mm above the bed by the finger's lowest point; pins are 1.9 mm higher.
+    path = Path(digiclay.__file__).parent / "sample_shapes" / "sessions" / "ridge_mound_valley.toml"
+    history = run(resolve(tomllib.loads(path.read_text(encoding="utf-8")))).history
+    wanted = 1e3 * history["height"][-1].reshape(25, 25)[:12, 12] - 40.0
+    session = form(begin(), [(-HALF, -21.0), (HALF, -21.0)], Brush.RAISE, 15.4)
+    np.testing.assert_allclose(rise(session)[:12, 12], wanted, rtol=0, atol=0.5)
 
 
 def test_a_raise_presses_no_harder_than_a_press(ridge: Running) -> None:
