@@ -12,7 +12,7 @@ from ..live import running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..live.tracking import find_tracking
-from ..press import aim, brush
+from ..press import aim, brush, pen
 from ..settings.declared import title
 from . import status
 from .action import Polled
@@ -86,6 +86,12 @@ class Press(Polled, bpy.types.Operator):
         name="Pen Pressure",
         description="Pen pressure scales depth, height and strength, up to their values",
         default=True,
+    )
+    pressure_curve: bpy.props.EnumProperty(
+        name="Pressure Curve",
+        description="Share of the values that a pen reaches with part of its pressure",
+        items=pen.CURVE_ITEMS,
+        default="LINEAR",
     )
 
     @classmethod
@@ -201,7 +207,7 @@ class Press(Polled, bpy.types.Operator):
     def _feel(self, event: Any) -> None:
         """Take a pen's pressure."""
         if self.use_pressure and event.is_tablet:
-            self.pressure = min(max(float(event.pressure), 0.0), 1.0)
+            self.pressure = pen.find_share(float(event.pressure), self.pressure_curve)
 
     def _keep_amount(self, context: Any) -> None:
         """Let the next stroke of this brush have the depth or height of this one."""

@@ -146,7 +146,10 @@ class PressTool(bpy.types.WorkSpaceTool):
         if settings.brush != "LEVEL":
             layout.prop(settings, amount_name(Brush(settings.brush)))
         layout.prop(settings, "strength")
-        layout.prop(settings, "use_pressure")
+        row = layout.row(align=True)
+        row.prop(settings, "use_pressure")
+        if settings.use_pressure:
+            row.prop(settings, "pressure_curve", text="")
         layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")
 
 
