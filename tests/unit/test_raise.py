@@ -108,7 +108,7 @@ def test_the_ridge_has_the_section_of_the_blister(ridge: Running) -> None:
 
 
 def test_the_ridge_is_the_paper_sessions_to_half_a_millimetre() -> None:
-    # Its ridge is at y = -21 mm, drawn 13.5 mm above the bed by the finger's lowest point; pins are 1.9 mm higher.
+    # Its ridge is at y = -21 mm; the lowest point of the finger that draws it is 13.5 mm above the bed.
     path = Path(digiclay.__file__).parent / "sample_shapes" / "sessions" / "ridge_mound_valley.toml"
     history = run(resolve(tomllib.loads(path.read_text(encoding="utf-8")))).history
     wanted = 1e3 * history["height"][-1].reshape(25, 25)[:12, 12] - 40.0
