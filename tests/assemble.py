@@ -196,6 +196,8 @@ STACKABLE = {
     "cell_states": "ridge_mound_valley",
     "elastic": "elastic_press",
     "plastic": "plastic_press",
+    "viscous": "viscous_press",
+    "push_pull": "push_pull",
     "force_display": "force_display",
     "shape_display": "shape_display",
 }

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 from digiclay.core.base.errors import DivergenceError
-from digiclay.core.batch.packing import BATCHED
 from digiclay.core.batch.run_together import measure_together
+from digiclay.core.control.methods import METHODS
 from digiclay.core.metrics.summary import METRICS
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
@@ -47,7 +47,7 @@ def assert_as(found: Any, alone: Any) -> None:
         assert found.metrics[name] == expected, name
 
 
-@pytest.mark.parametrize("method", BATCHED)
+@pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=2.5")
     first, *others = known.section("trajectory").waypoints

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DivergenceError, ParameterError
-from digiclay.core.batch.packing import BATCHED, describe_structure, find_reason
+from digiclay.core.batch.packing import describe_structure
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.trajectory import Waypoint
@@ -58,7 +58,7 @@ def assert_as_alone(found: Result, known: Scene) -> None:
     assert found.metrics["losses"] == alone.metrics["losses"]
 
 
-@pytest.mark.parametrize("method", BATCHED)
+@pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
     scenes = [
@@ -248,12 +248,6 @@ def test_a_stack_that_is_stopped_gives_up_what_is_not_done() -> None:
 def test_the_run_times_of_a_stack_are_shares_of_it() -> None:
     first, second = together([sample("tap", f"control.force_gain={gain}") for gain in (3, 5)])
     assert first.run_time == second.run_time > 0.0
-
-
-def test_every_method_stands_in_stacks_or_says_why_not() -> None:
-    for method in METHODS:
-        known = sample("tap", f"control.method={method}")
-        assert bool(find_reason(known)) == (method not in BATCHED), method
 
 
 @pytest.mark.parametrize(

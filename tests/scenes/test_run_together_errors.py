@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import pytest
-from digiclay.core.batch.packing import BATCHED, describe_structure
+from digiclay.core.batch.packing import describe_structure
 from digiclay.core.batch.run_together import measure_together
+from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
 from digiclay.core.session.run_scene import Result, run
@@ -40,7 +41,7 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
             assert found.metrics[f"{name}_error"] == expected, name
 
 
-@pytest.mark.parametrize("method", BATCHED)
+@pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
     first, *others = known.section("trajectory").waypoints

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
-from digiclay.core.batch.packing import find_reason
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import Scene
 
-from tests.assemble import sample
+from tests.assemble import STACKABLE, sample
 from tests.scenes.test_run_together import assert_as_alone, moved, together
 
 
@@ -35,9 +37,54 @@ def test_runs_with_sensors_of_their_own_come_to_what_they_come_to_alone() -> Non
         assert_as_alone(found, one)
 
 
-def test_noisy_sensors_keep_a_scene_out_of_stacks() -> None:
-    reasons = {find_reason(sample("tap", f"sensors.{one}_noise=1e-6")) for one in ("force", "height")}
-    assert reasons == {"what noisy sensors make of a cell depends on which cells take part"}
+#: Noise of three runs: of force, of height, and its seed.
+NOISES = (("1e-3", "5e-6", "1"), ("2e-3", "2e-6", "2"), ("0.5e-3", "20e-6", str(2**62 + 1)))
+
+
+def noisy(name: str, *settings: str) -> list[Scene]:
+    """Return scenes with noise of their own."""
+    return [
+        sample(
+            name,
+            *settings,
+            f"sensors.force_noise={force}",
+            f"sensors.height_noise={height}",
+            f"sensors.seed={seed}",
+        )
+        for force, height, seed in NOISES
+    ]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
+    scenes = noisy(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
+    # Fingers that come down elsewhere and differently far: other cells of each, and not as many.
+    scenes = [
+        replace(moved(one, 2e-3 * i, -0.2e-3 * i), simulation=replace(one.simulation, duration=1.5 - 0.3 * i))
+        for i, one in enumerate(scenes)
+    ]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        ("sensors.height_step=20e-6", "sensors.force_step=1e-3"),
+        ("sensors.delay=2", "sensors.height_step=5e-6"),
+    ],
+)
+def test_noise_that_is_rounded_or_late_is_that_of_the_run_alone(method: str, sensors: Sequence[str]) -> None:
+    scenes = noisy("slow_press", f"control.method={method}", *sensors, "simulation.duration=0.8")
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
+def test_the_papers_session_with_noise_is_that_session() -> None:
+    scenes = noisy("ridge_mound_valley", "simulation.duration=11")
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
 
 
 def test_runs_that_start_from_a_shape_come_to_what_they_come_to_alone() -> None:

@@ -155,16 +155,13 @@ def test_sessions_of_days_run_alone_and_it_is_said() -> None:
     assert parts.describe() == ["5 points one at a time: they have too many rows to keep for many at once"]
 
 
-def test_what_cannot_stand_in_a_stack_runs_alone_and_it_is_said() -> None:
-    parts = make_bundles(
-        some("control.method=viscous,push_pull,elastic", "valve_lag.time_constant=1e-3:2e-3:4")
-    )
-    assert indices(parts.batches) == [[8, 9, 10, 11]]
-    assert parts.describe() == [
-        "4 points run in 1 stack",
-        "4 points one at a time: what viscous does depends on which cells take part",
-        "4 points one at a time: what push_pull does depends on which cells take part",
-    ]
+def test_every_method_stands_in_stacks_with_noise_and_without() -> None:
+    noise = ("sensors.force_noise=1e-3,2e-3,3e-3", "sensors.seed=1,2")
+    parts = make_bundles(some("control.method=viscous,push_pull,cell_states,virtual_master", *noise))
+    assert indices(parts.batches) == [list(range(first, first + 6)) for first in (0, 6, 12, 18)]
+    assert parts.describe() == ["24 points run in 4 stacks"]
+    quiet = make_bundles(some("control.method=virtual_master", "sensors.force_noise=0,1e-3", noise[1]))
+    assert quiet.batches == ()  # with noise and without it are two structures, of two runs each
 
 
 def test_values_that_do_not_go_together_are_in_no_stack() -> None:

@@ -98,8 +98,9 @@ def select_runs(state: State, runs: Sequence[int]) -> State:
         quadratic_basis=held.quadratic_basis[..., chosen],
         peak=held.peak[chosen],
         until=0,
+        own=tuple(held.own[run] for run in runs) if held.own else (),
     )
     several = (state.rows, state.modes, state.aged)
     rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
     memory = [state.memory[run] for run in runs]
-    return State(state.period, rows, modes, aged, active.peak, active, memory)
+    return State(state.period, rows, modes, aged, state.peak[chosen], active, memory)

@@ -63,7 +63,7 @@ def _one(values: list[Any]) -> Any:
     if isinstance(first, tuple):
         own = tuple(_one(list(several)) for several in zip(*values, strict=True))
         return first if all(map(operator.is_, own, first)) else own
-    return first if all(value is first or value == first for value in values) else list_numbers(values)
+    return first if all(value is first or value == first for value in values) else np.array(values)
 
 
 def list_numbers(values: Sequence[float]) -> Floats:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
 
-from ..control.methods import METHODS
 from ..engine.system import System
 from ..model.interfaces import Stepper
 from ..scene.assembly import assemble
@@ -15,10 +14,10 @@ from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Batch
 from .broadcasting import classify, list_numbers, merge_parts
 from .movement import BatchStepper
-from .padding import PaddedSelection
+from .padding import OwnSelection, PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["BATCHED", "describe_structure", "find_reason", "make_batch"]
+__all__ = ["describe_structure", "make_batch"]
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
@@ -26,21 +25,9 @@ CLOSED_FORM = ("bernoulli", "richardson")
 #: Parts that decide how cells move.
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
-#: Methods whose orders for a cell are the same whichever others take part.
-BATCHED = tuple(name for name, method in METHODS.items() if not method.by_set)
-
-
-def find_reason(scene: Scene) -> str:
-    """Return why a scene cannot stand in a batch; empty for one that can."""
-    if scene.sensors and (scene.sensors.force_noise or scene.sensors.height_noise):
-        return "what noisy sensors make of a cell depends on which cells take part"
-    if scene.control and scene.method not in BATCHED:
-        return f"what {scene.method} does depends on which cells take part"
-    return ""
-
 
 def describe_structure(scene: Scene) -> Any:
-    """Return what scenes must have in common to stand in one batch; see also `find_reason`.
+    """Return what scenes must have in common to stand in one batch.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
     The other steppers know no runs, so for them all cells must be alike.
@@ -52,13 +39,15 @@ def describe_structure(scene: Scene) -> Any:
     """
     physics = tuple(scene.section(name) for name in PHYSICS)
     fingertips = tuple(finger.fingertip for finger in scene.fingers)
-    rounds = scene.sensors and bool(scene.sensors.force_step or scene.sensors.height_step)
+    sensors = scene.sensors and replace(scene.sensors, seed=0)
+    rounds = sensors and bool(sensors.force_step or sensors.height_step)
     common = (
         scene.layout,
         scene.method if scene.control else None,
         scene.shape is None,
-        *(classify(part) for part in (fingertips, scene.control, scene.blister, scene.sensors)),
+        *(classify(part) for part in (fingertips, scene.control, scene.blister, sensors)),
         rounds,
+        sensors and sensors.noisy,
         scene.recorder,
         scene.simulation.stepper,
     )
@@ -89,17 +78,22 @@ def make_batch(systems: Sequence[System]) -> Batch:
     plan = merge_parts([system.plan for system in systems])
     # Of its stepper a control period uses `prepare` alone.
     stepper = cast(Stepper, BatchStepper(first.stepper, plan is first.plan, cell.lag_rows.start))
+    common = first.grid, first.rows, cell, period, fastest
+    own = tuple(system.selection for system in systems)
     return Batch(
         grid=first.grid,
         cell=cell,
         sensors=merge_parts([system.sensors for system in systems]) if first.sensors else None,
-        controller=join_controllers([system.controller for system in systems]) if first.controller else None,
+        controller=join_controllers([system.controller for system in systems], by_set=first.by_set)
+        if first.controller
+        else None,
         stepper=stepper,
         plan=plan,
         period=period,
         fastest=fastest,
-        selection=PaddedSelection(first.grid, first.rows, cell, period, fastest),
+        selection=OwnSelection(*common, own) if first.by_set else PaddedSelection(*common),
         instants=first.instants,
         rows=first.rows,
+        by_set=first.by_set,
         systems=tuple(systems),
     )

@@ -6,18 +6,18 @@ The set is made anew for all runs together, as soon as it no longer does for one
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.active_set import KEPT, Selection
-from ..engine.state import State
+from ..engine.state import ActiveSet, State
 from ..model.layout import Grid
 from .broadcasting import Floats
 
-__all__ = ["NO_DISC", "PaddedSelection", "compute_reach", "join_discs"]
+__all__ = ["NO_DISC", "OwnSelection", "PaddedSelection", "compute_reach", "join_discs"]
 
 Flags = NDArray[np.bool_]
 Cells = NDArray[np.intp]
@@ -86,6 +86,67 @@ class PaddedSelection(Selection):
             until=state.period + KEPT,
         )
         return state._replace(peak=top, active=self.take(state, chosen))
+
+
+@dataclass(frozen=True, eq=False)
+class OwnSelection(Selection):
+    """Selection of the cells that are active in each session alone, for sessions that depend on them.
+
+    Where fewer are active than in another run, others make up the number; of these nothing is measured
+    and nothing is commanded.
+
+    Attributes
+    ----------
+    runs : tuple of Selection
+        The sessions' own.
+    """
+
+    runs: tuple[Selection, ...]
+
+    def update(self, state: State, finger: Any, control: Any) -> State:
+        """Return a state whose active cells are those of each session; see `PaddedSelection.update`."""
+        held, period, runs = state.active, state.period, range(len(self.runs))
+        # Before the first period there are no sets; those are as good as outlived.
+        own = list(held.own or (replace(held, cells=np.empty(0, np.intp)) for _ in runs))
+        windows = _split_window(finger, len(runs))
+        discs = control or [None for _ in runs]
+        due = [run for run in runs if not self.runs[run].holds(own[run], period, windows[run], discs[run])]
+        if period < held.until and not due:
+            return state
+        busy, peak = self.release(state), state.peak.copy()
+        for run in due:
+            cells = own[run].cells
+            heights, moving = held.block[0, : cells.size, run], cells[busy[: cells.size, run]]
+            top = peak[run] = max([float(peak[run]), *heights.tolist()])
+            own[run] = self.runs[run].choose(own[run], period, windows[run], discs[run], moving, top)
+        cells = _pad(own, self.grid.count)
+        chosen = replace(
+            held,
+            cells=cells,
+            near=max(one.near for one in own),
+            quadratic_basis=self.grid.compute_basis(cells.ravel()).reshape(6, *cells.shape),
+            until=min(one.until for one in own),
+            own=tuple(own),
+        )
+        return state._replace(peak=peak, active=self.take(state, chosen))
+
+
+def _split_window(finger: Any, runs: int) -> list[Any]:
+    """Return each run's own `touch.Window`; None where there is no finger."""
+    if finger is None:
+        return [None] * runs
+    return [tuple(window) for window in np.broadcast_to(finger.window, (6, runs)).T.tolist()]
+
+
+def _pad(own: Sequence[ActiveSet], count: int) -> Cells:
+    """Return the cells (w, b) of all sets, with as many others of the `count` behind them as it takes."""
+    width = max(one.cells.size for one in own)
+    others = np.ones((len(own), count), np.bool_)
+    columns = []
+    for one, free in zip(own, others, strict=True):
+        free[one.cells] = False
+        columns.append(np.concatenate([one.cells, np.flatnonzero(free)[: width - one.cells.size]]))
+    return np.stack(columns, axis=-1)
 
 
 def join_discs(discs: Sequence[tuple[float, float, float] | None] | None) -> Disc:

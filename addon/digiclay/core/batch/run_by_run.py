@@ -23,6 +23,8 @@ __all__ = ["RunByRun", "join_controllers"]
 class RunByRun:
     """Asks each run's own controller in turn: right for every method, and as slow as they are.
 
+    What it asks about are the cells that take part in the run; the others get no orders.
+
     Attributes
     ----------
     controllers : tuple of Controller
@@ -44,13 +46,23 @@ class RunByRun:
             controller.command(known, _take_run(seen, run))
             for run, (controller, known) in enumerate(zip(self.controllers, memory, strict=True))
         ]
-        orders = zip(*(orders for _, orders in given), strict=True)
-        return [known for known, _ in given], Commands(*(np.stack(rows, axis=-1) for rows in orders))
+        targets, modes, commands = seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.shape)
+        for run, (_, orders) in enumerate(given):
+            own = slice(orders.target.size)
+            targets[own, run], modes[own, run], commands[own, run] = orders
+        return [known for known, _ in given], Commands(targets, modes, commands)
 
 
-def join_controllers(controllers: Sequence[Any]) -> Any:
-    """Return one controller for all runs: the method's own where its formulas hold for many at once."""
-    if isinstance(controllers[0], BatchControl):
+def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
+    """Return one controller for all runs: the method's own where its formulas hold for many at once.
+
+    Parameters
+    ----------
+    controllers : sequence of Controller
+    by_set : bool
+        See `System.by_set`.
+    """
+    if isinstance(controllers[0], BatchControl) and not by_set:
         merged = merge_parts(controllers)
         parts = {part.name: getattr(merged, part.name) for part in fields(merged)}
         return merged.batch_class(**parts | {"runs": tuple(controllers)})
@@ -59,6 +71,7 @@ def join_controllers(controllers: Sequence[Any]) -> Any:
 
 def _take_run(seen: Measurement, run: int) -> Measurement:
     """Return what is measured of one run."""
-    rows: list[Any] = [one[..., run] for one in seen]
-    rows[0] = np.ascontiguousarray(rows[0])
-    return Measurement(*rows)
+    own = slice(seen.present[run] if seen.present else None)
+    rows: Any = seen[:-1]
+    basis, *others = (one[..., own, run] for one in rows)
+    return Measurement(np.ascontiguousarray(basis), *others)

@@ -36,7 +36,7 @@ class Method:
     recovers : bool
         Whether its cells go back to the height they had at rest.
     by_set : bool
-        Whether its orders for a cell depend on which other cells are active, which differ in a batch.
+        Whether its orders for a cell depend on which other cells are active; see `System.by_set`.
     """
 
     module: str

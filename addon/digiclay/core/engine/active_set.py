@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..model.layout import Disc, Grid
 from ..model.physics import Cell
-from ..model.touch import FingerPeriod, find_reached_disc
+from ..model.touch import FingerPeriod, Window, find_reached_disc
 from .state import ActiveSet, Rows, State
 
 __all__ = ["KEPT", "Selection"]
@@ -62,32 +62,71 @@ class Selection:
         control : (float, float, float) or None
             Disc x, y, radius that the controller will command, m.
         """
-        grid, held = self.grid, state.active
-        if (
-            state.period < held.until
-            and _holds(held.control, control)
-            and _holds(held.reach, _reach(finger, held.peak))
-        ):
+        held, window = state.active, finger.window if finger else None
+        if self.holds(held, state.period, window, control):
             return state
         moving, top = held.cells[self.release(state)], state.peak
         if held.cells.size:
             top = max(top, float(held.block[0].max()))
+        chosen = self.choose(held, state.period, window, control, moving, top)
+        chosen = replace(chosen, quadratic_basis=self.grid.compute_basis(chosen.cells))
+        return state._replace(peak=top, active=self.take(state, chosen))
+
+    def holds(self, held: ActiveSet, period: int, window: Window | None, control: Disc | None) -> bool:
+        """Return whether a set still has all cells that can change.
+
+        Parameters
+        ----------
+        held : ActiveSet
+        period : int
+            Number of control periods done.
+        window : Window or None
+            Where the finger may touch in the coming period.
+        control : (float, float, float) or None
+            See `update`.
+        """
+        return (
+            period < held.until
+            and _holds(held.control, control)
+            and _holds(held.reach, _reach(window, held.peak))
+        )
+
+    def choose(
+        self,
+        held: ActiveSet,
+        period: int,
+        window: Window | None,
+        control: Disc | None,
+        moving: Cells,
+        top: float,
+    ) -> ActiveSet:
+        """Return the set that comes after another one: its cells, and for how long it serves.
+
+        Parameters
+        ----------
+        held : ActiveSet
+            The set before; its block, modes and basis stay.
+        period, window, control
+            See `holds`.
+        moving : ndarray of int (m,)
+            Cells that still move.
+        top : float
+            No pin top is higher than this, m.
+        """
+        grid = self.grid
         peak = min(top + KEPT * self.period * self.fastest, self.cell.actuator.stroke)
         margin = grid.layout.pitch
-        wide_control, wide_reach = _wider(control, margin), _wider(_reach(finger, peak), margin)
+        wide_control, wide_reach = _wider(control, margin), _wider(_reach(window, peak), margin)
         near = _inside(grid, wide_reach)
-        cells = _together(near, moving, _inside(grid, wide_control))
-        chosen = replace(
+        return replace(
             held,
-            cells=cells,
+            cells=_together(near, moving, _inside(grid, wide_control)),
             near=near.size,
-            quadratic_basis=grid.compute_basis(cells),
             reach=wide_reach,
             control=wide_control,
             peak=peak,
-            until=state.period + KEPT,
+            until=period + KEPT,
         )
-        return state._replace(peak=top, active=self.take(state, chosen))
 
     def release(self, state: State) -> NDArray[np.bool_]:
         """Put the active cells back into the bed, in place; return which of them still move."""
@@ -120,9 +159,9 @@ class Selection:
         return replace(chosen, block=block, mode=state.modes.take(flat))
 
 
-def _reach(finger: FingerPeriod | None, peak: float) -> Disc | None:
+def _reach(window: Window | None, peak: float) -> Disc | None:
     """Return the disc the finger may touch while no pin is above `peak`, m; None without a finger."""
-    return find_reached_disc(finger.window, peak) if finger else None
+    return find_reached_disc(window, peak) if window else None
 
 
 def _wider(disc: Disc | None, margin: float) -> Disc | None:

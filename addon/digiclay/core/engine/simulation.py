@@ -172,15 +172,15 @@ def _ready(system: System, held: ActiveSet) -> _Ready:
     """Return what this system needs of an active set."""
     known: _Ready | None = held.ready.get(system.plan)
     if known is None:
-        touched, everything = (
-            Measurement(
-                one.quadratic_basis, one.height, one.force, one.target, one.mode, one.controlled, one.cells
-            )
-            for one in (held.touched, held.all)
-        )
         movement = system.stepper.prepare(system.plan, held.driven, held.near)
-        known = held.ready[system.plan] = _Ready(touched, everything, movement)
+        known = held.ready[system.plan] = _Ready(_read(held.touched), _read(held.all), movement)
     return known
+
+
+def _read(one: CellGroup) -> Measurement:
+    """Return what is true of some active cells, in the arrays of the set."""
+    rows = one.height, one.force, one.target, one.mode, one.controlled
+    return Measurement(one.quadratic_basis, *rows, one.cells, one.present)
 
 
 def _locate(system: System, state: State) -> tuple[Any, Any]:

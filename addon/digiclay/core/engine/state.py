@@ -104,6 +104,9 @@ class ActiveSet:
         No pin top in the finger's part is higher while this set is in use, m.
     until : int
         Control period by which the set is to be made anew.
+    own : tuple of ActiveSet
+        In a batch whose runs have the sets they have alone: these, of which block, modes and basis are not
+        looked at. Their cells are the first of each run's; others make up the number.
     """
 
     rows: Rows
@@ -116,21 +119,22 @@ class ActiveSet:
     control: Any
     peak: Any
     until: int
+    own: tuple[ActiveSet, ...] = ()
 
     # Parts of the block, all of them views. Each is made once: a set lives for many periods.
 
     @cached_property
     def all(self) -> CellGroup:
         """All cells."""
-        return self._part(len(self.cells))
+        return self._part(len(self.cells), [len(one.cells) for one in self.own])
 
     @cached_property
     def touched(self) -> CellGroup:
         """The cells the finger may touch."""
-        return self._part(self.near)
+        return self._part(self.near, [one.near for one in self.own])
 
-    def _part(self, count: int) -> CellGroup:
-        """Return the rows of the first `count` cells."""
+    def _part(self, count: int, present: list[int]) -> CellGroup:
+        """Return the rows of the first `count` cells; the first `present` of them are the runs' own."""
         rows, block = self.rows, self.block[:, :count]
         return CellGroup(
             self.cells[:count],
@@ -142,6 +146,7 @@ class ActiveSet:
             block[rows.force],
             block[rows.controlled],
             block[rows.sensed],
+            tuple(present),
         )
 
     @cached_property
@@ -185,6 +190,7 @@ class CellGroup(NamedTuple):
     force: Floats
     controlled: Floats
     sensed: Floats
+    present: tuple[int, ...]
 
 
 class State(NamedTuple):

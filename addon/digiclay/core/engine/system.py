@@ -45,6 +45,9 @@ class System:
     instants : ndarray (p,)
         Times into the period at which the finger's pose is needed, first 0, last `period`, s.
     rows : Rows
+    by_set : bool
+        Whether what becomes of a cell depends on which others are active: in a batch each run then keeps
+        the active set it has alone.
     """
 
     grid: Grid
@@ -58,6 +61,7 @@ class System:
     selection: Selection
     instants: Floats
     rows: Rows
+    by_set: bool
 
 
 def make_segments(

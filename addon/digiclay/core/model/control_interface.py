@@ -28,6 +28,8 @@ class Measurement(NamedTuple):
         What the controller remembers of each cell; brought up to date in place.
     cells : ndarray of int (m,)
         Their numbers in the bed.
+    present : tuple of int
+        In a batch how many of the cells, the first, take part in each run; empty: all do.
     """
 
     quadratic_basis: Floats
@@ -37,6 +39,7 @@ class Measurement(NamedTuple):
     mode: NDArray[np.int8]
     own: Floats
     cells: NDArray[np.intp]
+    present: tuple[int, ...] = ()
 
 
 class Commands(NamedTuple):

@@ -57,6 +57,11 @@ class Sensing(Parameters):
     seed: int = quantity(0, "seed of the noise", at_least=0, at_most=2**63 - 1)
 
     @property
+    def noisy(self) -> bool:
+        """Whether there is noise."""
+        return bool(self.force_noise or self.height_noise)
+
+    @property
     def force_floor(self) -> float:
         """Force from which on the reading of a cell is no noise, N; 0 without noise.
 
@@ -87,7 +92,7 @@ class Sensing(Parameters):
                 raise ParameterError("Sensing", name, rule, f"{getattr(self, name):g} N")
 
 
-def draw_normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """Return two independent standard normal numbers a cell, a pure function of the arguments.
 
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
@@ -95,16 +100,18 @@ def draw_normals(seed: int, period: int, cells: NDArray[np.intp]) -> tuple[Float
 
     Parameters
     ----------
-    seed, period : int
+    seed : int or ndarray of int (b,)
         Not negative.
-    cells : ndarray of int (m,)
+    period : int
+        Not negative.
+    cells : ndarray of int (m,) or (m, b)
 
     Returns
     -------
-    first, second : ndarray (m,)
+    first, second : ndarray (m,) or (m, b)
         By Box and Muller's method; no farther from 0 than 8.6.
     """
-    start = _mix(np.array([seed % WORD], np.uint64))
+    start = _mix(np.array(seed, np.uint64, ndmin=1))
     start = _mix(start + np.uint64(period % WORD))
     counter = start + np.uint64(WEYL) * (2 * cells.astype(np.uint64))
     radius = np.sqrt(-2.0 * np.log(_draw_uniform(counter)))

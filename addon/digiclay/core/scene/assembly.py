@@ -50,7 +50,15 @@ def assemble(scene: Scene) -> System:
         selection=Selection(bed, rows, cell, period, fastest),
         instants=instants,
         rows=rows,
+        by_set=_depends_on_set(scene),
     )
+
+
+def _depends_on_set(scene: Scene) -> bool:
+    """Return whether what becomes of a cell depends on which others are active."""
+    if scene.sensors and scene.sensors.noisy:
+        return True
+    return bool(scene.control) and METHODS[scene.method].by_set
 
 
 def _make_stepper(scene: Scene) -> Stepper:
@@ -105,7 +113,7 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     from ..model.sensors import Delayed, Noisy, Quantized
 
     sensors: Sensors = PerfectSensors()
-    if known.force_noise or known.height_noise:
+    if known.noisy:
         sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
     if known.force_step or known.height_step:
         sensors = Quantized(sensors, known.force_step, known.height_step)

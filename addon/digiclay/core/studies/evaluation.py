@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
-from ..batch.packing import describe_structure, find_reason
+from ..batch.packing import describe_structure
 from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
 from ..scene.schema import Scene
@@ -117,10 +117,8 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
     alone: list[Point] = []
     why: Counter[str] = Counter()
     for point in points:
-        reason = find_reason(point.scene) if point.scene else ""
-        if point.scene is None or reason:
+        if point.scene is None:
             alone.append(point)
-            why.update([reason] if reason else [])
             continue
         try:
             judge = describe_structure(make_reference(point.scene)) if errors else None
