@@ -107,7 +107,7 @@ def test_the_ridge_has_the_section_of_the_blister(ridge: Running) -> None:
     np.testing.assert_allclose(across, wanted, rtol=0, atol=1.0)
 
 
-def test_the_ridge_is_the_paper_sessions_to_half_a_millimetre() -> None:
+def test_the_ridge_is_the_paper_sessions_to_half_a_millimeter() -> None:
     # Its ridge is at y = -21 mm; the lowest point of the finger that draws it is 13.5 mm above the bed.
     path = Path(digiclay.__file__).parent / "sample_shapes" / "sessions" / "ridge_mound_valley.toml"
     history = run(resolve(tomllib.loads(path.read_text(encoding="utf-8")))).history
