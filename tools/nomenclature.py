@@ -78,7 +78,6 @@ TERMS = (
     ("bake", "Blender animation made from a take"),
     ("batch", "several runs that are simulated in one call, with the run as the last array axis"),
     ("job", "one run of a job series, with its meshes and pictures"),
-    ("snapshot", "state as bytes, in a file or a .blend"),
     ("job series", "all jobs of a JOBS file; the command `digiclay batch` executes it"),
     ("sweep", "one scene over a grid of parameter values; a point is one combination of them"),
     ("series", "a job series or a sweep, with its folder"),

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.control_interface import Measurement, Commands
+from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
 

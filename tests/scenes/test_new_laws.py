@@ -22,7 +22,7 @@ import numpy as np
 
 from ..base.quantity import Parameters, quantity
 from .fluid import Fluid
-from .valve import Orifice, Valve, orifice
+from .valve import Orifice, Valve, make_orifice
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class EqualPercentage(Parameters):
 
     def flow_law(self, fluid: Fluid) -> Orifice:
         """Return the valve's flow law in a fluid."""
-        open_ = orifice(Valve(self.orifice_diameter, self.stroke), fluid)
+        open_ = make_orifice(Valve(self.orifice_diameter, self.stroke), fluid)
         return ExponentialOrifice(open_.laminar, open_.turbulent, open_.power, self.rangeability)
 
 

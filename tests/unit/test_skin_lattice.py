@@ -64,7 +64,9 @@ def test_inside_the_bed_it_is_the_smooth_skin_of_the_exports() -> None:
     formed = Formed(
         instant.position, height, rest, np.zeros(len(height)), np.zeros(len(height), np.int8), 9, 8
     )
-    exported = skins.over(formed, height, "smooth", parts, 1e-3).reshape(8 * parts + 1, 7 * parts + 1)
+    exported = skins.interpolate_skin(formed, height, "smooth", parts, 1e-3).reshape(
+        8 * parts + 1, 7 * parts + 1
+    )
     margin = parts // 2
     inside = live[margin:-margin, margin:-margin]
     # The two end the slopes at the outermost pins differently, which the next pin inside feels no more.
