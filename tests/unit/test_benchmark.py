@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import statistics
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -77,6 +78,13 @@ def test_the_products_of_plain_arrays_in_a_period_are_all_counted() -> None:
         sys.setprofile(None)
     assert counted.calls["dot", (2, 6)] == asked > 100
     assert len(calls) == 300
+
+
+def test_a_period_of_method_i_makes_at_most_115_numpy_calls() -> None:
+    # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
+    scene = sample("ridge_mound_valley")
+    calls, _ = period_calls(assemble(scene), scene.trajectories(), 2000)
+    assert statistics.median(calls) <= 115
 
 
 def test_counting_does_not_change_a_result(ledger: Ledger) -> None:

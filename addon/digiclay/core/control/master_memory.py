@@ -65,8 +65,8 @@ class Master(NamedTuple):
             m.
         heading : Heading
         """
-        kept = self.height, self.opening, self.reference, self.edge
-        return Master(self.phase, x, y, *kept, heading, self.felt, 0, self.losses)
+        phase, _, _, height, opening, reference, edge, _, felt, _, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
 
     def lead(self, phase: Phase, height: float, opening: float) -> Master:
         """Return the master after a period, with its valve's opening.
@@ -79,11 +79,11 @@ class Master(NamedTuple):
         opening : float
             Of its valve.
         """
-        felt = height if self.alone == 0 else self.felt
-        place, kept = (self.x, self.y), (self.reference, self.edge)
-        return Master(phase, *place, height, opening, *kept, self.heading, felt, self.alone, self.losses)
+        _, x, y, _, _, reference, edge, heading, felt, alone, losses = self
+        felt = height if alone == 0 else felt
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
 
     def with_edge(self, edge: float) -> Master:
         """Return the master in a surface of this height."""
-        kept = self.phase, self.x, self.y, self.height, self.opening, self.reference
-        return Master(*kept, edge, self.heading, self.felt, self.alone, self.losses)
+        phase, x, y, height, opening, reference, _, heading, felt, alone, losses = self
+        return Master(phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)

@@ -93,13 +93,14 @@ def take_cells(values: NDArray[Any], cells: NDArray[np.intp]) -> NDArray[Any]:
     return values.take(cells) if values.ndim == 1 else np.take_along_axis(values, cells, axis=0)
 
 
-def sum_weighted(rows: Floats, weights: Floats) -> Floats:
+def sum_weighted(rows: Floats, weights: NDArray[Any]) -> Floats:
     """Return the sums over the cells of one or k rows times a weight.
 
     Parameters
     ----------
     rows : ndarray ([k,] m) or ([k,] m, b)
     weights : ndarray (m,) or (m, b)
+        Numbers, or a test: the sums over the cells for which it holds.
 
     Returns
     -------

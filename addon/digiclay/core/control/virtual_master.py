@@ -99,7 +99,7 @@ class VirtualMasterControl(MasterControl):
         """
         hidden = self._measure_excess(memory, touched.quadratic_basis) <= 0.0
         hidden &= touched.force < self.floor
-        noise = sum_weighted(touched.force, hidden.astype(float)).tolist()
+        noise = sum_weighted(touched.force, hidden).tolist()
         return self.add_noise(memory, felt, noise)
 
     def _measure_excess(self, memory: Any, basis: Floats) -> Floats:
@@ -134,7 +134,7 @@ class VirtualMasterControl(MasterControl):
         # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
         facing = ahead >= abeam
         facing &= ring
-        level = sum_weighted(seen.height, facing.astype(float)).tolist()
+        level = sum_weighted(seen.height, facing).tolist()
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind = self.get_heights(memory)
         profile = self.blister.interpolate(distance, edge, top)

@@ -101,8 +101,6 @@ class Orifice:
         """
         if out is None:
             return opening * opening if self.power == 2 else abs(opening)
-        if out is None:
-            return opening * opening if self.power == 2 else abs(opening)
         return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
