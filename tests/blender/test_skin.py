@@ -112,6 +112,25 @@ def test_automatic_draws_the_skin_for_pins_that_are_too_small(bed: Any) -> None:
     assert len(points)
 
 
+def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Path) -> None:
+    scene = bpy.context.scene
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bed.location = (6.2, -6.0, 4.2)  # near the camera of the factory file
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.render.resolution_x, scene.render.resolution_y = 96, 64
+    form.set_far(bed, True)
+    pictures = {}
+    for shown in ("pins", "automatic", "skin"):
+        bed.digiclay_display.form = shown
+        scene.render.filepath = str(tmp_path / f"{shown}.png")
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(scene.render.filepath)
+        pictures[shown] = np.array(image.pixels[:])
+    np.testing.assert_array_equal(pictures["automatic"], pictures["pins"])
+    # The bed is seen: pins and skin differ in some of the pixels by more than rounding.
+    assert (np.abs(pictures["skin"] - pictures["pins"]) > 0.02).sum() > 100
+
+
 def test_the_key_shows_the_skin_and_the_pins_again_as_undo_steps(bed: Any) -> None:
     done("Bed")
     shown = []

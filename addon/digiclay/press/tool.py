@@ -151,6 +151,7 @@ class PressTool(bpy.types.WorkSpaceTool):
         if settings.use_pressure:
             row.prop(settings, "pressure_curve", text="")
         layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")
+        layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
 
 
 def register() -> None:
