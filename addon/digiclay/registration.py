@@ -8,7 +8,7 @@ from . import command_line, operators, panels, preferences
 from .device import detail, display, unit_watch
 from .exchange import image_reader
 from .live import handlers
-from .press import tool
+from .press import brush_presets, tool
 from .settings import properties
 
 __all__ = ["register", "unregister"]
@@ -19,6 +19,7 @@ MODULES: tuple[ModuleType, ...] = (
     image_reader,
     display,
     preferences,
+    brush_presets,
     operators,
     panels,
     tool,

@@ -15,6 +15,8 @@ from tests.window.hand_strokes import drag, finish, hand, note, on_the_screen, r
 
 #: Ends of the stroke that is mirrored, mm.
 MIRRORED = ((-27.0, 12.0), (-9.0, 12.0))
+#: Radius of the ring, mm.
+RADIUS = 21.0
 #: How far the mouse goes sideways to make the fingertip larger, mm on the bed: half of what its size grows.
 WIDER = 4.0
 
@@ -115,3 +117,33 @@ def symmetric(blender: Any) -> Iterator[float | None]:
     yield from finish(blender, hand(keys("ctrl+z")))
     note(blender, "symmetric undone")
     settings(blender).symmetry = "NONE"
+    yield from reset(blender)
+    yield from shapes(blender)
+
+
+def shapes(blender: Any) -> Iterator[float | None]:
+    """Drag a line, then click with Shift; drag a ring; draw with a stabilizer."""
+    brush = settings(blender)
+    brush.path = "LINE"
+    start, end = on_the_screen(blender, -27.0, -24.0), on_the_screen(blender, 27.0, -24.0)
+    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 0.4, 60), "mouseup 1"))
+    brush.path = "FREE"
+    corner = on_the_screen(blender, 27.0, 27.0)
+    yield from finish(blender, hand(to(corner), "keydown shift sleep 0.1 click 1 sleep 0.1 keyup shift"))
+    note(blender, "lines")
+    yield from reset(blender)
+    brush.path = "RING"
+    start, end = on_the_screen(blender, 0.0, 0.0), on_the_screen(blender, RADIUS, 0.0)
+    process = hand(to(start), "mousedown 1", drag(start, end, 0.4, 60))
+    yield from blender.until(lambda: process.poll() is not None)
+    yield 0.5
+    blender.shot("ring_preview")
+    yield from finish(blender, hand("mouseup 1"))
+    note(blender, "ring")
+    blender.shot("ring")
+    yield from reset(blender)
+    brush.path, brush.stabilizer = "FREE", 9.0
+    start, end = on_the_screen(blender, -27.0, 0.0), on_the_screen(blender, 27.0, 0.0)
+    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
+    note(blender, "stabilized")
+    brush.stabilizer = 0.0

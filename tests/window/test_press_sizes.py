@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.window.blender_window import played
-from tests.window.press_sizes import MIRRORED, WIDER
+from tests.window.press_sizes import MIRRORED, RADIUS, WIDER
 
 REST = 40.0
 #: A pin that a finger of 4 mm depth has passed is down by more than this, mm.
@@ -70,3 +70,25 @@ def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen: dict[str
         for side in (columns, 24 - columns):
             assert (down(seen, "symmetric")[row, side] > FORMED).mean() >= 0.95
     assert np.abs(down(seen, "symmetric undone")).max() < 1e-3
+
+
+def test_a_line_and_the_line_of_a_shift_click_cover_all_their_pins(seen: dict[str, Any]) -> None:
+    formed = down(seen, "lines") > FORMED
+    assert formed[4, 3:22].mean() >= 0.95
+    assert formed[4:22, 21].mean() >= 0.95
+    # The blister reaches 15 mm to the side.
+    assert not formed[10:22, 3:15].any()
+
+
+def test_a_ring_covers_its_circumference_and_leaves_its_middle(seen: dict[str, Any]) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    rows, columns = (
+        np.rint(12.0 + RADIUS / 3.0 * part).astype(int) for part in (np.sin(angle), np.cos(angle))
+    )
+    formed = down(seen, "ring") > FORMED
+    assert formed[rows, columns].mean() >= 0.95
+    assert not formed[11:14, 11:14].any()
+
+
+def test_a_stabilized_stroke_reaches_its_end(seen: dict[str, Any]) -> None:
+    assert (down(seen, "stabilized")[12, 3:22] > FORMED).mean() >= 0.95

@@ -10,6 +10,7 @@ from ..core.base.errors import DigiclayError
 from ..device import view
 from ..live import running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
+from ..live.stroke_path import pull
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..live.tracking import find_tracking
 from ..press import aim, brush, pen
@@ -17,7 +18,7 @@ from ..settings.declared import title
 from . import status
 from .action import Polled
 
-__all__ = ["Press"]
+__all__ = ["Press", "open_session"]
 
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
@@ -82,6 +83,25 @@ class Press(Polled, bpy.types.Operator):
         items=brush.SYMMETRY_ITEMS,
         default="NONE",
     )
+    path: bpy.props.EnumProperty(
+        name="Stroke",
+        description="Path of a stroke",
+        items=brush.PATH_ITEMS,
+        default="FREE",
+    )
+    stabilizer: bpy.props.FloatProperty(
+        name="Stabilizer (mm)",
+        description=(
+            "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
+            "its end is reached. 0: none"
+        ),
+        default=0.0,
+        min=0.0,
+        max=50.0,
+        soft_max=15.0,
+        precision=1,
+        step=50,
+    )
     use_pressure: bpy.props.BoolProperty(
         name="Pen Pressure",
         description="Pen pressure scales depth, height and strength, up to their values",
@@ -104,22 +124,16 @@ class Press(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points; beside the bed there is nothing to press."""
+        if self.path != "FREE":
+            return {"PASS_THROUGH"}  # to the operator of lines and rings
         found = aim.find_target(context, (event.mouse_region_x, event.mouse_region_y))
         if found is None:
             return {"PASS_THROUGH"}
-        try:
-            session = _session(context, found.bed)
-        except (DigiclayError, RuntimeError) as error:
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
         # Ctrl inverts the brush, for as long as this stroke lasts.
         self.kind = Brush(self.brush).inverse if event.ctrl else Brush(self.brush)
-        if self.kind is not Brush.LOWER and find_tracking(session.scene, session.system) is None:
-            self.report({"ERROR"}, NO_BLISTER.format(brush.LABELS[self.kind], title(session.scene.method)))
+        session = open_session(self, context, found.bed, self.kind)
+        if session is None:
             return {"CANCELLED"}
-        if session.paused:
-            self.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
-        selection.deselect(found.bed)
         # The hand draws on the surface it has seen when it began, not on pins that give way under it.
         self.uid, self.grid, self.surface = session.uid, found.grid, found.height.copy()
         self.region, self.began = context.region, time.perf_counter()
@@ -127,6 +141,7 @@ class Press(Polled, bpy.types.Operator):
         self.pressure, self.ticked = 1.0, 0.0
         self._feel(event)
         place = float(found.point[0]), float(found.point[1])
+        self.lagged = place
         depth, share = self._amount()
         session, self.number = queue_stroke(
             session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share
@@ -179,7 +194,9 @@ class Press(Polled, bpy.types.Operator):
         with context.temp_override(region=self.region):
             point = aim.hit_point(bpy.context, bed, self.grid, self.surface, xy)
         if point is not None and event.value != "PRESS":
-            x, y = float(point[0]), float(point[1])
+            # Released, the stroke goes on to the mouse: a stabilized one has not come there yet.
+            string = 1e-3 * self.stabilizer if event.type != "LEFTMOUSE" else 0.0
+            x, y = self.lagged = pull(self.lagged, (float(point[0]), float(point[1])), string)
             depth, share = self._amount()
             self._change(partial(draw, time=self._time(), x=x, y=y, depth=depth, share=share))
 
@@ -228,7 +245,32 @@ class Press(Polled, bpy.types.Operator):
         return result
 
 
-def _session(context: Any, bed: Any) -> running.Running:
+def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.Running | None:
+    """Return the session of a bed, for a stroke of a brush; one is started if there is none.
+
+    Parameters
+    ----------
+    operator : bpy.types.Operator
+        Reports why there is none to be returned.
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    kind : Brush
+    """
+    try:
+        session = _ensure_session(context, bed)
+    except (DigiclayError, RuntimeError) as error:
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return None
+    if kind is not Brush.LOWER and find_tracking(session.scene, session.system) is None:
+        operator.report({"ERROR"}, NO_BLISTER.format(brush.LABELS[kind], title(session.scene.method)))
+        return None
+    if session.paused:
+        operator.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
+    selection.deselect(bed)
+    return session
+
+
+def _ensure_session(context: Any, bed: Any) -> running.Running:
     """Return the session of a bed; one is started if there is none.
 
     Raises

@@ -16,7 +16,7 @@ from ..press import aim, brush, marks
 from . import status
 from .action import Polled
 
-__all__ = ["AdjustMixin", "no_bed"]
+__all__ = ["AdjustMixin", "no_bed", "no_tool"]
 
 #: Factor of the mouse's way with Shift held.
 PRECISE = 0.1
@@ -194,8 +194,8 @@ class AdjustMixin(Polled):
         scale = context.preferences.system.ui_scale
         shown = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
         cursor(
-            marks.edge_lines(shown, context.preferences.system.pixel_size),
-            marks.label(self.words, (middle[0], middle[1]), scale),
+            marks.make_lines(shown, context.preferences.system.pixel_size),
+            marks.make_label(self.words, (middle[0], middle[1]), scale),
         )
 
     def _end(self, context: Any, result: set[str]) -> set[str]:

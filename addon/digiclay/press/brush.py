@@ -10,9 +10,8 @@ from ..live import waiting
 from ..live.stroke import Brush
 
 __all__ = [
-    "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "SYMMETRY_ITEMS", "TOOL", "amount_name", "bed_in_use",
-    "describe_brush", "describe_stroke", "find_bed",
-    "tool_settings",
+    "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "PATH_ITEMS", "SYMMETRY_ITEMS", "TOOL", "amount_name",
+    "bed_in_use", "describe_brush", "describe_stroke", "find_bed", "tool_settings",
 ]  # fmt: skip
 
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
@@ -38,6 +37,11 @@ SYMMETRY_ITEMS = (
     ("X", "X", "Form the stroke, then its mirror image across the bed's YZ plane"),
     ("Y", "Y", "Form the stroke, then its mirror image across the bed's XZ plane"),
     ("XY", "X and Y", "Form the stroke, then its three mirror images"),
+)
+PATH_ITEMS = (
+    ("FREE", "Free", "Drag to draw the path"),
+    ("LINE", "Line", "Drag from one end of the line to the other; it is formed on release"),
+    ("RING", "Ring", "Drag from the center of the ring to its rim; it is formed on release"),
 )
 
 

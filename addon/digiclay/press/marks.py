@@ -9,7 +9,7 @@ import numpy as np
 
 from ..overlay.picture import Line, Words
 
-__all__ = ["edge_lines", "label"]
+__all__ = ["make_label", "make_lines"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -17,7 +17,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
 
 
-def edge_lines(paths: Sequence[Floats], width: float) -> list[Line]:
+def make_lines(paths: Sequence[Floats], width: float) -> list[Line]:
     """Return light lines on dark ones.
 
     Parameters
@@ -30,7 +30,7 @@ def edge_lines(paths: Sequence[Floats], width: float) -> list[Line]:
     return [Line(path, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for path in paths]
 
 
-def label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
+def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:
     """Return text beside a place, light on a dark edge.
 
     Parameters

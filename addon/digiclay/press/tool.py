@@ -72,7 +72,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     brush = _shown_brush(found.bed, settings)
     amount = 1e-3 * getattr(settings, amount_name(brush))
     text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), brush, amount, settings.strength)
-    cursor(marks.edge_lines(shown, width), marks.label(text, xy, context.preferences.system.ui_scale))
+    cursor(marks.make_lines(shown, width), marks.make_label(text, xy, context.preferences.system.ui_scale))
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:
@@ -114,7 +114,11 @@ class PressTool(bpy.types.WorkSpaceTool):
     )
     bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
+        # The first two leave the press to each other: Blender keeps no order among them.
+        ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        ("digiclay.press_line", {"type": "LEFTMOUSE", "value": "CLICK", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
         ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
@@ -135,6 +139,10 @@ class PressTool(bpy.types.WorkSpaceTool):
         tool : bpy.types.WorkSpaceTool
         """
         settings = tool.operator_properties(OPERATOR)
+        row = layout.row(align=True)
+        row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
+        row.operator("digiclay.press_brush_save", text="", icon="ADD")
+        row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
         bed = bed_in_use(context)
         if bed is not None:
             row = layout.row(align=True)
@@ -143,13 +151,16 @@ class PressTool(bpy.types.WorkSpaceTool):
             row.prop(bed.digiclay, "size")
             row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
         layout.row(align=True).prop(settings, "brush", expand=True)
-        if settings.brush != "LEVEL":
-            layout.prop(settings, amount_name(Brush(settings.brush)))
-        layout.prop(settings, "strength")
         row = layout.row(align=True)
-        row.prop(settings, "use_pressure")
+        if settings.brush != "LEVEL":
+            row.prop(settings, amount_name(Brush(settings.brush)))
+        row.prop(settings, "use_pressure", text="", icon="STYLUS_PRESSURE")
         if settings.use_pressure:
             row.prop(settings, "pressure_curve", text="")
+        layout.prop(settings, "strength")
+        layout.prop(settings, "path", text="")
+        if settings.path == "FREE":
+            layout.prop(settings, "stabilizer")
         layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")
         layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
 
