@@ -118,7 +118,8 @@ class MasterControl(BatchControl):
 
     def is_new(self, master: Master) -> bool:
         """Tell whether a master has found a finger, and is not in the surface yet."""
-        return math.isnan(master.height)
+        # It has no height yet; a comparison, since a batch asks once a run and period.
+        return not master.height > -math.inf
 
     def set_surface(self, master: Master, total: float, surface: float) -> Master:
         """Put a master that has found a finger into the surface; others stay where they are.
