@@ -10,6 +10,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import live_periods
@@ -19,6 +20,8 @@ from digiclay.live.running import Running
 from digiclay.live.stroke import DEEPEST, Brush, draw, start
 from digiclay.live.stroke_queue import change_stroke, queue_stroke
 from digiclay.live.tracking import find_tracking
+from digiclay.settings.beds import BEDS
+from digiclay.settings.devices import make_scene
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
@@ -123,6 +126,21 @@ def test_a_raise_presses_no_harder_than_a_press(ridge: Running) -> None:
 @pytest.mark.parametrize("preset", ["fast", "viscous"])
 def test_other_devices_raise_as_high(preset: str) -> None:
     np.testing.assert_allclose(along(form(begin(preset=preset), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=1.5)
+
+
+@pytest.mark.parametrize("height", [5.0, 15.0])
+def test_a_finer_bed_with_quicker_pins_raises_as_high_and_no_blister_follows_the_finger_up(
+    height: float,
+) -> None:
+    plan, bed = Layout(rows=25, columns=60, pitch=BEDS["design"].pitch), BEDS["design"]
+    scene = make_scene("paper", plan, "virtual_master", bed.share)
+    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
+    session, _ = sculpting.begin_session(7, "Bed", scene, above)
+    session = sculpting.advance(session, above, 0.0, 100)
+    formed = form(session, [(-20.0, 0.0), (20.0, 0.0)], Brush.RAISE, height)
+    row = 1e3 * heights(formed).reshape(25, 60)[12, 17:43] - 40.0
+    assert (np.abs(row - height) < 2.0).mean() >= 0.9
+    assert abs(row[-1] - height) < 1.0
 
 
 def test_method_2_raises_the_whole_line() -> None:

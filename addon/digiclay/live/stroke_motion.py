@@ -42,6 +42,11 @@ CLEARANCE = 4e-3
 #: How long a finger that takes a blister up gains speed, s: at once at half the free speed, it leaves the
 #: pins behind, whose valves have not opened yet.
 SPEED_UP = 1.0
+#: Fastest drag of a blister, in its radii a second: the control finds the finger so much later. The pins of
+#: small beds rise quickly enough to overtake it.
+RADII = 2.0
+#: How long pins look for a finger that leaves, s, and how many times as fast as they it is.
+SEARCH, OUTRUN = 0.1, 5.0
 #: How far the finger may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
 #: Heights that differ by less count as equal, m.
@@ -126,9 +131,13 @@ def _step(
         return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
     radius = finger.width / 2
     if stroke.phase == LEAVING:
+        lift = LIFT
         if stroke.tracking is not None:
-            safe = max(safe, _find_lowest(stroke, grid, x, y, radius) + stroke.tracking.sink + CLEARANCE)
-        z = min(safe, z + LIFT * period)
+            # Pins that look for the finger are not to find it again.
+            speed = stroke.tracking.speed
+            top = _find_lowest(stroke, grid, x, y, radius) + stroke.tracking.sink
+            safe, lift = max(safe, top + max(CLEARANCE, SEARCH * speed)), max(LIFT, OUTRUN * speed)
+        z = min(safe, z + lift * period)
         return (_finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
     move = _press if stroke.tracking is None or stroke.phase == PRESSING else _track
     stroke, (x, y, z) = move(stroke, grid, radius, (x, y, z), period)
@@ -201,7 +210,7 @@ def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
     tracking = stroke.tracking
     near = stroke.height[grid.disc(x, y, tracking.radius)]
     change = float(np.abs(near - z - tracking.sink).max(initial=NEAR))
-    return min(DRAG, tracking.speed / (tracking.slope * change))
+    return min(DRAG, RADII * tracking.radius, tracking.speed / (tracking.slope * change))
 
 
 def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:
