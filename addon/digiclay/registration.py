@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import command_line, operators, panels, preferences
+from . import command_line, operators, panels, preferences, translations
 from .device import detail, display, unit_watch
 from .exchange import image_reader
 from .live import handlers
@@ -23,6 +23,7 @@ MODULES: tuple[ModuleType, ...] = (
     operators,
     panels,
     tool,
+    translations,  # of all that is registered before
     command_line,
     unit_watch,
     detail,

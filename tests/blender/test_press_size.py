@@ -29,13 +29,13 @@ def lengths(bed: Any) -> tuple[float, ...]:
     scene = properties.scene_of(bed)
     blister = scene.blister
     assert blister is not None
-    metres = (
+    meters = (
         2.0 * scene.fingers[0].fingertip.width,
         blister.radius,
         blister.edge_radius,
         blister.flat_radius,
     )
-    return tuple(round(1e3 * length, 4) for length in metres)
+    return tuple(round(1e3 * length, 4) for length in meters)
 
 
 def test_blister_and_drawn_ellipsoid_follow_the_size_in_proportion(bed: Any) -> None:

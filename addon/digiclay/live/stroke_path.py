@@ -50,21 +50,21 @@ def lay_line(start: Place, end: Place) -> Floats:
     return np.array([start, end])
 
 
-def lay_ring(centre: Place, rim: Place) -> Floats:
+def lay_ring(center: Place, rim: Place) -> Floats:
     """Return a closed polygon for the circle about a place through another, (k, 2), m.
 
     Parameters
     ----------
-    centre, rim : (float, float)
-        m. It begins and ends at the rim; one without a radius is its centre alone.
+    center, rim : (float, float)
+        m. It begins and ends at the rim; one without a radius is its center alone.
     """
-    radius = math.hypot(rim[0] - centre[0], rim[1] - centre[1])
+    radius = math.hypot(rim[0] - center[0], rim[1] - center[1])
     if radius < SMALLEST_RING:
-        return np.array([centre])
+        return np.array([center])
     count = max(12, math.ceil(2.0 * math.pi * radius / SIDE))
-    angle = math.atan2(rim[1] - centre[1], rim[0] - centre[0]) + np.linspace(0.0, 2.0 * math.pi, count + 1)
+    angle = math.atan2(rim[1] - center[1], rim[0] - center[0]) + np.linspace(0.0, 2.0 * math.pi, count + 1)
     around: Floats = np.column_stack([np.cos(angle), np.sin(angle)])
-    return radius * around + centre
+    return radius * around + center
 
 
 def lay_path(stroke: Stroke, points: Sequence[Place] | Floats) -> Stroke:

@@ -37,7 +37,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return m a pixel at which the outline's side keeps up with the mouse."""
-        points = self.centre + 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        points = self.center + 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         middle, along, across = aim.project(context, bed, points)[:, 0]
         # Half the width on the screen of a circle of 1 mm about the place.
         pixels = float(np.hypot(along - middle, across - middle))

@@ -101,8 +101,8 @@ class AdjustMixin(Polled):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
         xy = event.mouse_region_x, event.mouse_region_y
-        bed, centre = find_place(context, xy)
-        self.uid, self.centre = bed.session_uid, centre
+        bed, center = find_place(context, xy)
+        self.uid, self.center = bed.session_uid, center
         self.start = self.value = self.read(bed, brush.tool_settings(context))
         self.before, self.text, self.snapped, self.region = event.mouse_x, "", False, context.region
         self.handler = bpy.types.SpaceView3D.draw_handler_add(
@@ -188,9 +188,9 @@ class AdjustMixin(Polled):
         depth = 1e-3 * settings.depth if settings else DEEPEST
         finger, turn = bridge.finger_of(tip), bridge.pose(tip)[3:]
         rims = self.outlines(finger, turn, depth, self._shown())
-        places = [np.column_stack([rim, np.zeros(len(rim))]) + self.centre for rim in rims]
+        places = [np.column_stack([rim, np.zeros(len(rim))]) + self.center for rim in rims]
         lines = [aim.project(context, bed, place) for place in places]
-        middle = aim.project(context, bed, self.centre[None])[0]
+        middle = aim.project(context, bed, self.center[None])[0]
         scale = context.preferences.system.ui_scale
         shown = [np.concatenate([line, line[:1]]) for line in lines if np.isfinite(line).all()]
         cursor(

@@ -1,0 +1,130 @@
+"""Translations of labels and tooltips: a catalog a language, registered with Blender."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from .. import operators, panels, preferences
+from ..compat import bpy
+from ..core.scene.toml_table import PRESETS
+from ..device import display
+from ..press.tool import PressTool
+from ..settings import groups
+from ..settings.declared import title
+
+__all__ = ["collect_strings", "make_entries", "register", "translate", "unregister"]
+
+#: Beginning of the names of the extension's modules.
+EXTENSION = __package__.rpartition(".")[0]
+#: Languages that have a catalog.
+LANGUAGES = ("de",)
+#: Contexts in which Blender looks up a text: labels of operators have one of their own.
+CONTEXTS = ("*", "Operator")
+
+
+@cache
+def _catalog(language: str) -> dict[str, dict[str, str]]:
+    """Read the catalog of a language: sections of texts with their translations."""
+    path = Path(__file__).with_name(f"{language}.toml")
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def translate(text: str, language: str) -> str | None:
+    """Return the translation of a label or a tooltip, or None where the catalog has none.
+
+    A unit in brackets, and what a tooltip adds of a parameter, stay what they are.
+
+    Parameters
+    ----------
+    text : str
+    language : str
+        One of `LANGUAGES`.
+    """
+    known = _catalog(language)
+    for section in ("labels", "tooltips", "parameters"):
+        if text in known[section]:
+            return known[section][text]
+    label, bracket, unit = text.rpartition(" (")
+    if bracket and label in known["labels"]:
+        return f"{known['labels'][label]} ({unit}"
+    parts = text.split("; ")
+    for count in range(len(parts) - 1, 0, -1):
+        meaning = known["parameters"].get("; ".join(parts[:count]))
+        details = [_translate_detail(part, known["details"]) for part in parts[count:]]
+        if meaning is not None and None not in details:
+            return "; ".join([meaning, *filter(None, details)])
+    return None
+
+
+def _translate_detail(part: str, words: dict[str, str]) -> str | None:
+    """Return the translation of a part such as ``at least 3 mm``."""
+    found = next((word for word in words if part.startswith(f"{word} ")), None)
+    return None if found is None else words[found] + part[len(found) :]
+
+
+def collect_strings() -> set[str]:
+    """Return labels and tooltips of all that is registered: of classes, their properties and enum items."""
+    owners = (*operators.CLASSES, *panels.CLASSES, *groups.CLASSES, preferences.Preferences, display.Display)
+    found = {title(name) for name in PRESETS} | {PressTool.bl_label}
+    for owner in owners:
+        found.add(getattr(owner, "bl_label", ""))
+        if issubclass(owner, bpy.types.Operator):
+            found.add(inspect.cleandoc(owner.__doc__ or ""))
+        found.update(_property_strings(owner))
+    return found - {""}
+
+
+def _property_strings(owner: Any) -> Iterator[str]:
+    """Yield labels and tooltips of the properties that a class or a mixin of it declares, and shows."""
+    if issubclass(owner, bpy.types.Menu | bpy.types.Panel):  # their annotations are of Blender's own
+        return
+    own = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
+    declared = {name for kind in own for name in inspect.get_annotations(kind)}
+    described: Any = getattr(owner, "bl_rna", None)
+    if issubclass(owner, bpy.types.Operator):  # its class does not list them
+        area, _, name = owner.bl_idname.partition(".")
+        described = getattr(getattr(bpy.ops, area), name).get_rna_type()
+    for known in described.properties if described is not None else ():
+        if (
+            known.identifier not in declared
+            or known.identifier.startswith(("bl_", "menu_"))
+            or known.is_hidden
+        ):
+            continue
+        yield from (known.name, known.description)
+        for item in known.enum_items if known.type == "ENUM" else ():
+            yield from (item.name, item.description)
+
+
+def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], str]:
+    """Return the entries that Blender takes, by context and text.
+
+    Parameters
+    ----------
+    texts : iterable of str
+    language : str
+        One of `LANGUAGES`.
+    """
+    found = {text: translate(text, language) for text in texts}
+    return {(context, text): said for text, said in found.items() if said for context in CONTEXTS}
+
+
+def register() -> None:
+    """Register the catalogs; Blender names a language alone, or with a country."""
+    texts = collect_strings()
+    catalogs = {
+        name: make_entries(texts, language)
+        for language in LANGUAGES
+        for name in {language, f"{language}_{language.upper()}"}
+    }
+    bpy.app.translations.register(__package__, catalogs)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    bpy.app.translations.unregister(__package__)
