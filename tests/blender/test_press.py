@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
+from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
 from digiclay.device import view
-from digiclay.press import aim, tool
+from digiclay.live.stroke import Brush
+from digiclay.press import aim, brush, tool
 from digiclay.press.drape import drape
 from digiclay.settings import properties
 
@@ -158,3 +160,11 @@ def test_pressing_wants_a_bed_in_a_view_in_object_mode(in_the_view: Any, bed: An
     assert bpy.ops.digiclay.press.poll()
     bed.hide_set(True)
     assert not bpy.ops.digiclay.press.poll()
+
+
+def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit() -> None:
+    finger = Fingertip()
+    assert brush.describe_brush(finger, Brush.RAISE, 15e-3) == "Size 16 mm   Raise, height 15 mm"
+    assert brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5) == "Size 16 mm   Lower, depth 4 mm × 50 %"
+    assert brush.describe_brush(finger, Brush.LEVEL, 4e-3) == "Size 16 mm   Level 100 %"
+    assert [brush.amount_name(one) for one in Brush] == ["depth", "height", "depth"]
