@@ -81,6 +81,18 @@ def test_noise_that_is_rounded_or_late_is_that_of_the_run_alone(method: str, sen
         assert_as_alone(found, one)
 
 
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states", "viscous"])
+def test_noisy_runs_whose_sets_are_far_apart_come_to_what_they_come_to_alone(method: str) -> None:
+    lengths = ("7e-3", "10e-3", "14e-3")
+    one_by_one = (
+        noisy("tap", f"control.method={method}", f"fingertip.length={length}")[i]
+        for i, length in enumerate(lengths)
+    )
+    scenes = [moved(one, 8e-3 * (i - 1), -0.2e-3 * i) for i, one in enumerate(one_by_one)]
+    for found, one in zip(together(scenes), scenes, strict=True):
+        assert_as_alone(found, one)
+
+
 def test_the_papers_session_with_noise_is_that_session() -> None:
     scenes = noisy("ridge_mound_valley", "simulation.duration=11")
     for found, one in zip(together(scenes), scenes, strict=True):

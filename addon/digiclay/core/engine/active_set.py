@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
-from ..model.layout import Disc, Grid
+from ..model.layout import ON_THE_SIDE, Disc, Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod, Window, find_reached_disc
 from .state import ActiveSet, Rows, State
@@ -173,7 +173,10 @@ def _holds(outer: Disc | None, inner: Disc | None) -> bool:
     """Return whether all of `inner` is in `outer`."""
     if inner is None:
         return True
-    return outer is not None and math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2]
+    if outer is None:
+        return False
+    # One that touches the limit from inside is in: a last bit, other in a batch than alone, decides nothing.
+    return math.dist(inner[:2], outer[:2]) + inner[2] <= outer[2] * (1.0 + ON_THE_SIDE)
 
 
 def _inside(grid: Grid, disc: Disc | None) -> Cells:
