@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
+from digiclay.core.mesh_io.export_model import make_feature_solid
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.feature_solids import make_feature_solid
 from digiclay.core.surface.features import Feature, Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skin_grid import fit_skin

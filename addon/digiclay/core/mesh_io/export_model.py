@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
 from ..surface.body import NO_PIN, Body, Floats, Indices
-from ..surface.feature_solids import make_feature_solid as feature_solid
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
 from ..surface.pins_solid import make_pins_solid
@@ -18,7 +17,7 @@ from ..surface.skin_grid import SurfaceGrid, fit_skin
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS
 
-__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_skin_grid"]
+__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_feature_solid", "make_skin_grid"]
 
 #: Kinds of mesh, by name, with what is said of them in the help.
 KINDS: dict[str, str] = {
@@ -163,7 +162,7 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Indices) 
 
 def _feature(formed: Formed, feature: Feature) -> Body:
     """Return the body of a feature; its vertices have force and mode of the nearest pin."""
-    body = feature_solid(feature)
+    body = make_feature_solid(feature)
     nearest = formed.nearest(body.vertices[:, :2])
     return replace(body, values=_of_pins(formed, body.vertices, nearest))
 
@@ -176,3 +175,22 @@ def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict
         "force": np.where(pinned, formed.force[owner], 0.0),
         "mode": np.where(pinned, formed.mode[owner], NO_PIN).astype(np.float64),
     }
+
+
+def make_feature_solid(feature: Feature) -> Body:
+    """Return the body between the surface as it is and as it was before, closed.
+
+    A boss stands on the former surface; a crease is the body that fills it up to there. Where the
+    feature ends, and at the edge of the bed, an upright wall closes it: as high as the threshold, because
+    an edge that thins out to nothing makes booleans of other programs fail.
+    """
+    region = feature.region
+    count = len(region.position)
+    now = region.former + (region.off if feature.kind == "boss" else -region.off)
+    over, under = np.maximum(now, region.former), np.minimum(now, region.former)
+    vertices = np.concatenate([np.column_stack([region.position, one]) for one in (over, under)])
+    start, end = region.outline().T
+    walls = [[start, start + count, end + count], [start, end + count, end]]
+    sides = [np.stack(corners, axis=1) for corners in walls]
+    faces = np.concatenate([region.faces, region.faces[:, ::-1] + count, *sides]).astype(np.int32)
+    return Body(feature.name, vertices, faces)
