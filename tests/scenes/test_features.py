@@ -49,7 +49,7 @@ def test_their_crests_are_the_ways_of_the_finger(history):
 def test_the_mound_stands_where_the_finger_was_lifted_and_the_ridge_is_as_high_as_before(history):
     found = {one.form: one for one in features(history, 26.5, 0.0)}
     (before,) = features(history, 10.3, 0.0)
-    middle = found["mound"].region.quadratic_basis.mean(axis=0)
+    middle = found["mound"].region.position.mean(axis=0)
     assert np.linalg.norm(middle - (21e-3, -21e-3)) < 6e-3
     assert found["mound"].extreme > 24e-3
     # Its crest goes on under the mound, as high as it was: 15 mm, and the pulp over it.
@@ -64,6 +64,6 @@ def test_the_ridge_stands_before_the_mound_and_the_mound_at_its_end(history):
     assert ridge.extreme == pytest.approx(15e-3, abs=2e-3)  # drawn up by 15 mm, and the pulp over it
     (line,) = ridge.crests
     assert np.ptp(line[:, 2]) < 2e-3
-    middle = mound.region.quadratic_basis.mean(axis=0)
+    middle = mound.region.position.mean(axis=0)
     assert np.linalg.norm(middle - (21e-3, -21e-3)) < 6e-3
     assert mound.extreme == pytest.approx(10e-3, abs=3e-3)

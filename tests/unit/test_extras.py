@@ -123,7 +123,7 @@ def test_form_ends_at_the_first_signal_and_names_what_is_missing(
         assert (here / OUT / name).read_bytes() == (here / "whole" / name).read_bytes()
 
 
-@pytest.mark.parametrize("step", ["scene_of", "fitted_to", "shaped"])
+@pytest.mark.parametrize("step", ["scene_of", "fit_shape", "make_forming_scene"])
 def test_form_that_is_stopped_before_its_session_writes_nothing(
     step: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -83,12 +83,9 @@ class VirtualMasterControl(MasterControl):
     def _sum_forces(self, memory: Any, basis: Floats, force: Floats) -> tuple[Any, ...]:
         """Return what `follow` takes: sums over all cells, and over those near the master."""
         (none,) = NONE[force.shape]
-        total, x, y, *_ = near = sum_weighted(basis, force).tolist()
-        beyond = self._measure_excess(memory, basis)
-        beyond *= force
-        far = beyond > none
-        if any_true(far):
-            near = sum_weighted(basis, np.where(far, none, force)).tolist()
+        total, x, y, *_ = sum_weighted(basis, force).tolist()
+        far = self._measure_excess(memory, basis) > none
+        near = sum_weighted(basis, np.where(far, none, force)).tolist()
         return total, x, y, *near[:3]
 
     def _sum_held(self, memory: Any, touched: Measurement, felt: Any) -> Any:
