@@ -112,7 +112,7 @@ def script(blender: Any) -> Iterator[float | None]:
 
 
 def depths(blender: Any) -> Iterator[float | None]:
-    """Change the depth by the wheel and by Ctrl, and take a gesture back with Esc."""
+    """Change the depth by the wheel, draw on with Ctrl held, and take a gesture back with Esc."""
     yield from drag(blender, [(-20.0, -20.0)])
     note(blender, "before the wheel")
     at = blender.on_the_bed(-20, -20)

@@ -156,7 +156,9 @@ def follow_selection() -> None:
         for layer in layers:
             if not (_is_in_layer(layer, tip) and _is_in_layer(layer, ball)):
                 continue
-            if ball.select_get(view_layer=layer):
+            # Selecting what is selected, too, would count as a change to be looked at.
+            held = tip.select_get(view_layer=layer) or not tip.visible_get(view_layer=layer)
+            if ball.select_get(view_layer=layer) and not held:
                 tip.select_set(True, view_layer=layer)
             if layer.objects.active == ball:
                 layer.objects.active = tip
