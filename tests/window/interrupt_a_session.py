@@ -86,6 +86,7 @@ def script(blender: Any) -> Iterator[float | None]:
     bpy.context.view_layer.objects.active.location.x = 1.5
     yield from start(blender)
     blender.look("two beds")
+    blender.select(bpy.context.view_layer.objects.active)
     blender.key("DEL", blender.middle())
     yield from blender.settle()
     blender.look("second bed deleted")
