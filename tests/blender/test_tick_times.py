@@ -44,6 +44,7 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatc
 def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
+    pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
     monkeypatch.setattr(ticks, "BEDS", ((11, 11, 3e-3, 2e-3, 8e-3), (20, 21, 1.5e-3, 1e-3, 16e-3)))
     monkeypatch.setattr(ticks, "QUICK", 5)
     monkeypatch.setattr(ticks, "keep_to_one_core", lambda: None)  # other tests go on in this process
