@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.test_architecture import PACKAGE, ROOT, imports
+from tests.unit.test_architecture import PACKAGE, ROOT, find_circle, find_own_name, imports
 
 #: Packages beside the extension: they import it, and it never imports them.
 BESIDE = {name: ROOT / name for name in ("benchmarks", "digiclay_paper")}
@@ -15,41 +15,14 @@ BESIDE = {name: ROOT / name for name in ("benchmarks", "digiclay_paper")}
 DOOR = PACKAGE / "commands" / "outside.py"
 
 
-def package_imports(package: Path) -> dict[str, set[str]]:
-    """Return what each module of a package imports of it, also inside functions."""
-    parts = {path: path.relative_to(package).with_suffix("").parts for path in package.rglob("*.py")}
-    names = {".".join(own).removesuffix(".__init__"): path for path, own in parts.items()}
-    found: dict[str, set[str]] = {}
-    for name, path in names.items():
-        found[name] = set()
-        for _, target, imported in imports(path):
-            dots = len(target) - len(target.lstrip("."))
-            if dots:
-                base = [*parts[path][: len(parts[path]) - dots], *filter(None, target[dots:].split("."))]
-                known = [".".join([*base, one]) for one in imported]
-                found[name] |= {one if one in names else ".".join(base) for one in known} & names.keys()
-    return found
-
-
 @pytest.mark.parametrize("package", BESIDE.values(), ids=BESIDE)
 def test_no_module_imports_itself_by_way_of_others(package: Path) -> None:
-    left = package_imports(package)
-    assert left
-    while free := {name for name, others in left.items() if not others & left.keys() - {name}}:
-        left = {name: others for name, others in left.items() if name not in free}
-    # What is left imports, or is imported by, a circle.
-    assert sorted(left) == []
+    assert find_circle(package) == []
 
 
 @pytest.mark.parametrize("package", BESIDE.values(), ids=BESIDE)
 def test_package_imports_itself_relatively(package: Path) -> None:
-    wrong = [
-        f"{path.relative_to(ROOT)}:{line}: {target}"
-        for path in package.rglob("*.py")
-        for line, target, _ in imports(path)
-        if target.split(".")[0] == package.name
-    ]
-    assert wrong == []
+    assert find_own_name(package) == []
 
 
 def test_the_extension_never_imports_what_stands_beside_it() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import drag, finish, hand, note, on_the_screen, to
+from hand_strokes import drag, finish, focus_window, hand, note, on_the_screen, to
 
 #: Places in the sidebar, pixels from its upper right corner at a resolution scale of 1: the tab, and in it
 #: the first button.
@@ -43,8 +43,7 @@ def script(blender: Any) -> Iterator[float | None]:
     area, _ = blender.view()
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    yield from focus_window()
     typed = " ".join(f"key {letter} sleep 0.05" for letter in "digital")
     began = time.perf_counter()
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")

@@ -10,7 +10,18 @@ from typing import Any
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.window.hand_strokes import drag, finish, hand, note, on_the_screen, reset, to
+from tests.window.hand_strokes import (
+    add_bed,
+    drag,
+    finish,
+    focus_window,
+    hand,
+    note,
+    on_the_screen,
+    reset,
+    take_tool,
+    to,
+)
 
 #: Half the length of a stroke, mm; how long the hand takes for it, s, and moves a second.
 HALF, DURATION, RATE = 30.0, 0.5, 125
@@ -29,18 +40,9 @@ def line(blender: Any, y: float, hold: str = "") -> Iterator[float | None]:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Raise by the header's brush, by Ctrl, level the middle of what was raised, and lower by Ctrl."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
-    blender.call(bpy.ops.mesh.digital_clay_add)
-    blender.call(bpy.ops.view3d.view_all)
-    # A frame takes software GL half a second: the session catches up between two of them.
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 1000
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
-    blender.call(bpy.ops.object.select_all, action="DESELECT")
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    add_bed(blender)
+    take_tool(blender)
+    yield from focus_window()
     settings = blender.part("press.brush").tool_settings(bpy.context)
     settings.brush = "RAISE"
     yield from line(blender, 0.0)

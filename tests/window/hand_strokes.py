@@ -79,8 +79,8 @@ def reset(blender: Any) -> Iterator[float | None]:
     yield from blender.settle(5)
 
 
-def script(blender: Any) -> Iterator[float | None]:
-    """Do what a hand does."""
+def add_bed(blender: Any) -> None:
+    """Have a bed alone in the scene, in full view."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.digital_clay_add)
@@ -89,11 +89,25 @@ def script(blender: Any) -> Iterator[float | None]:
     entry = bpy.context.preferences.addons.new()
     entry.module = blender.EXTENSION
     entry.preferences.most_periods = 1000
+
+
+def take_tool(blender: Any) -> None:
+    """Take the Press tool in hand, with nothing selected."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     blender.call(bpy.ops.object.select_all, action="DESELECT")
-    # A window that no manager has made active takes a button to be pressed where the pointer is by now.
+
+
+def focus_window() -> Iterator[float | None]:
+    """Make Blender's window the active one: else a button is pressed where the pointer is by then."""
     hand("search --onlyvisible --class blender windowfocus").wait(30)
     yield 1.0
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a hand does."""
+    add_bed(blender)
+    take_tool(blender)
+    yield from focus_window()
     for duration, rate in STROKES:
         start, end = ends(blender)
         began = time.perf_counter()

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from hand_strokes import drag, finish, hand, on_the_screen, reset, to
+from hand_strokes import add_bed, drag, finish, focus_window, hand, on_the_screen, reset, to
 from mathutils import Vector
 
 #: Places of the pins, mm: behind the cube, and beside it.
@@ -78,17 +78,10 @@ def script(blender: Any) -> Iterator[float | None]:
 
 def prepare(blender: Any) -> Iterator[float | None]:
     """Have a bed with a session and a cube, and the Press tool in hand."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
-    blender.call(bpy.ops.mesh.digital_clay_add)
-    blender.call(bpy.ops.view3d.view_all)
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 1000
+    add_bed(blender)
     blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    yield from focus_window()
     blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     yield 1.0

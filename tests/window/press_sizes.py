@@ -11,7 +11,18 @@ import bpy
 
 sys.path.append(str(Path(__file__).parents[2]))
 
-from tests.window.hand_strokes import drag, finish, hand, note, on_the_screen, reset, to
+from tests.window.hand_strokes import (
+    add_bed,
+    drag,
+    finish,
+    focus_window,
+    hand,
+    note,
+    on_the_screen,
+    reset,
+    take_tool,
+    to,
+)
 
 #: Ends of the stroke that is mirrored, mm.
 MIRRORED = ((-27.0, 12.0), (-9.0, 12.0))
@@ -23,18 +34,11 @@ WIDER = 4.0
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a hand does."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
-    blender.call(bpy.ops.mesh.digital_clay_add)
+    add_bed(blender)
     blender.call(bpy.ops.view3d.view_axis, type="TOP")
     blender.call(bpy.ops.view3d.view_all)
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 1000
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
-    blender.call(bpy.ops.object.select_all, action="DESELECT")
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    take_tool(blender)
+    yield from focus_window()
     # The first press starts the session.
     yield from finish(blender, hand(to(on_the_screen(blender, -24.0, -24.0)), "click 1"))
     yield from sizes(blender)

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import drag, finish, hand, on_the_screen, to
+from hand_strokes import add_bed, drag, finish, focus_window, hand, on_the_screen, to
 
 
 def count_orange(name: str, blender: Any) -> int:
@@ -67,16 +67,9 @@ def watch_overlay(blender: Any) -> None:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Look."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
-    blender.call(bpy.ops.mesh.digital_clay_add)
-    blender.call(bpy.ops.view3d.view_all)
+    add_bed(blender)
     watch_overlay(blender)
-    entry = bpy.context.preferences.addons.new()
-    entry.module = blender.EXTENSION
-    entry.preferences.most_periods = 1000
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    yield from focus_window()
     note(blender, "selected")
     middle = on_the_screen(blender, 0.0, 0.0)
     yield from levels_of_detail(blender)
