@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.core.metrics.signal import (
+    WINDOW,
     compute_deviation,
     compute_mean,
     measure_amplitude,
     measure_frequency,
+    measure_oscillation,
     measure_overshoot,
     measure_settling_time,
 )
@@ -88,3 +90,32 @@ def test_nothing_has_no_mean_and_no_deviation() -> None:
         None,
         None,
     )
+
+
+#: Half a minute of a sine of each of these frequencies, Hz, with rows of 2 ms.
+MOMENTS = np.arange(0.0, 30.0, 2e-3)
+ALL_ROWS = np.ones(len(MOMENTS), dtype=bool)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 2.0, 4.0, 9.0])
+def test_of_a_sine_the_share_beside_its_moving_average_counts_as_oscillation(frequency: float) -> None:
+    found = measure_oscillation(MOMENTS, 3.0 + np.sin(2.0 * np.pi * frequency * MOMENTS), ALL_ROWS)
+    # The moving average of a sine is its sinc; 29.75 s are no whole number of periods.
+    assert found == pytest.approx((1.0 - np.sinc(frequency * WINDOW)) / np.sqrt(2.0), rel=0.01)
+
+
+def test_a_straight_line_does_not_oscillate() -> None:
+    assert measure_oscillation(MOMENTS, 2.0 * MOMENTS - 7.0, ALL_ROWS) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_jump_between_two_stretches_is_no_oscillation() -> None:
+    rows = (MOMENTS < 1.0) | (MOMENTS > 2.0)
+    assert measure_oscillation(MOMENTS, np.where(MOMENTS < 1.5, 0.0, 5.0), rows) == pytest.approx(
+        0.0, abs=1e-9
+    )
+
+
+def test_a_stretch_shorter_than_the_window_has_no_oscillation() -> None:
+    shorter, longer = MOMENTS < WINDOW - 2e-3, MOMENTS < WINDOW + 4e-3
+    assert measure_oscillation(MOMENTS, MOMENTS, shorter) is None
+    assert measure_oscillation(MOMENTS, MOMENTS, longer) == pytest.approx(0.0, abs=1e-9)

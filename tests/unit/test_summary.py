@@ -206,8 +206,8 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
     nothing = {name for name, value in found.items() if value is None}
     assert nothing == {
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
-        "force_overshoot", "settling_time", "height_deviation", "ridge_offset", "ridge_error",
-        "ridge_unevenness",
+        "force_oscillation", "force_overshoot", "settling_time", "height_deviation", "ridge_offset",
+        "ridge_error", "ridge_unevenness",
     }  # fmt: skip
     assert found["contact_share"] == 0.0
 

@@ -6,11 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "compute_deviation", "compute_mean", "compute_weights", "measure_amplitude", "measure_frequency",
-    "measure_overshoot", "measure_settling_time",
+    "WINDOW", "compute_deviation", "compute_mean", "compute_weights", "find_stretches", "measure_amplitude",
+    "measure_frequency", "measure_oscillation", "measure_overshoot", "measure_settling_time",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
+
+#: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f Hz is
+#: 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of it at 4 Hz; a
+#: controller on its limit of stability oscillates at 4 to 10 Hz (digiclay paper).
+WINDOW = 0.25
 
 
 def compute_weights(time: ArrayLike) -> Floats:
@@ -125,3 +130,53 @@ def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
     if rises.size < 3:
         return None
     return float((rises.size - 1) / (moment[rises[-1]] - moment[rises[0]]))
+
+
+def find_stretches(rows: NDArray[np.bool_]) -> list[slice]:
+    """Return the unbroken stretches of chosen rows, in order.
+
+    Parameters
+    ----------
+    rows : ndarray of bool, shape (t,)
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
+    return [slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def measure_oscillation(
+    time: ArrayLike, values: ArrayLike, rows: NDArray[np.bool_], window: float = WINDOW
+) -> float | None:
+    """Return the rms over time of a signal less its moving average.
+
+    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window around row i. A row
+    counts when its whole window is within an unbroken stretch of the chosen rows.
+
+    Parameters
+    ----------
+    time, values : array_like, shape (t,)
+        Increasing, s, and the signal.
+    rows : ndarray of bool, shape (t,)
+        Chosen rows.
+    window : float, optional
+        s.
+
+    Returns
+    -------
+    float or None
+        None when no stretch is as long as the window.
+    """
+    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    off: list[Floats] = []
+    weight: list[Floats] = []
+    for stretch in find_stretches(rows):
+        t, y = moment[stretch], signal[stretch]
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
+        # Half a millionth of the window: an edge on the first row is within.
+        inner = (t - 0.5 * window >= t[0] - 5e-7 * window) & (t + 0.5 * window <= t[-1] + 5e-7 * window)
+        below, above = (np.interp(t[inner] + side * window, t, area) for side in (-0.5, 0.5))
+        off.append(y[inner] - (above - below) / window)
+        weight.append(compute_weights(t)[inner])
+    if not off:
+        return None
+    square = compute_mean(np.concatenate(off) ** 2, np.concatenate(weight))
+    return None if square is None else float(np.sqrt(square))

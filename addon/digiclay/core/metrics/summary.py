@@ -25,7 +25,7 @@ from .finger_path import (
     sum_cells,
 )
 from .force import compute_contact_loss_share, compute_rfd, find_first_touch, measure_touchdown
-from .signal import compute_deviation, compute_mean, compute_weights
+from .signal import compute_deviation, compute_mean, compute_weights, measure_oscillation
 
 __all__ = [
     "METRICS",
@@ -57,6 +57,10 @@ METRICS: dict[str, tuple[str, str]] = {
     "lag_mean": ("m", "mean horizontal distance from fingertip to the centroid of the cells' forces"),
     "lag_max": ("m", "largest such distance"),
     "force_deviation": ("N", "standard deviation over time of the total force while shaping"),
+    "force_oscillation": (
+        "N",
+        "rms over time of the total force less its moving average over 0.25 s, while shaping",
+    ),
     "force_overshoot": ("1", "first touch: largest force beyond the set point, as a share of it"),
     "settling_time": (
         "s",
@@ -179,6 +183,7 @@ def compute_metrics_from_sums(
         "lag_mean": compute_mean(behind, weight[felt]),
         "lag_max": float(behind.max()) if len(behind) else None,
         "force_deviation": compute_deviation(total[rows], weight[rows]),
+        "force_oscillation": measure_oscillation(time, total, rows),
         "force_overshoot": beyond,
         "settling_time": settled,
         "height_deviation": compute_deviation(above[rows[felt]], weight[rows]),

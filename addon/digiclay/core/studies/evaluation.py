@@ -45,7 +45,7 @@ FIGURES: dict[str, tuple[str, str]] = {
 #: Figures that are others each time.
 TIMES = ("run_time", "real_time_factor")
 #: Short names of figures.
-SHORT = {"lag": "lag_mean"}
+SHORT = {"lag": "lag_mean", "oscillation": "force_oscillation", "relief": "ridge_error"}
 #: Fewer points than this are as quick one at a time.
 LEAST = 4
 #: From twice as many points on there are two batches: a larger one gains little, and busies one core only.
