@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,7 +26,14 @@ from ..core.studies.evaluation import (
     make_bundles,
 )
 from ..core.studies.series import finish
-from ..core.studies.sweep_plan import Folder, format_table, make_grid, open_sweep
+from ..core.studies.sweep_plan import (
+    Folder,
+    find_unfinished,
+    format_table,
+    make_grid,
+    open_sweep,
+    select_done,
+)
 from .arguments import add_scene, settings_of
 from .evaluator import Evaluator, evaluate_elsewhere
 from .exit_codes import STOPPED
@@ -102,7 +110,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
                     print(f"Stopped: {said}. The same command goes on from there.")
                 return STOPPED
         columns = make_columns(points, axes)
-        table = format_table(columns, records, names)
+        values = itertools.product(*(one.values for one in columns))
+        table = format_table([(one.key, one.unit) for one in columns], values, records, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
         notes = _draw_pictures(arguments.out, columns, axes, records, names)
         failed = [record["error"] for _, record in sorted(records.items()) if "error" in record]
@@ -134,25 +143,15 @@ def _finish(
     *,
     errors: bool,
 ) -> dict[int, Record]:
-    """Run the points that are not in the folder yet; return the records of all.
-
-    Where errors are asked for, a point without them is not done.
-    """
-    records = {
-        index: record
-        for index, record in folder.read_records().items()
-        if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys()
-    }
+    """Run the points that are not in the folder yet; return the records of all."""
+    records = select_done(folder.read_records(), errors=errors)
     every = (*bundles.batches, *bundles.alone)
-    # A batch of which a point is missing is run as a whole, or its results would be others in the last bit.
-    todo = [bundle for bundle in every if any(point.index not in records for point in bundle)]
+    todo = find_unfinished(every, records)
     total = sum(len(bundle) for bundle in every)
+    keys = [one.key for one in axes]
 
     def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
-        for point, record in zip(bundle, found, strict=True):
-            if record is not None and point.index not in records:
-                folder.keep(point, axes, record)
-                records[point.index] = record
+        folder.keep_bundle(bundle, found, keys, records)
 
     def fail(bundle: Sequence[Point], why: str) -> None:
         # Told, but not kept: the same command tries them again.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["picture", "sweep_figure"]
+__all__ = ["picture", "read_unit", "sweep_figure"]
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
         Its axes, by label: ``sweep``; with two columns also ``scale``.
     """
     unit, meaning = FIGURES[name]
-    factor, read = _read(unit, values)
+    factor, read = read_unit(unit, values)
     label = f"{name} ({read})" if read else name
     with canvas(9.0, 5.2 if len(columns) == 1 else 6.0) as (figure, place):
         # The meaning is a sentence: it goes above the axes, and the key beside them.
@@ -80,8 +80,16 @@ def sweep_figure(columns: Sequence[Column], name: str, values: Floats) -> Figure
     return figure
 
 
-def _read(unit: str, values: Any) -> tuple[float, str]:
-    """Return factor and name of the unit people read; times below half a second are read in ms."""
+def read_unit(unit: str, values: Any) -> tuple[float, str]:
+    """Return factor and name of the unit people read; times below half a second are read in ms.
+
+    Parameters
+    ----------
+    unit : str
+        SI; empty or 1 for none.
+    values : array_like
+        In SI.
+    """
     if unit == "s":
         known = [abs(value) for value in np.ravel(values) if np.isfinite(value)]
         return (1e3, "ms") if known and max(known) < 0.5 else (1.0, "s")
@@ -153,5 +161,5 @@ def _shown(column: Column) -> tuple[Any, str]:
     if not column.numeric:
         return list(column.values), column.key
     values = np.array(column.values, dtype=np.float64)
-    factor, unit = _read(column.unit, values)
+    factor, unit = read_unit(column.unit, values)
     return values * factor, f"{column.key} ({unit})" if unit else column.key

@@ -16,7 +16,7 @@ from ..base.quantity import list_quantities
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 
-__all__ = ["MOST", "Axis", "Column", "Point", "make_columns", "make_points", "read_axis"]
+__all__ = ["MOST", "Axis", "Column", "Point", "make_columns", "make_points", "place_points", "read_axis"]
 
 #: More points than this are refused: a slip of the keyboard, not a sweep.
 MOST = 10_000
@@ -174,16 +174,47 @@ def make_points(
     if count > MOST:
         raise ParameterError("--vary", "", f"must come to {MOST} points at most", f"{count} points")
     load(path, settings)  # what is wrong without the axes is told of first
+    rows = list(itertools.product(*(one.words for one in axes)))
+    points = place_points(path, settings, keys, rows, progress=progress)
+    _refuse_hopeless_values(points, axes)
+    return points
+
+
+def place_points(
+    path: Path,
+    settings: Sequence[Setting],
+    keys: Sequence[str],
+    rows: Sequence[tuple[str, ...]],
+    *,
+    first: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Point]:
+    """Make the scenes of points anywhere; values that do not go together make a point with an error.
+
+    Parameters
+    ----------
+    path : Path
+        The scene's file, which is read once.
+    settings : sequence of Setting
+        What is changed of it at every point.
+    keys : sequence of str
+        Varied parameters.
+    rows : sequence of tuple of str
+        Their values at each point.
+    first : int, optional
+        Index of the first point.
+    progress : callable, optional
+        Told how many points are made, and of how many.
+    """
     table, points = read_table(path), []
-    for index, words in enumerate(itertools.product(*(one.words for one in axes))):
+    for index, words in enumerate(rows, first):
         varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
         try:
             points.append(Point(index, words, make_scene(path, table, [*settings, *varied])))
         except SceneError as error:
             points.append(Point(index, words, None, str(error)))
         if progress:
-            progress(index + 1, count)
-    _refuse_hopeless_values(points, axes)
+            progress(index - first + 1, len(rows))
     return points
 
 

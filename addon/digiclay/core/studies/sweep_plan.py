@@ -5,10 +5,9 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +19,21 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError
 from ..base.whole_files import format_json, read_json, write_whole
 from ..scene.toml_table import format_scene
-from .axes import Axis, Column, Point
+from .axes import Axis, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
 
-__all__ = ["MARK", "Folder", "format_table", "make_grid", "open_sweep"]
+__all__ = [
+    "MARK",
+    "POINTS",
+    "Folder",
+    "find_unfinished",
+    "format_table",
+    "hash_points",
+    "make_grid",
+    "open_sweep",
+    "select_done",
+]
 
 #: The file by which a folder is known as a sweep's, and the folder of its points.
 MARK, POINTS = "sweep.json", "points"
@@ -47,17 +56,83 @@ class Folder:
                 records[int(path.stem)] = record
         return records
 
-    def keep(self, point: Point, axes: Sequence[Axis], record: Record) -> None:
+    def keep(self, point: Point, keys: Sequence[str], record: Record) -> None:
         """Write the file of a finished point, whole or not at all.
 
         Parameters
         ----------
         point : Point
-        axes : sequence of Axis
+        keys : sequence of str
+            The varied parameters.
         record : Record
         """
-        values = {one.key: word for one, word in zip(axes, point.words, strict=True)}
+        values = dict(zip(keys, point.words, strict=True))
         write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
+
+    def keep_bundle(
+        self,
+        bundle: Sequence[Point],
+        found: Sequence[Record | None],
+        keys: Sequence[str],
+        records: dict[int, Record],
+    ) -> None:
+        """Write the files of the finished points of a bundle, and add their records to those of all.
+
+        Parameters
+        ----------
+        bundle : sequence of Point
+        found : sequence of Record or None
+            None for a point that was stopped.
+        keys : sequence of str
+            The varied parameters.
+        records : dict
+            Of all points that are done, by their index; what is there stays.
+        """
+        for point, record in zip(bundle, found, strict=True):
+            if record is not None and point.index not in records:
+                self.keep(point, keys, record)
+                records[point.index] = record
+
+
+def select_done(records: Mapping[int, Record], *, errors: bool) -> dict[int, Record]:
+    """Return the records of points that need not be run again.
+
+    Parameters
+    ----------
+    records : mapping of int to Record
+        That are kept.
+    errors : bool
+        Whether errors are asked for: a point without them is not done.
+    """
+    return {
+        index: record
+        for index, record in records.items()
+        if not errors or "error" in record or record["figures"].keys() >= ERRORS.keys()
+    }
+
+
+def find_unfinished(
+    bundles: Iterable[Sequence[Point]], records: Mapping[int, Record]
+) -> list[Sequence[Point]]:
+    """Return the bundles that are to be run: those of which a point is missing, whole.
+
+    Without the others of its batch the results of a point would be others in the last bit.
+
+    Parameters
+    ----------
+    bundles : iterable of sequence of Point
+    records : mapping of int to Record
+        Of the points that are done.
+    """
+    return [bundle for bundle in bundles if any(point.index not in records for point in bundle)]
+
+
+def hash_points(points: Iterable[Point]) -> str:
+    """Return a number that identifies the scenes of points, without the comments of their files."""
+    scenes = hashlib.sha256()
+    for point in points:
+        scenes.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
+    return scenes.hexdigest()
 
 
 @contextmanager
@@ -78,15 +153,12 @@ def open_sweep(path: Path, points: Sequence[Point], axes: Sequence[Axis], versio
     OutputError
         When it holds anything else, cannot be written, or another process works in it.
     """
-    scenes = hashlib.sha256()
-    for point in points:
-        scenes.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
     plan = {
         "digiclay": version,
         "axes": [{"key": one.key, "values": list(one.words)} for one in axes],
         "points": len(points),
     }
-    description = {**plan, "scenes": scenes.hexdigest()}
+    description = {**plan, "scenes": hash_points(points)}
     folder = Folder(path)
 
     def refuse_another(there: Any) -> None:
@@ -146,12 +218,20 @@ def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) ->
     return values.reshape(shape)
 
 
-def format_table(columns: Sequence[Column], records: Mapping[int, Record], names: Sequence[str]) -> str:
-    """Return the sweep as CSV: the axes, the metrics, and the error; SI units, in the header.
+def format_table(
+    varied: Sequence[tuple[str, str]],
+    rows: Iterable[Sequence[Any]],
+    records: Mapping[int, Record],
+    names: Sequence[str],
+) -> str:
+    """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header.
 
     Parameters
     ----------
-    columns : sequence of Column
+    varied : sequence of (str, str)
+        Key and unit of each parameter.
+    rows : iterable of sequence
+        Their values at each point.
     records : mapping of int to Record
         Of every point, by its index.
     names : sequence of str
@@ -159,11 +239,9 @@ def format_table(columns: Sequence[Column], records: Mapping[int, Record], names
     """
     lines = io.StringIO()
     writer = csv.writer(lines, lineterminator="\n")
-    units = [(one.key, one.unit) for one in columns] + [(name, FIGURES[name][0]) for name in names]
+    units = [*varied, *((name, FIGURES[name][0]) for name in names)]
     writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
-    for values, (_, record) in zip(
-        itertools.product(*(one.values for one in columns)), sorted(records.items()), strict=True
-    ):
+    for values, (_, record) in zip(rows, sorted(records.items()), strict=True):
         figures = record.get("figures", {})
         written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
         writer.writerow([*values, *written, record.get("error", "")])
