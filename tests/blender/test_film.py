@@ -13,6 +13,7 @@ import pytest
 from digiclay.compat import scratch, strips
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.base.modes import COLORS, Mode
+from digiclay.core.base.png import is_whole_picture
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session.render_settings import Film, Turntable
@@ -197,10 +198,8 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path: Path, history: Any
     )
     path = still.render_still(Instant.of(history), tmp_path / "still.png", width=32, height=20, samples=1)
     picture = path.read_bytes()
-    assert still.is_whole_picture(picture)
-    assert not any(
-        still.is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
-    )
+    assert is_whole_picture(picture)
+    assert not any(is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1))
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make a small disk")

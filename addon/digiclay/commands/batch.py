@@ -18,7 +18,8 @@ from ..core.studies.series import finish
 from .arguments import add_command
 from .batch_folder import Folder, open_batch
 from .exit_codes import FAILED, STOPPED
-from .job import ERROR, PROGRESS, check_outputs
+from .job import ERROR, PROGRESS
+from .job_steps import check_outputs
 from .progress import Counted, format_duration
 from .stop import Stop
 from .sweep import read_count
@@ -178,7 +179,7 @@ def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder
     """Run a job in a process of its own; DigiclayError states the reason of a failure."""
     arguments = [
         "job", str(folder.find_job(job).resolve()), "--out", str(folder.find_run(job).resolve()),
-        "--overwrite", "--follow", "--since", repr(time.time()),
+        "--follow", "--since", repr(time.time()),
     ]  # fmt: skip
     process = processes.start(partial(JobProcess, arguments, folder.find_log(job)))
     if process is None:

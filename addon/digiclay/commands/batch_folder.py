@@ -10,18 +10,16 @@ from statistics import median
 from typing import Any
 
 from .. import __version__
-from ..core.base.errors import DigiclayError, OutputError
+from ..core.base.errors import OutputError
 from ..core.base.run_folder import resolve_inside
 from ..core.base.unfinished import remove_abandoned
 from ..core.base.whole_files import read_json, write_whole
-from ..core.scene.scene_source import load
 from ..core.scene.toml_table import format_scene
-from ..core.session.finished_run import is_whole
-from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, read_outputs
+from ..core.studies.job_table import JOB, SCENE, Job, JobSeries
 from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
-from .job import FILES, RUNS, TIMING
 from .progress import format_duration
+from .run_state import RUNS, TIMING, is_done
 from .thumbnail import NAMES
 
 __all__ = ["JOBS", "MARK", "Folder", "open_batch"]
@@ -63,15 +61,7 @@ class Folder:
 
     def is_done(self, job: Job) -> bool:
         """Return whether there is a whole run of just this job, and not of one it once was."""
-        if job.scene is None:
-            return False
-        run = self.find_run(job)
-        try:
-            same = load(run / SCENE) == job.scene and read_outputs(run / JOB) == self.batch.outputs
-        except DigiclayError:
-            return False
-        timing = read_json(run / TIMING)
-        return same and timing is not None and is_whole(run, job.scene, timing.get(FILES))
+        return not job.error and is_done(self.find_job(job), self.find_run(job))
 
     def describe(self, job: Job) -> None:
         """Write the files of a job."""
@@ -133,7 +123,7 @@ class Folder:
         links = [
             (path.name, f"{RUNS}/{job.name}/{path.name}")
             for path in sorted(run.iterdir())
-            if path.name not in hidden
+            if path.name not in hidden and not path.name.startswith(".") and path.is_file()
         ]
         shown = next((path for name in SHOWN for said, path in links if said == name), "")
         return Card(job.name, thumbnail, [fact for fact in facts if fact[1]], links, shown)

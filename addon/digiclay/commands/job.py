@@ -1,4 +1,4 @@
-"""``digiclay job``: one job of a series, from its two files alone."""
+"""``digiclay job``: one job of a series, or a part of it, from its two files alone."""
 
 from __future__ import annotations
 
@@ -9,31 +9,26 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, one_line
-from ..core.base.run_folder import write_folder
+from ..core.base.run_folder import claim_folder
 from ..core.base.whole_files import format_json, write_whole
 from ..core.scene.scene_source import load
-from ..core.scene.schema import Scene
-from ..core.session.accuracy import estimate_errors, has_every_command
-from ..core.session.run_scene import run, save
 from ..core.studies.job_outputs import Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
 from .arguments import add_command
 from .exit_codes import STOPPED, WRONG
-from .export import exported, formats
+from .job_films import make_film, make_frames
+from .job_steps import Tell, check_outputs, make_outputs
 from .progress import Counted
-from .refusals import refuse_what_has_no_surface, refuse_without_blender
-from .render import draw_film, draw_still, draw_turntable
+from .run_state import FILES, MOVING, RUNS, TIMING, RunState, judge_run, list_lacking
 from .stop import Stop
-from .thumbnail import of_heights, of_picture
 
-__all__ = ["ERROR", "FILES", "PROGRESS", "RUNS", "TIMING", "add", "check_outputs"]
+__all__ = ["ERROR", "PROGRESS", "add"]
 
 EXAMPLES = """\
 examples:
@@ -41,17 +36,18 @@ examples:
   digiclay job first/jobs/tap-cell_states   run one of them, on any machine: into first/runs
   digiclay batch first                      collect finished jobs, run the rest, write first/index.html
 
-A job is a folder with scene.toml (every parameter of its session) and job.toml (its outputs).
+A job is a folder with scene.toml (every parameter of its session) and job.toml (its outputs). A finished
+job is left as it is, with exit code 0; after a change of its files it is done again.
+
+On several machines, a long film in parts:
+  digiclay job JOB --only run                     all but the films
+  digiclay job JOB --only film --frames 0-49      some frames; on any machine, in any order
+  digiclay job JOB --only film                    the film of these frames; draws those that are missing
 """
-#: Where a batch keeps its runs, beside its jobs; what each took; and in there, the size of each file.
-RUNS, TIMING, FILES = "runs", "timing.json", "files"
 #: What the lines begin with that are meant for the batch that has started the job.
 PROGRESS, ERROR = "@ ", "! "
-#: Seconds between two lines of progress, and those the process of a batch that was killed gets to end.
-PAUSE, GRACE = 0.2, 20.0
-
-#: Told of a step, and of how much of the whole job is done.
-Tell = Callable[[str, float], None]
+#: Seconds that the process of a batch that was killed gets to end.
+GRACE = 20.0
 
 
 def add(commands: Any) -> None:
@@ -60,7 +56,9 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "job", said, EXAMPLES)
     parser.add_argument("job", metavar="JOB", type=Path, help="the folder of the job")
     parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
-    parser.add_argument("--overwrite", action="store_true", help="replace an older run at the end")
+    parser.add_argument("--only", choices=("run", *MOVING), help="a part: all but the films, or one film")
+    parser.add_argument("--frames", metavar="A-B", help="with --only: these frames of the film, from 0")
+    parser.add_argument("--overwrite", action="store_true", help="replace a run, a finished one too")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     # How a batch starts it: at what time, and that it is to stop when its standard input ends.
     parser.add_argument("--since", type=float, help=argparse.SUPPRESS)
@@ -72,9 +70,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Do the job."""
     if not arguments.follow:
         with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
-            out = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+            said = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
         if not arguments.quiet:
-            print(f"written to {out}")
+            print(said)
         return 0
     ended = watch_input()
     try:
@@ -110,108 +108,64 @@ def watch_input() -> threading.Event:
     return ended
 
 
-def check_outputs(scene: Scene, outputs: Outputs) -> None:
-    """Refuse, before any work, what is bound to fail after it.
-
-    Parameters
-    ----------
-    scene : Scene
-    outputs : Outputs
-    """
-    if outputs.export:
-        try:
-            formats(",".join(outputs.export))
-        except argparse.ArgumentTypeError as error:
-            raise OutputError(f"export: {error}.") from None
-        refuse_what_has_no_surface(scene, "export")
-    if (outputs.needs_blender or outputs.export) and scene.recorder is None:
-        raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
-    if outputs.needs_blender:
-        refuse_without_blender()
-
-
-def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> Path:
-    """Do the job, and return its folder; KeyboardInterrupt when it was stopped."""
-    folder: Path = arguments.job
+def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> str:
+    """Do the job or a part of it, and return what came of it; KeyboardInterrupt when it was stopped."""
+    folder, only, frames = arguments.job, arguments.only, arguments.frames
     if not os.path.isfile(folder / JOB):
         raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
-    scene, outputs = load(folder / SCENE), read_outputs(folder / JOB)
-    name = folder.resolve().name
-    out: Path = arguments.out or folder.resolve().parent.parent / RUNS / name
+    if frames is not None and only not in MOVING:
+        raise OutputError("--frames must be given with --only film or --only turntable.")
+    outputs = read_outputs(folder / JOB)
+    out: Path = arguments.out or _find_place(folder)
+    if only not in MOVING:
+        return _do_run(arguments, outputs, out, stopped, tell)
+    if frames is not None:
+        drawn = make_frames(folder, out, outputs, only, frames, stopped, tell)
+        return f"frames {frames} of {out / only}.mp4 {'drawn' if drawn else 'were there already'}"
+    made = make_film(folder, out, outputs, only, stopped, tell)
+    return f"{'written to' if made else 'was done already:'} {out / only}.mp4"
+
+
+def _find_place(job: Path) -> Path:
+    """Return where a series keeps the run of a job."""
+    full = job.resolve()
+    return full.parent.parent / RUNS / full.name
+
+
+def _do_run(
+    arguments: argparse.Namespace, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
+) -> str:
+    """Do the run, or only what is missing of it."""
+    wanted = replace(outputs, turntable=None, film=None) if arguments.only else outputs
+    done = arguments.overwrite or judge_run(arguments.job, out) is not RunState.WHOLE
+    if done:
+        done = _write_run(arguments, wanted, out, stopped, tell)
+    for kind in list_lacking(out, wanted):
+        done |= make_film(arguments.job, out, outputs, kind, stopped, tell)
+    return f"written to {out}" if done else f"was done already: {out}"
+
+
+def _write_run(
+    arguments: argparse.Namespace, outputs: Outputs, out: Path, stopped: Callable[[], bool], tell: Tell
+) -> bool:
+    """Write the folder of the run; False when another process has just done so."""
+    folder: Path = arguments.job
+    scene = load(folder / SCENE)
     check_outputs(scene, outputs)
-    started = time.time()
-    timing: dict[str, Any] = {"start_up": started - arguments.since if arguments.since else None}
+    timing: dict[str, Any] = {"start_up": time.time() - arguments.since if arguments.since else None}
+    # What a series keeps there is its own; a folder elsewhere may be somebody's.
+    overwrite = arguments.overwrite or out.resolve() == _find_place(folder)
     patience = GRACE if arguments.follow else 0.0
-    with write_folder(out, overwrite=arguments.overwrite, patience=patience) as staged:
-        _make_outputs(scene, outputs, staged, timing, stopped, tell)
-        for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
-            shutil.copyfile(folder / file, staged / file)
-        timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
-        write_whole(staged / TIMING, format_json(timing))
-    return out
-
-
-def _make_outputs(
-    scene: Scene,
-    outputs: Outputs,
-    out: Path,
-    timing: dict[str, Any],
-    stopped: Callable[[], bool],
-    tell: Tell,
-) -> None:
-    """Run the session, and make all that belongs to it; KeyboardInterrupt when it was stopped."""
-    names = ["run", *(n for n in ("errors", "export", "still", "turntable", "film") if getattr(outputs, n))]
-    told = 0.0
-
-    @contextmanager
-    def step(name: str) -> Iterator[Callable[[int, int], None]]:
-        """Time a step; give what is to be called with how much of it is done."""
-
-        def progress(done: int, total: int) -> None:
-            nonlocal told
-            if time.monotonic() - told >= PAUSE:
-                told = time.monotonic()
-                tell(name, (names.index(name) + done / total) / len(names))
-
-        if stopped():
-            raise KeyboardInterrupt
-        began = time.perf_counter()
-        yield progress
-        timing[name] = time.perf_counter() - began
-
-    with step("run") as progress:
-        result = run(scene, progress=progress, stopped=stopped, versions={"digiclay": __version__})
-        if result.incomplete:
-            raise KeyboardInterrupt
-    if outputs.errors:
-        with step("errors") as progress:
-            if has_every_command(scene):
-                errors = estimate_errors(scene, result.history, progress=progress, stopped=stopped)
-                if errors is None:
-                    raise KeyboardInterrupt
-                result = result.with_errors(errors)
-    with step("save"):
-        save(result, out)
-    history = result.history
-    if not history:
-        return
-    if outputs.export:
-        with step("export"):
-            exported(scene, history, -1, outputs.export, out, outputs.mesh)
-    if outputs.still:
-        with step("still"):
-            draw_still(scene, history, outputs.still, out / "still.png")
-    if outputs.turntable:
-        with step("turntable") as progress:
-            path = out / "turntable.mp4"
-            if not draw_turntable(scene, history, outputs.turntable, path, progress, stopped):
-                raise KeyboardInterrupt
-    if outputs.film:
-        with step("film") as progress:
-            if not draw_film(scene, history, outputs.film, out / "film.mp4", progress, stopped):
-                raise KeyboardInterrupt
-    with step("thumbnail"):
-        if outputs.still:
-            of_picture(out / "still.png", out)
-        else:
-            of_heights(history["height"][-1], scene.layout.rows, scene.layout.columns, out)
+    with claim_folder(out, overwrite=overwrite, patience=patience) as claim:
+        state = judge_run(folder, out)
+        if state is RunState.WHOLE and not arguments.overwrite:
+            return False
+        if state in (RunState.CHANGED, RunState.INCOMPLETE) and not arguments.quiet:
+            print(f"The run in {out} is {state.value}: it is done again.", flush=True)
+        with claim.write() as staged:
+            make_outputs(scene, outputs, staged, timing, stopped, tell)
+            for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
+                shutil.copyfile(folder / file, staged / file)
+            timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
+            write_whole(staged / TIMING, format_json(timing))
+    return True

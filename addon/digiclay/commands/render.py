@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -22,7 +23,12 @@ from .progress import Counted
 from .refusals import refuse_file, refuse_without_blender
 from .stop import Stop
 
-__all__ = ["ARRAYS", "PICTURE", "add", "draw_film", "draw_still", "draw_turntable", "picture"]
+if TYPE_CHECKING:
+    from ..pictures.film import Shots
+
+__all__ = [
+    "ARRAYS", "PICTURE", "add", "draw_film", "draw_still", "draw_turntable", "picture", "stage_moving",
+]  # fmt: skip
 
 EXAMPLES = """\
 examples:
@@ -243,10 +249,33 @@ def draw_film(
     """
     from ..pictures.film import render_film
 
-    wanted = compute_metrics(history, scene.set_point)["set_point"]
     return render_film(
-        history, out, looks, set_point=wanted, progress=progress, stopped=stopped, **sizes(scene)
+        history, out, looks, progress=progress, stopped=stopped, **_describe_session(scene, history)
     )
+
+
+def stage_moving(
+    scene: Scene, history: Mapping[str, NDArray[Any]], looks: Film | Turntable
+) -> AbstractContextManager[Shots]:
+    """Set the stage for single frames of the film `draw_film` or `draw_turntable` would draw.
+
+    Parameters
+    ----------
+    scene : Scene
+    history : mapping of arrays
+    looks : Film or Turntable
+    """
+    from ..device.instant import Instant
+    from ..pictures.film import stage_film, stage_turntable
+
+    if isinstance(looks, Film):
+        return stage_film(history, looks, **_describe_session(scene, history))
+    return stage_turntable(Instant.of(history, _row(history, looks.when, None), **sizes(scene)), looks)
+
+
+def _describe_session(scene: Scene, history: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """Return what a film shows besides the rows of the history."""
+    return {"set_point": compute_metrics(history, scene.set_point)["set_point"], **sizes(scene)}
 
 
 def _row(history: Mapping[str, NDArray[Any]], when: str, row: int | None) -> int:

@@ -1,12 +1,16 @@
 """Films from recorded states: a session with its force plot, or a rotating formed bed.
 
 Nothing is simulated here. Every frame is drawn into a picture of its own, and Blender's
-sequencer makes the film of them: so a stop between two frames loses nothing but the film.
+sequencer makes the film of them: so a stop between two frames loses nothing but the film. A frame
+depends on its number alone, not on those drawn before it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +20,9 @@ from numpy.typing import NDArray
 from ..bridge import SCALE
 from ..compat import bpy, scratch
 from ..core.base.modes import Mode
-from ..core.session.render_settings import Film, Turntable
+from ..core.base.unfinished import name_unfinished
+from ..core.session.frame_files import name_frame
+from ..core.session.render_settings import Film, Moving, Turntable
 from ..device import view
 from ..device.instant import Instant
 from . import stage
@@ -24,13 +30,31 @@ from .film_file import encode_film, frame_folder
 from .force_plot import SHARE, draw_force_plot
 from .still import add_picture_scene, apply_style, render_picture, use_fast_settings
 
-__all__ = ["render_film", "render_turntable"]
+__all__ = ["Shots", "draw_frames", "render_film", "render_turntable", "stage_film", "stage_turntable"]
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 #: Angles at which a turning bed's outline is looked at for the frame it needs.
 LOOKS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """Frames of a film, which can be drawn in any order.
+
+    Attributes
+    ----------
+    scene : bpy.types.Scene
+    count : int
+        Number of frames.
+    show : callable
+        Changes the scene to what a frame shows, by its number from 0.
+    """
+
+    scene: Any
+    count: int
+    show: Callable[[int], None]
 
 
 def render_film(
@@ -73,10 +97,26 @@ def render_film(
     OutputError
         When the file cannot be written.
     """
+    return _render_whole(
+        stage_film(history, looks, set_point=set_point, **sizes), out, looks, progress, stopped
+    )
+
+
+@contextmanager
+def stage_film(
+    history: Mapping[str, NDArray[Any]], looks: Film, *, set_point: float | None = None, **sizes: Any
+) -> Iterator[Shots]:
+    """Set the stage for the frames of a film.
+
+    Parameters
+    ----------
+    history, looks, set_point, **sizes
+        As for `render_film`.
+    """
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
-    with scratch(), frame_folder(out) as folder:
+    with scratch():
         scene = add_picture_scene("Digital Clay Film", looks)
         use_fast_settings(scene)
         first = Instant.of(history, int(rows[0]), **sizes)
@@ -98,8 +138,7 @@ def render_film(
             if chart is not None:
                 chart.show(float(time[row]), float(force[row]))
 
-        drawn = _render_frames(scene, folder, out, len(rows), show, progress, stopped)
-        return encode_film(drawn, out, looks) if drawn else None
+        yield Shots(scene, len(rows), show)
 
 
 def render_turntable(
@@ -124,7 +163,19 @@ def render_turntable(
     Path or None
         `out`; None when it was stopped.
     """
-    with scratch(), frame_folder(out) as folder:
+    return _render_whole(stage_turntable(instant, looks), out, looks, progress, stopped)
+
+
+@contextmanager
+def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
+    """Set the stage for the frames of a turntable.
+
+    Parameters
+    ----------
+    instant, looks
+        As for `render_turntable`.
+    """
+    with scratch():
         scene = add_picture_scene("Digital Clay Turntable", looks)
         use_fast_settings(scene)
         bed = view.build(instant, scene.collection)
@@ -141,8 +192,7 @@ def render_turntable(
         def show(frame: int) -> None:
             bed.rotation_euler = (0.0, 0.0, float(angles[frame]))
 
-        drawn = _render_frames(scene, folder, out, looks.frames, show, progress, stopped)
-        return encode_film(drawn, out, looks) if drawn else None
+        yield Shots(scene, looks.frames, show)
 
 
 def _visible_points(
@@ -174,23 +224,58 @@ def _turn(points: Floats, angle: float) -> Floats:
     return np.asarray(points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def _render_frames(
-    scene: Any,
-    folder: Path,
+def _render_whole(
+    staged: AbstractContextManager[Shots],
     out: Path,
-    count: int,
-    show: Callable[[int], None],
+    looks: Moving,
     progress: Progress | None,
     stopped: Callable[[], bool] | None,
-) -> list[Path]:
-    """Draw every frame into a file of its own; none are returned when somebody asked to stop."""
-    files = []
-    for frame in range(count):
+) -> Path | None:
+    """Draw all frames into a folder that is taken away again, and make the film of them."""
+    with frame_folder(out) as folder, staged as shots:
+        frames = range(shots.count)
+        if not draw_frames(shots, frames, folder, out, progress, stopped):
+            return None
+        return encode_film([name_frame(folder, frame) for frame in frames], out, looks)
+
+
+def draw_frames(
+    shots: Shots,
+    frames: Sequence[int],
+    folder: Path,
+    out: Path,
+    progress: Progress | None = None,
+    stopped: Callable[[], bool] | None = None,
+) -> bool:
+    """Draw frames, each into a file of its own, which appears whole or not at all.
+
+    Parameters
+    ----------
+    shots : Shots
+    frames : sequence of int
+        Their numbers, from 0.
+    folder : Path
+        Of the files, see `frame_files.name_frame`.
+    out : Path
+        What the user knows of it; messages name this.
+    progress : callable, optional
+        Told after each frame how many are drawn, and of how many.
+    stopped : callable, optional
+        Asked before each frame.
+
+    Returns
+    -------
+    bool
+        Whether all were drawn: nobody asked to stop.
+    """
+    for count, frame in enumerate(frames):
         if stopped and stopped():
-            return []
-        show(frame)
-        files.append(folder / f"{frame:06d}.png")
-        render_picture(scene, files[-1], out)
+            return False
+        shots.show(frame)
+        file = name_frame(folder, frame)
+        part = name_unfinished(file)
+        render_picture(shots.scene, part, out)
+        os.replace(part, file)
         if progress:
-            progress(frame + 1, count)
-    return files
+            progress(count + 1, len(frames))
+    return True

@@ -9,14 +9,15 @@ from typing import Any
 
 from ..compat import bpy, has_denoiser, quiet, scratch
 from ..core.base.errors import OutputError
+from ..core.base.png import is_whole_picture
 from ..core.session.render_settings import Picture, Still
 from ..device import view
 from ..device.instant import Instant
 from . import stage
 
 __all__ = [
-    "ENGINES", "add_picture_scene", "apply_style", "failure_reason", "is_whole_picture", "render_picture",
-    "render_still", "use_fast_settings",
+    "ENGINES", "add_picture_scene", "apply_style", "failure_reason", "render_picture", "render_still",
+    "use_fast_settings",
 ]  # fmt: skip
 
 #: Our names of the engines, and Blender's.
@@ -128,11 +129,6 @@ def render_picture(scene: Any, path: Path, out: Path) -> None:
         raise OutputError(f"{out} cannot be written: {error.strerror or error}.") from None
     except RuntimeError as error:
         raise OutputError(f"{out} cannot be drawn: {' '.join(str(error).split())}") from None
-
-
-def is_whole_picture(data: bytes) -> bool:
-    """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
-    return data[-8:-4] == b"IEND"
 
 
 def failure_reason(path: Path) -> str:

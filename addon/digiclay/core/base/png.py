@@ -1,4 +1,4 @@
-"""PNG writer for small pictures, without Blender or matplotlib."""
+"""PNG writer for small pictures, without Blender or matplotlib; whether a picture is whole."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["encode_png"]
+__all__ = ["encode_png", "is_whole_picture"]
 
 
 def encode_png(pixels: NDArray[np.uint8]) -> bytes:
@@ -30,3 +30,8 @@ def encode_png(pixels: NDArray[np.uint8]) -> bytes:
 def _chunk(kind: bytes, data: bytes) -> bytes:
     """Return a part of the file: its length, kind, data and checksum."""
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def is_whole_picture(data: bytes) -> bool:
+    """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
+    return data[-8:-4] == b"IEND"

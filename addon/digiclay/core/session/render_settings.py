@@ -63,6 +63,10 @@ class Turntable(Moving):
     frames: int = quantity(75, "frames of the whole turn", at_least=2, at_most=MOST_FRAMES)
     fingertip: bool = quantity(False, "whether the fingertip is shown")
 
+    def count(self, time: Sequence[float] | Floats) -> int:
+        """Return the number of frames, whatever the times of the history are."""
+        return self.frames
+
     def angles(self) -> Floats:
         """Return the turn of the bed in each frame, rad; the frame after the last would be the first."""
         return np.arange(self.frames) * (2.0 * np.pi / self.frames)
@@ -79,6 +83,10 @@ class Film(Moving):
     stop: float = quantity(
         0.0, "simulated time of the last frame; 0: the session's end", unit="s", at_least=0.0, at_most=1e6
     )
+
+    def count(self, time: Sequence[float] | Floats) -> int:
+        """Return the number of frames; the parameters are those of `moments`."""
+        return len(self.moments(time))
 
     def moments(self, time: Sequence[float] | Floats) -> Floats:
         """Return the simulated time of each frame, s.

@@ -1,0 +1,115 @@
+"""State of a job's run: whether it is there, whole, and of the job's present definition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+from ..core.base.errors import DigiclayError
+from ..core.base.run_folder import lock_name
+from ..core.base.whole_files import format_json, read_json, write_whole
+from ..core.scene.scene_source import load
+from ..core.session.finished_run import is_whole
+from ..core.studies.job_outputs import Outputs
+from ..core.studies.job_table import JOB, SCENE, read_outputs
+
+__all__ = [
+    "FILES", "MOVING", "RUNS", "TIMING", "RunState", "is_done", "judge_run", "list_lacking", "note_film",
+]  # fmt: skip
+
+#: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
+RUNS, TIMING, FILES = "runs", "timing.json", "files"
+#: Outputs that can be drawn frame by frame after the run; each is the file of its name with ``.mp4``.
+MOVING = ("turntable", "film")
+#: Seconds to wait for another process that notes its film.
+PATIENCE = 20.0
+
+
+class RunState(Enum):
+    """State of a job's run, without regard to its films."""
+
+    ABSENT = "absent"
+    CHANGED = "of another definition"
+    INCOMPLETE = "incomplete"
+    WHOLE = "whole"
+
+
+def judge_run(job: Path, run: Path) -> RunState:
+    """Return what there is of a run.
+
+    Parameters
+    ----------
+    job : Path
+        The folder of the job's files.
+    run : Path
+        The folder of its run.
+    """
+    if not run.is_dir() or not any(run.iterdir()):
+        return RunState.ABSENT
+    if not all((run / name).is_file() for name in (SCENE, JOB)):
+        return RunState.INCOMPLETE
+    if not (_is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)):
+        return RunState.CHANGED
+    timing = read_json(run / TIMING)
+    whole = timing is not None and is_whole(run, load(run / SCENE), timing.get(FILES))
+    return RunState.WHOLE if whole else RunState.INCOMPLETE
+
+
+def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:
+    """Return whether two files say the same; older versions wrote it otherwise."""
+    try:
+        return one.read_bytes() == other.read_bytes() or read(one) == read(other)
+    except (OSError, DigiclayError):
+        return False
+
+
+def list_lacking(run: Path, outputs: Outputs) -> list[str]:
+    """Return those of `MOVING` that are wanted and not there.
+
+    Parameters
+    ----------
+    run : Path
+    outputs : Outputs
+    """
+    files = (read_json(run / TIMING) or {}).get(FILES)
+    # Older runs have not noted their files.
+    there = files if isinstance(files, Mapping) else {path.name for path in run.iterdir()}
+    return [kind for kind in MOVING if getattr(outputs, kind) and f"{kind}.mp4" not in there]
+
+
+def is_done(job: Path, run: Path) -> bool:
+    """Return whether a job is done, its films too.
+
+    Parameters
+    ----------
+    job, run
+        As for `judge_run`.
+    """
+    try:
+        return judge_run(job, run) is RunState.WHOLE and not list_lacking(run, read_outputs(job / JOB))
+    except (OSError, DigiclayError):
+        return False
+
+
+def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
+    """Note in a run what was drawn for one of its films, and its file once there is one.
+
+    Parameters
+    ----------
+    run : Path
+    kind : str
+        Of `MOVING`.
+    seconds : float
+        Time it took; added to what is noted already.
+    encoded : bool
+        Whether the film is there now.
+    """
+    with lock_name(run / TIMING, PATIENCE):
+        timing: dict[str, Any] = read_json(run / TIMING) or {}
+        timing[kind] = (timing.get(kind) or 0.0) + seconds
+        if encoded and isinstance(timing.get(FILES), dict):
+            name = f"{kind}.mp4"
+            timing[FILES] = {**timing[FILES], name: (run / name).stat().st_size}
+        write_whole(run / TIMING, format_json(timing))

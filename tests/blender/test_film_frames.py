@@ -1,0 +1,112 @@
+"""A film drawn in ranges of frames, by several processes, is the film drawn in one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.commands.job_films import find_frames, make_frames
+from digiclay.commands.render import ARRAYS, stage_moving
+from digiclay.commands.run_state import is_done, list_lacking
+from digiclay.compat import scratch, strips
+from digiclay.core.base.run_folder import lock_name
+from digiclay.core.session.finished_run import read_run
+from digiclay.core.session.frame_files import list_missing, name_frame
+from digiclay.core.studies.job_table import read_outputs
+from digiclay.pictures.film import draw_frames
+
+JOBS = """
+scenes = ["tap"]
+errors = false
+settings.short.simulation.duration = 0.4
+[film]
+width = 160
+height = 100
+rate = 10
+[turntable]
+width = 64
+height = 40
+frames = 3
+"""
+COUNT = 5
+JOB, RUN = Path("two/jobs/tap-short"), Path("two/runs/tap-short")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work beside a job whose run is done and whose films are not."""
+    monkeypatch.chdir(tmp_path)
+    Path("two.toml").write_text(JOBS, encoding="utf-8")
+    assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
+    assert main(["job", str(JOB), "--only", "run", "--quiet"]) == 0
+    return tmp_path
+
+
+def pixels(folder: Path, frame: int) -> np.ndarray:
+    """Read a frame."""
+    with scratch():
+        image = bpy.data.images.load(str(name_frame(folder, frame).resolve()))
+        return np.array(image.pixels[:])
+
+
+def count_frames(film: Path) -> int:
+    """Return how many frames a film has."""
+    with scratch():
+        strip = strips(bpy.data.scenes.new("reading")).new_movie("film", str(film), channel=1, frame_start=1)
+        return int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)
+
+
+def test_frames_drawn_in_ranges_are_those_of_the_whole_film_and_make_it(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = find_frames(RUN, "film")
+    for some in ("3-4", "1+2"):
+        assert main(["job", str(JOB), "--only", "film", "--frames", some, "--quiet"]) == 0
+    assert list_missing(folder, range(COUNT)) == [0]
+    assert not is_done(JOB, RUN)
+    whole = here / "whole"
+    whole.mkdir()
+    outputs, found = read_outputs(JOB / "job.toml"), read_run(RUN, *ARRAYS)
+    with stage_moving(found.scene, found.history, outputs.film) as shots:
+        assert shots.count == COUNT
+        assert draw_frames(shots, range(COUNT), whole, here / "film.mp4")
+    for frame in range(1, COUNT):
+        np.testing.assert_array_equal(pixels(folder, frame), pixels(whole, frame))
+        assert (pixels(whole, frame) != pixels(whole, frame - 1)).any()
+    # Whoever makes the film draws what is missing, and does not draw the others again.
+    name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
+    kept = name_frame(folder, 3).stat().st_mtime_ns
+    assert main(["job", str(JOB), "--only", "film", "--frames", "3", "--quiet"]) == 0
+    assert name_frame(folder, 3).stat().st_mtime_ns == kept
+    assert main(["job", str(JOB), "--only", "film", "--quiet"]) == 0
+    assert count_frames(RUN / "film.mp4") == COUNT
+    assert (folder.exists(), list_lacking(RUN, outputs)) == (False, ["turntable"])
+    # The job as a whole makes what is left, and leaves the film as it is.
+    made = (RUN / "film.mp4").stat().st_mtime_ns
+    assert main(["job", str(JOB), "--quiet"]) == 0
+    assert count_frames(RUN / "turntable.mp4") == 3
+    assert is_done(JOB, RUN)
+    timing = json.loads((RUN / "timing.json").read_text(encoding="utf-8"))
+    assert timing["files"]["turntable.mp4"] == (RUN / "turntable.mp4").stat().st_size
+    capsys.readouterr()
+    for part in (["--only", "film"], ["--only", "film", "--frames", "0-3"], []):
+        assert main(["job", str(JOB), *part]) == 0
+        assert " already" in capsys.readouterr().out
+    assert (RUN / "film.mp4").stat().st_mtime_ns == made
+
+
+def test_a_stop_keeps_the_frames_that_are_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    outputs, asked = read_outputs(JOB / "job.toml"), iter([False, True])
+    with pytest.raises(KeyboardInterrupt):
+        make_frames(JOB, RUN, outputs, "turntable", "0-2", lambda: next(asked), lambda step, share: None)
+    folder = find_frames(RUN, "turntable")
+    assert [path.name for path in folder.iterdir()] == ["000000.png"]
+    with lock_name(folder / "0-2"):
+        assert main(["job", str(JOB), "--only", "turntable", "--frames", "0-2", "--quiet"]) == 2
+    assert "0-2 is being written by another digiclay" in capsys.readouterr().err
+    assert main(["job", str(JOB), "--only", "turntable", "--frames", "0-3", "--quiet"]) == 2
+    assert capsys.readouterr().err == "--frames must be within 0-2, first frame first (got 0-3).\n"

@@ -1,0 +1,132 @@
+"""A job of a series may be started again and again: what is done stays, and what is not is done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+from digiclay.core.base.errors import OutputError
+from digiclay.core.session.frame_files import format_range, list_missing, name_frame, read_range
+
+JOBS = """
+scenes = ["tap"]
+errors = false
+[settings.quick]
+simulation.duration = 0.05
+"""
+JOB, RUN = Path("two/jobs/tap-quick"), Path("two/runs/tap-quick")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work beside the files of one job that is not done."""
+    monkeypatch.chdir(tmp_path)
+    prepare(JOBS)
+    return tmp_path
+
+
+def prepare(said: str) -> None:
+    """Write the files of the job."""
+    Path("two.toml").write_text(said, encoding="utf-8")
+    assert main(["batch", "two.toml", "--prepare", "--quiet"]) == 0
+
+
+def written(run: Path = RUN) -> int:
+    """Return when a run was written, ns."""
+    return (run / "history.npz").stat().st_mtime_ns
+
+
+def test_a_job_that_is_done_is_left_as_it_is_with_exit_code_0(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["job", str(JOB)]) == 0
+    assert capsys.readouterr().out.startswith("written to ")
+    before = written()
+    assert main(["job", str(JOB)]) == 0
+    out, err = capsys.readouterr()
+    assert (out, err) == (f"was done already: {RUN.resolve()}\n", "")
+    assert main(["job", str(JOB), "--only", "run", "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+    assert written() == before
+    assert main(["job", str(JOB), "--overwrite", "--quiet"]) == 0
+    assert written() > before
+
+
+def test_a_job_whose_files_changed_is_done_again_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["job", str(JOB), "--quiet"])
+    before = written()
+    prepare(JOBS.replace("0.05", "0.06"))
+    assert main(["job", str(JOB)]) == 0
+    assert "is of another definition: it is done again.\n" in capsys.readouterr().out
+    assert written() > before
+    prepare(f'export = ["stl"]\n{JOBS.replace("0.05", "0.06")}')
+    assert main(["job", str(JOB), "--quiet"]) == 0
+    assert (RUN / "surface.stl").is_file()
+
+
+@pytest.mark.parametrize("harm", ["history.npz", "scene.toml"])
+def test_a_run_of_which_a_copy_broke_off_is_done_again(harm: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["job", str(JOB), "--quiet"])
+    whole = (RUN / harm).read_bytes()
+    (RUN / harm).unlink()
+    if harm == "history.npz":
+        (RUN / harm).write_bytes(whole[:100])
+    assert main(["job", str(JOB)]) == 0
+    assert "is incomplete: it is done again.\n" in capsys.readouterr().out
+    assert (RUN / harm).stat().st_size == len(whole)
+
+
+def test_a_folder_outside_the_series_is_replaced_only_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    own = ["job", str(JOB), "--out", "mine", "--quiet"]
+    assert (main(own), main(own)) == (0, 0)
+    before = written(Path("mine"))
+    prepare(JOBS.replace("0.05", "0.06"))
+    assert main(own) == 2
+    assert "mine is not empty: choose another folder with --out" in capsys.readouterr().err
+    assert written(Path("mine")) == before
+    assert main([*own, "--overwrite"]) == 0
+    assert written(Path("mine")) > before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--frames", "0-9"], "--frames must be given with --only film or --only turntable."),
+        (["--only", "run", "--frames", "0-9"], "--frames must be given with --only film"),
+        (["--only", "film"], "job.toml has no section [film]."),
+        (["--only", "turntable"], "--only turntable needs a finished run, and the run in "),
+        (["--only", "fim"], "Did you mean film?"),
+    ],
+)
+def test_a_part_that_cannot_be_done_is_refused_in_one_line(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    prepare(f"{JOBS}[turntable]\nframes = 4\n")
+    assert main(["job", str(JOB), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert said in err
+    assert list(Path("two/runs").iterdir()) == []
+
+
+RANGES = {"0-24": (0, 25), "7": (7, 8), "50+25": (50, 60), "59+1": (59, 60), "0-59": (0, 60), " 3-3 ": (3, 4)}
+
+
+@pytest.mark.parametrize(("text", "ends"), RANGES.items())
+def test_a_range_of_frames_reads_back(text: str, ends: tuple[int, int]) -> None:
+    frames = read_range(text, 60)
+    assert (frames.start, frames.stop) == ends
+    assert read_range(format_range(frames), 60) == frames
+
+
+@pytest.mark.parametrize("text", ["", "a", "1-", "-3", "5-2", "0-60", "60", "60+1", "3+0", "1e2", "٣"])
+def test_a_range_that_is_none_of_the_film_is_refused(text: str) -> None:
+    with pytest.raises(OutputError, match="--frames must be "):
+        read_range(text, 60)
+
+
+def test_a_frame_that_is_cut_off_is_missing(tmp_path: Path) -> None:
+    whole = b"anything" + b"IEND\xaeB`\x82"
+    for frame, content in enumerate((whole, whole[:-3], b"", whole)):
+        name_frame(tmp_path, frame).write_bytes(content)
+    assert list_missing(tmp_path, range(6)) == [1, 2, 4, 5]
+    assert list_missing(tmp_path / "none", range(2)) == [0, 1]
