@@ -153,6 +153,16 @@ def test_a_blister_that_outgrows_a_frozen_cell_takes_it_along() -> None:
     assert orders.target[at(-12, 0)] == pytest.approx(45e-3, abs=1e-9)
 
 
+@pytest.mark.parametrize(("risen", "kept"), [(1.4e-3, False), (1.6e-3, True)])
+def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(
+    risen: float, kept: bool
+) -> None:
+    # It has not felt the finger for a period.
+    searching = master(*EAST, height=55e-3)._replace(felt=55e-3 - risen, alone=1)
+    target = created(searching, ridge(Mode.FROZEN))[1].target[at(-12, 0)]
+    assert target == pytest.approx(44e-3 if kept else 45e-3, abs=1e-9)
+
+
 def test_a_dent_that_outgrows_a_frozen_cell_takes_it_along() -> None:
     seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, 39e-3))
     _, orders = created(master(*EAST, height=31e-3), seen)

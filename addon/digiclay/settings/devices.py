@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ..core.base.quantity import list_quantities
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load
 from ..core.scene.schema import Finger, Scene
@@ -13,6 +14,7 @@ from .own_presets import path
 
 if TYPE_CHECKING:
     from ..core.control.blister import Blister
+    from ..core.control.methods import ControlParameters
 
 __all__ = ["change_layout", "fit_blister", "make_scene"]
 
@@ -64,18 +66,42 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
 
 
 def _scale_finger(scene: Scene, share: float) -> Scene:
-    """Return a scene with fingertip and blister of another size."""
-    fingers = tuple(_scale_tip(finger, share) for finger in scene.fingers)
-    return replace(scene, fingers=fingers, blister=scene.blister and _scale_blister(scene.blister, share))
+    """Return a scene with fingertip and blister of another size, and with forces and gains to match."""
+    return replace(
+        scene,
+        fingers=tuple(_scale_tip(finger, share) for finger in scene.fingers),
+        blister=scene.blister and _scale_blister(scene.blister, share),
+        control=scene.control and _scale_control(scene.control, share),
+    )
 
 
 def _scale_tip(finger: Finger, share: float) -> Finger:
-    """Return a finger with a tip of another size."""
-    tip = finger.fingertip
-    if tip is None:
-        return finger
-    scaled = replace(tip, length=tip.length * share, width=tip.width * share, height=tip.height * share)
-    return replace(finger, fingertip=scaled)
+    """Return a finger with a tip of another size, of the same pulp.
+
+    As many pins as before are under it, and each has a smaller area: its share of the law of a flat plate
+    goes with the square of the size.
+    """
+    tip, contact = finger.fingertip, finger.contact
+    if tip is not None:
+        tip = replace(tip, length=tip.length * share, width=tip.width * share, height=tip.height * share)
+    if contact is not None:
+        contact = replace(contact, share=contact.share * share**2)
+    return replace(finger, fingertip=tip, contact=contact)
+
+
+def _scale_control(control: ControlParameters, share: float) -> ControlParameters:
+    """Return a control for a finger of another size, on pins of another bore, behind the same valves.
+
+    The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
+    The flow goes with the square of the opening, which is the gain times the force. So a gain that goes with
+    the inverse of the size leaves the finger's speed at a given share of the set point what it was. Heights
+    are those of the clay, and stay.
+    """
+    factors = {"N": share**2, "N/m": share**2, "N s/m": share**2, "1/N": 1.0 / share, "m2/s": share**2}
+    known = list_quantities(control)
+    change = {name: factors[one.unit] for name, one in known.items() if one.unit in factors}
+    change |= {name: share for name in ("radius", "travel", "jump") if name in known}
+    return replace(control, **{name: getattr(control, name) * factor for name, factor in change.items()})
 
 
 def fit_blister(blister: Blister, layout: Layout) -> Blister:

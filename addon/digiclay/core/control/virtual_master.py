@@ -133,7 +133,7 @@ class VirtualMasterControl(MasterControl):
         facing &= ring
         level = sum_weighted(seen.height, facing).tolist()
         memory = self.set_edge(memory, level, count_true(facing))
-        edge, top, kind = self.get_heights(memory)
+        edge, top, kind, beyond = self.get_heights(memory)
         profile = self.blister.interpolate(distance, edge, top)
         frozen = ahead < behind * distance
         frozen &= distance > flat_radius
@@ -145,6 +145,7 @@ class VirtualMasterControl(MasterControl):
             kept = seen.target > profile
             if self.is_sunk(memory):
                 kept ^= top < edge
+            kept |= beyond
             kept &= frozen
             np.putmask(profile, kept, seen.target)
         target = seen.target.copy()
