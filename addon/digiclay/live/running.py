@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.control.smoothing import ORDER
 from ..core.engine.state import State
 from ..core.engine.system import System
 from ..core.scene.schema import Scene
@@ -35,7 +36,7 @@ class Gesture:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Fingertip path since the start of the recording.
+    """Fingertip path, and what was smoothed, since the start of the recording.
 
     Attributes
     ----------
@@ -43,8 +44,9 @@ class Recording:
         The state recording began with, kept by `core.session.snapshot`.
     first : int
         Its period.
-    rows : ndarray (capacity, 7 f + 1)
-        Poses of the fingers at the end of each period and the moment it was simulated in; row 0: the start.
+    rows : ndarray (capacity, 7 f + 4 + 1)
+        Poses of the fingers at the end of each period, what was smoothed in it, see `core.control.smoothing`,
+        and the moment it was simulated in; row 0: the start.
     count : int
         How many of the rows are in use. Those behind belong to nobody.
     saved : int
@@ -71,21 +73,27 @@ class Recording:
             Of the fingertips then.
         tick : int
         """
-        rows = np.empty((256, pose.size + 1))
-        rows[0] = *pose.ravel(), tick
+        rows = np.empty((256, pose.size + ORDER + 1))
+        rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
         return cls(snapshot, period, rows, 1)
 
     @property
     def path(self) -> Floats:
         """Poses, shape (t + 1, f, 7): `simulate_path` simulates them again bit for bit."""
-        return self.rows[: self.count, :-1].reshape(self.count, -1, 7)
+        return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
+
+    @property
+    def smoothing(self) -> Floats | None:
+        """What was smoothed in each period, shape (t, 4); None: nothing in any."""
+        orders = self.rows[1 : self.count, -ORDER - 1 : -1]
+        return orders if orders.any() else None
 
     @property
     def unsaved(self) -> bool:
         """Whether something was recorded that the file does not have."""
         return self.count > max(self.saved, 1)
 
-    def extend(self, path: Floats, tick: int) -> Recording:
+    def extend(self, path: Floats, tick: int, smoothing: Floats | None = None) -> Recording:
         """Return the recording with the poses of some more periods, shape (k, f, 7).
 
         Parameters
@@ -93,13 +101,16 @@ class Recording:
         path : ndarray (k, f, 7)
             Poses at the ends of the periods.
         tick : int
+        smoothing : ndarray (k, 4), optional
+            What was smoothed in them; nothing when left out.
         """
         end = self.count + len(path)
         rows = self.rows
         if end > len(rows):
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
-        rows[self.count : end, :-1] = path.reshape(len(path), -1)
+        rows[self.count : end, : -ORDER - 1] = path.reshape(len(path), -1)
+        rows[self.count : end, -ORDER - 1 : -1] = 0.0 if smoothing is None else smoothing
         rows[self.count : end, -1] = tick
         return replace(self, rows=rows, count=end)
 

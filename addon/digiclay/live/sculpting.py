@@ -150,9 +150,9 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     count : int
         Most control periods.
     """
-    system, state, monitor = running.system, running.state, running.monitor
+    system, state, monitor, smoothing = running.system, running.state, running.monitor, None
     if running.strokes:
-        running, path = take_path(running, count)
+        running, path, smoothing = take_path(running, count)
     else:
         pose = clamp_pose(pose, system.cell.actuator.stroke)
         running = _mark_gesture_start(running, pose, count)
@@ -162,7 +162,7 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
     with np.errstate(over="ignore", invalid="ignore"):
         monitor = monitor and accuracy.begin_stretch(monitor, state)
-        for index, state in enumerate(simulate_path(system, running.state, paths)):
+        for index, state in enumerate(simulate_path(system, running.state, paths, smoothing)):
             if monitor:
                 monitor, found = accuracy.follow(monitor, state, paths[index : index + 2])
                 errors = found or errors
@@ -173,9 +173,9 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
         running, state=state, snapshot=snapshot.dump(system, state), pose=path[-1],
         clock=clock, monitor=monitor,
         errors=errors, trace=recent_trace.extend(running.trace, rows),
-        recording=running.recording and running.recording.extend(paths[1:], running.tick),
+        recording=running.recording and running.recording.extend(paths[1:], running.tick, smoothing),
     )  # fmt: skip
-    return _count_gesture(gone)
+    return _count_gesture(gone, smoothed=smoothing is not None and bool(smoothing.any()))
 
 
 def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
@@ -189,9 +189,10 @@ def _mark_gesture_start(running: Running, pose: Floats, count: int) -> Running:
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
-def _count_gesture(running: Running) -> Running:
-    """Count a gesture that has touched among the last ones."""
-    if running.next_gesture is None or recent_trace.measure_total_force(running.system, running.state) == 0.0:
+def _count_gesture(running: Running, *, smoothed: bool) -> Running:
+    """Count a gesture that has touched, or smoothed, among the last ones."""
+    touched = smoothed or recent_trace.measure_total_force(running.system, running.state) > 0.0
+    if running.next_gesture is None or not touched:
         return running
     room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
     return replace(running, gestures=(*running.gestures, running.next_gesture)[-room:], next_gesture=None)

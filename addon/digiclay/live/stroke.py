@@ -42,6 +42,7 @@ class Brush(Enum):
     LOWER = "LOWER"
     RAISE = "RAISE"
     LEVEL = "LEVEL"
+    SMOOTH = "SMOOTH"
 
     @property
     def inverse(self) -> Brush:
@@ -62,7 +63,7 @@ class Sample:
     depth : float
         How far below the surface, or above it where it is raised, m.
     share : float
-        Share of the way from the surface to the level, from 0 to 1.
+        Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
     """
 
     time: float
@@ -109,6 +110,8 @@ class Stroke:
         How the blister follows, of a brush that needs one; found when the finger begins.
     climb : float
         How fast the finger rises with the blister, m/s.
+    left : float
+        When a finger that smooths came to the end of the path, s of `clock`.
     """
 
     number: int
@@ -127,6 +130,7 @@ class Stroke:
     brush: Brush = Brush.LOWER
     tracking: Tracking | None = None
     climb: float = 0.0
+    left: float = 0.0
 
     @property
     def done(self) -> bool:

@@ -21,24 +21,17 @@ from numpy.typing import NDArray
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
-from .stroke import ABOVE, DONE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
+from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
+from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, Place, cross, drag, finish_image, run_clock
 from .tracking import Tracking
 
-__all__ = ["APPROACH", "DRAG", "SPEED", "follow"]
+__all__ = ["APPROACH", "SPEED", "follow"]
 
 Floats = NDArray[np.float64]
 
 #: How fast the finger comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
 #: valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.
 APPROACH, SPEED = 0.1, 0.02
-#: How fast it leaves, m/s: well above any pin's free speed, so that no blister follows it up; and how fast
-#: it crosses the bed above all pins.
-LIFT, CROSS = 0.4, 1.0
-#: Fastest drag, m/s. On the paper's device a valley is as even at 100 mm/s as at 20 mm/s; at 200 mm/s
-#: the master is left behind, and its depth grows from 4 to 11 mm along 60 mm.
-DRAG = 0.1
-#: How far above the highest pin the finger passes over the bed, m.
-CLEARANCE = 4e-3
 #: How long a finger that takes a blister up gains speed, s: at once at half the free speed, it leaves the
 #: pins behind, whose valves have not opened yet.
 SPEED_UP = 1.0
@@ -49,11 +42,6 @@ RADII = 2.0
 SEARCH, OUTRUN = 0.1, 5.0
 #: How far the finger may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
-#: Heights that differ by less count as equal, m.
-NEAR = 1e-9
-#: How far a session slower than the wall's clock may fall behind the hand's times, s: what a hand does
-#: in seconds is not to take minutes. The path stays whole, since the finger drags no faster than `DRAG`.
-LATE = 0.5
 
 
 def follow(
@@ -103,9 +91,6 @@ def follow(
     return stroke, np.array(path)
 
 
-Place = tuple[float, float, float]
-
-
 def _begin(stroke: Stroke, height: Floats, tracking: Tracking | None) -> Stroke:
     """Return the stroke at its beginning; one whose brush needs a blister only leaves a device without."""
     stroke = replace(stroke, height=height.copy(), phase=ABOVE)
@@ -123,12 +108,10 @@ def _step(
     assert stroke.height is not None
     height = stroke.height
     x, y, z = pose[:3].tolist()
-    # It waits for moves that may have been made, or it would stop short and then make haste.
-    if not stroke.held or stroke.clock < stroke.known:
-        stroke = replace(stroke, clock=max(stroke.clock + period, now - stroke.began - LATE))
+    stroke = run_clock(stroke, period, now)
     safe = max(peak, float(height.max())) + CLEARANCE
     if stroke.phase == ABOVE:
-        return _cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
+        return cross(replace(stroke, clock=0.0, began=now), (x, y, z), safe, period)
     radius = finger.width / 2
     if stroke.phase == LEAVING:
         lift = LIFT
@@ -138,7 +121,7 @@ def _step(
             top = _find_lowest(stroke, grid, x, y, radius) + stroke.tracking.sink
             safe, lift = max(safe, top + max(CLEARANCE, SEARCH * speed)), max(LIFT, OUTRUN * speed)
         z = min(safe, z + lift * period)
-        return (_finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
+        return (finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
     move = _press if stroke.tracking is None or stroke.phase == PRESSING else _track
     stroke, (x, y, z) = move(stroke, grid, radius, (x, y, z), period)
     over = not stroke.held and stroke.reached == len(stroke.samples) - 1
@@ -153,7 +136,7 @@ def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: floa
     assert height is not None
     x, y, z = place
     if stroke.phase == DRAGGING:
-        stroke, x, y = _drag(stroke, x, y, DRAG * period)
+        stroke, x, y = drag(stroke, x, y, DRAG * period)
     surface = find_ground_height(grid, height, x, y, radius)
     # Pins bottom out on the bed's floor.
     if stroke.tracking is None:
@@ -172,7 +155,7 @@ def _track(stroke: Stroke, grid: Grid, radius: float, place: Place, period: floa
     x, y, z = place
     lowest = _find_lowest(stroke, grid, x, y, radius)
     if stroke.phase == DRAGGING and abs(z - lowest) <= SLACK:
-        stroke, x, y = _drag(stroke, x, y, _limit_drag(stroke, grid, place) * period)
+        stroke, x, y = drag(stroke, x, y, _limit_drag(stroke, grid, place) * period)
         lowest = _find_lowest(stroke, grid, x, y, radius)
     z, climb = _climb(z, stroke.climb, lowest, tracking.lift, period)
     risen = stroke.phase == RISING and abs(z - lowest) < NEAR
@@ -236,25 +219,6 @@ def _climb(z: float, climb: float, aim: float, fastest: float, period: float) ->
     return z + climb * period, climb
 
 
-def _finish_image(stroke: Stroke) -> Stroke:
-    """Return the stroke with its next mirror image begun; without one it is done."""
-    if stroke.image + 1 < len(stroke.mirrors):
-        return replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, climb=0.0)
-    return replace(stroke, phase=DONE)
-
-
-def _cross(stroke: Stroke, place: Place, safe: float, period: float) -> tuple[Stroke, Place]:
-    """Go up to a safe height, m, then over to the path's first place."""
-    x, y, z = place
-    if z < safe - NEAR:
-        return stroke, (x, y, min(safe, z + LIFT * period))
-    to_x, to_y = stroke.place(0)
-    far, length = math.hypot(to_x - x, to_y - y), CROSS * period
-    if far > length:
-        return stroke, (x + (to_x - x) * length / far, y + (to_y - y) * length / far, z)
-    return replace(stroke, phase=PRESSING), (to_x, to_y, z)
-
-
 def _sink(z: float, surface: float, lowest: float, period: float) -> float:
     """Return the height after a control period on the way to the lowest, m."""
     if z > surface:
@@ -262,24 +226,3 @@ def _sink(z: float, surface: float, lowest: float, period: float) -> float:
     if z > lowest:
         return max(lowest, z - SPEED * period)
     return min(lowest, z + APPROACH * period)
-
-
-def _drag(stroke: Stroke, x: float, y: float, length: float) -> tuple[Stroke, float, float]:
-    """Return the stroke and the place after a length of its path, m, never ahead of the hand."""
-    reached, samples = stroke.reached, stroke.samples
-    while reached + 1 < len(samples):
-        last, aim = samples[reached], samples[reached + 1]
-        (last_x, last_y), (aim_x, aim_y) = stroke.place(reached), stroke.place(reached + 1)
-        passed = aim.time <= stroke.clock
-        # On the way to a move yet to come the finger is no farther than the hand was.
-        part = 1.0 if passed else (stroke.clock - last.time) / (aim.time - last.time)
-        to_x, to_y = last_x + part * (aim_x - last_x), last_y + part * (aim_y - last_y)
-        far = math.hypot(to_x - x, to_y - y)
-        if far > length:
-            x, y = x + length / far * (to_x - x), y + length / far * (to_y - y)
-            break
-        x, y, length = to_x, to_y, length - far
-        if not passed:
-            break
-        reached += 1
-    return replace(stroke, reached=reached), x, y

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.modes import Mode
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
-from .stroke import SYMMETRIES, Brush, Mirror, Stroke, start
+from .stroke import LEAVING, SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
+from .sweep import find_radius, sweep
 from .tracking import find_tracking
 
 __all__ = ["change_stroke", "drop_strokes", "find_stroke", "last_place", "queue_stroke", "take_path"]
@@ -79,7 +81,7 @@ def drop_strokes(running: Running) -> Running:
     return replace(running, strokes=(), stroke_start=None)
 
 
-def take_path(running: Running, count: int) -> tuple[Running, Floats]:
+def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | None]:
     """Take from the first stroke where the finger goes in the next control periods.
 
     Parameters
@@ -95,19 +97,14 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
         Without the stroke when that ends here. Where it began is where a gesture began.
     path : ndarray (k + 1, 7)
         Poses between the periods, k at most `count`.
+    smoothing : ndarray (k, 4) or None
+        What is smoothed in each of the periods, see `core.control.smoothing`; None: nothing.
     """
-    system, first = running.system, running.strokes[0]
-    tracking = first.tracking
+    first = running.strokes[0]
     if first.height is None:
-        tracking = find_tracking(running.scene, system)
         begun = Gesture(running.state.period, running.snapshot, running.pose)
         running = replace(running, next_gesture=begun, stroke_start=begun)
-    finger = find_ellipsoid(running.scene)
-    height = running.state.row(0)
-    now = running.clock.seen or first.began
-    stroke, path = follow(
-        first, system.grid, height, finger, running.pose, count, system.period, now, tracking
-    )
+    stroke, path, smoothing = _advance(running, first, count)
     left = (stroke, *running.strokes[1:])
     running = replace(running, strokes=left)
     if stroke.done:
@@ -116,4 +113,17 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats]:
             running, strokes=left[1:], stroke_start=None, finished_strokes=running.finished_strokes + 1,
             last_place=(end.x, end.y),
         )  # fmt: skip
-    return running, path
+    return running, path, smoothing
+
+
+def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Floats | None]:
+    """Advance the finger along a stroke; return it, the finger's path, and what is smoothed."""
+    system, pose = running.system, running.pose
+    finger, height = find_ellipsoid(running.scene), running.state.row(0)
+    now, period = running.clock.seen or stroke.began, system.period
+    if stroke.brush is Brush.SMOOTH:
+        radius = find_radius(finger, system.grid.layout)
+        arrived = stroke.phase == LEAVING and not bool((running.state.mode() == Mode.BLISTER).any())
+        return sweep(stroke, height, radius, pose, count, period, now, arrived=arrived)
+    tracking = find_tracking(running.scene, system) if stroke.height is None else stroke.tracking
+    return *follow(stroke, system.grid, height, finger, pose, count, period, now, tracking), None

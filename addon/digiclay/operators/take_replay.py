@@ -121,7 +121,8 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
             here, there = len(bed.data.vertices), self._system.grid.count
             raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
         self._state = snapshot.load(self._system, self._took.start)
-        self._states = simulate_path(self._system, self._state, self._took.poses)
+        took = self._took
+        self._states = simulate_path(self._system, self._state, took.poses, took.smoothing)
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:

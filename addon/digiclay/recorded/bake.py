@@ -90,7 +90,8 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     height = np.empty((wanted.size, count), np.float32)
     force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
     frame, start = 0, snapshot.load(system, take.start)
-    for period, state in enumerate(chain([start], simulate_path(system, start, take.poses))):
+    states = simulate_path(system, start, take.poses, take.smoothing)
+    for period, state in enumerate(chain([start], states)):
         while frame < wanted.size and wanted[frame] == period:
             height[frame], force[frame] = state.row(0), state.row(system.rows.force)
             mode[frame] = state.mode()

@@ -80,9 +80,11 @@ def find(bed: Any, number: str = "") -> Entry:
 
 def read_recording(session: Running) -> Take | None:
     """Return what a session has recorded, or None when that is nothing yet."""
-    if session.recording is None or len(session.recording.path) < 2:
+    keep = session.recording
+    if keep is None or len(keep.path) < 2:
         return None
-    return Take(session.scene, session.recording.start, session.recording.path.copy(), session.snapshot)
+    smoothing = None if keep.smoothing is None else keep.smoothing.copy()
+    return Take(session.scene, keep.start, keep.path.copy(), session.snapshot, smoothing)
 
 
 def add(bed: Any, take: Take, name: str = "") -> Entry:

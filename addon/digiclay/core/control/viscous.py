@@ -16,11 +16,11 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
-from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, TouchParameters, check_damping, make_drive, raise_felt_force
+from .exchange import Exchange, make_exchange
 
-__all__ = ["Exchange", "Spot", "Viscous", "ViscousControl", "build", "make_exchange"]
+__all__ = ["Spot", "Viscous", "ViscousControl", "build"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -65,90 +65,6 @@ class Viscous(TouchParameters):
     diffusivity: float = quantity(
         10e-6, "diffusivity of the displacement between neighbors", unit="m2/s", symbol="D", at_least=0.0
     )
-
-
-@dataclass(frozen=True)
-class Exchange:
-    """Exchange between neighbors in one control period.
-
-    Attributes
-    ----------
-    columns : int
-        Cells in a row.
-    shifted : bool
-        Whether odd rows are shifted, so that a cell has six neighbors, not four.
-    along, across : float
-        Share of their difference that two neighbors exchange, in a row and between rows.
-    """
-
-    columns: int
-    shifted: bool
-    along: float
-    across: float
-
-    def find_pairs(self, cells: Cells) -> list[tuple[Cells, Cells, float]]:
-        """Return where in `cells` neighbors stand, each pair once, with the share they exchange."""
-        row, column = np.divmod(cells, self.columns)
-        last = self.columns - 1
-        steps = [(1, column < last, self.along), (self.columns, column <= last, self.across)]
-        if self.shifted:  # even rows reach left as well, odd ones right
-            odd = row % 2 == 1
-            steps.append((self.columns - 1, ~odd & (column > 0), self.across))
-            steps.append((self.columns + 1, odd & (column < last), self.across))
-        order = np.argsort(cells)
-        ascending = cells[order]
-        found = []
-        for step, exists, share in steps:
-            start = np.flatnonzero(exists)
-            goal = cells[start] + step
-            at = np.minimum(np.searchsorted(ascending, goal), cells.size - 1)
-            here = ascending[at] == goal
-            found.append((start[here], order[at[here]], share))
-        return found
-
-    def even_out(self, cells: Cells, values: Floats) -> Floats:
-        """Return values of some cells, shape (m,), after neighbors among them have exchanged.
-
-        What one gives the other gets, and nothing is exchanged with a cell that is not there: the
-        sum stays what it was.
-
-        Parameters
-        ----------
-        cells : ndarray of int (m,)
-        values : ndarray (m,)
-        """
-        change = np.zeros(cells.size)
-        for one, other, share in self.find_pairs(cells):
-            flow = share * (values[other] - values[one])
-            change += np.bincount(one, flow, cells.size) - np.bincount(other, flow, cells.size)
-        evened: Floats = values + change
-        return evened
-
-
-def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
-    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions.
-
-    The rates come from matching ``D`` along x and y; their sum is limited so that no period,
-    however long, makes neighbors overshoot one another.
-
-    Parameters
-    ----------
-    grid : Grid
-    diffusivity : float
-        m²/s.
-    period : float
-        Control period, s.
-    """
-    plan = grid.layout
-    if plan.arrangement == "aligned":
-        along, across = diffusivity / plan.pitch**2, diffusivity / plan.row_spacing**2
-        total = 2.0 * (along + across)
-    else:
-        across = diffusivity / (2.0 * plan.row_spacing**2)
-        along = diffusivity / plan.pitch**2 - across / 2.0
-        total = 2.0 * along + 4.0 * across
-    limited = -math.expm1(-2.0 * total * period) / (2.0 * total) if total else 0.0
-    return Exchange(plan.columns, plan.shift > 0.0, along * limited, across * limited)
 
 
 @dataclass(frozen=True, eq=False)

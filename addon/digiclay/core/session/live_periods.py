@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,7 +152,9 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
     return inside
 
 
-def simulate_path(system: System, state: State, path: Floats) -> Iterator[State]:
+def simulate_path(
+    system: System, state: State, path: Floats, smoothing: Floats | None = None
+) -> Iterator[State]:
     """Simulate the periods of the fingers' paths; the arrays of `state` are used up.
 
     A recorded path gives the same states bit for bit, however many periods are done at a time.
@@ -162,12 +165,25 @@ def simulate_path(system: System, state: State, path: Floats) -> Iterator[State]
     state : State
     path : ndarray (t + 1, f, 7)
         Where the fingers are between the periods, from `interpolate_path`.
+    smoothing : ndarray (t, 4), optional
+        What is smoothed in each period, see `control.smoothing`.
 
     Yields
     ------
     State
         After each period; valid until the next one is asked for.
     """
-    for finger in trace_fingers(system, interpolate_poses(path, system.instants / system.period)):
-        state = advance(system, state, finger)
+    fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
+    systems = repeat(system, len(fingers)) if smoothing is None else _order_smoothing(system, smoothing)
+    for own, finger in zip(systems, fingers, strict=True):
+        state = advance(own, state, finger)
         yield state
+
+
+def _order_smoothing(system: System, smoothing: Floats) -> Iterator[System]:
+    """Yield the system of each control period of a bed that is smoothed."""
+    from ..control.smoothing import order_periods
+
+    method = system.controller
+    for controller in order_periods(method, system.grid, system.cell, system.period, smoothing):
+        yield system if controller is method else replace(system, controller=controller)

@@ -1,8 +1,8 @@
 """Take: initial state and fingers' paths of a session, replayed bit for bit.
 
 The path is a pose at the start and one at the end of every control period, between which the
-finger goes straight; that and the state at the start decide all that follows. The state at
-the end is kept as well, so that a replay can prove that it came to the same.
+finger goes straight; that, what is smoothed in each period, and the state at the start decide all
+that follows. The state at the end is kept as well, so that a replay can prove that it came to the same.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError, ParameterError
 from ..base.npz import BROKEN_ZIP, read_array, read_heads
 from ..base.toml_text import parse_tables
+from ..control.smoothing import find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -37,8 +38,10 @@ STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")
 #: What the number of a format's version stands for: 1, which is not written down, has poses (t + 1, 7) of one
-#: finger; 2 has (t + 1, f, 7).
-VERSION = 2
+#: finger; 2 has (t + 1, f, 7); 3 has the array `SMOOTHING` besides. A take without it is written as 2, which
+#: older versions can read.
+PLAIN, VERSION = 2, 3
+SMOOTHING = "smoothing"
 #: Most parts a physics step is cut into when a take is simulated once more.
 MOST_PARTS = 64
 
@@ -56,17 +59,21 @@ class Take:
     poses : ndarray (t + 1, f, 7)
         Fingers at the start, and at the end of each of t control periods: lowest point, m,
         and unit quaternion.
+    smoothing : ndarray (t, 4) or None
+        What is smoothed in each period, see `control.smoothing`; None: nothing in any.
 
     Raises
     ------
     ParameterError
-        When there is no period, a pose is not finite, or the scene has another number of fingers.
+        When there is no period, a pose is not finite, the scene has another number of fingers, or what is
+        smoothed is no disc and strength a period.
     """
 
     scene: Scene
     start: bytes
     poses: Floats
     end: bytes
+    smoothing: Floats | None = None
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -76,6 +83,10 @@ class Take:
         if not np.isfinite(self.poses).all():
             row = int(np.argwhere(~np.isfinite(self.poses))[0][0])
             raise ParameterError("Take", "poses", "must be finite numbers", f"row {row} is not")
+        fault = "" if self.smoothing is None else find_fault(self.smoothing, self.periods)
+        if fault:
+            rule = f"must hold x, y, a radius and a strength from 0 to 1 for each of {self.periods} periods"
+            raise ParameterError("Take", SMOOTHING, rule, fault)
 
     @property
     def periods(self) -> int:
@@ -103,7 +114,7 @@ def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
         After each period; valid until the next one is asked for.
     """
     system = assemble(scene or take.scene)
-    yield from simulate_path(system, snapshot.load(system, take.start), take.poses)
+    yield from simulate_path(system, snapshot.load(system, take.start), take.poses, take.smoothing)
 
 
 def refine(scene: Scene, parts: int) -> Scene:
@@ -137,8 +148,14 @@ def to_scene(take: Take, name: str) -> Scene:
     Raises
     ------
     OutputError
-        When the take does not begin at rest: a scene file has no other beginning.
+        When the take does not begin at rest: a scene file has no other beginning; or when something is
+        smoothed in it: a scene file has a finger alone.
     """
+    if take.smoothing is not None:
+        raise OutputError(
+            f"The take {name!r} has strokes of the brush Smooth, and a scene file holds the fingertip's path "
+            "alone: record a take without them for export."
+        )
     system = assemble(take.scene)
     if not _is_at_rest(system, take.start):
         raise OutputError(
@@ -184,13 +201,15 @@ def _find_turns(poses: Floats) -> NDArray[np.bool_]:
 def to_bytes(take: Take) -> bytes:
     """Write a take as numpy's ``.npz``"""
     written = io.BytesIO()
+    smoothed = {} if take.smoothing is None else {SMOOTHING: take.smoothing}
     np.savez(
         written,
         scene=np.frombuffer(format_scene(take.scene).encode(), np.uint8),
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
-        version=np.array(VERSION),
+        version=np.array(VERSION if smoothed else PLAIN),
+        **smoothed,
     )
     return written.getvalue()
 
@@ -205,17 +224,20 @@ def from_bytes(data: bytes) -> Take:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = (*PARTS, "version")[: 5 if "version.npy" in archive.namelist() else 4]
+            there = archive.namelist()
+            names = [*PARTS, *(name for name in ("version", SMOOTHING) if f"{name}.npy" in there)]
             held = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to no more than it is.
             size = sum(head.size for head in held.values())
             if size > len(data):
                 raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
-            scene, start, poses, end, *version = (read_array(archive, name) for name in names)
-        if not version:
+            parts = {name: read_array(archive, name) for name in names}
+        scene, start, poses, end = (parts[name] for name in PARTS)
+        if "version" not in parts:
             poses = poses[:, None]  # the first version held one finger
-        elif int(version[0]) != VERSION:
-            raise ValueError(f"its version must be at most {VERSION} (got {version[0]})")
-        return Take(resolve(parse_tables(scene.tobytes().decode())), start.tobytes(), poses, end.tobytes())
+        elif not PLAIN <= int(parts["version"]) <= VERSION:
+            raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
+        resolved = resolve(parse_tables(scene.tobytes().decode()))
+        return Take(resolved, start.tobytes(), poses, end.tobytes(), parts.get(SMOOTHING))
     except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

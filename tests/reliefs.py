@@ -1,0 +1,79 @@
+"""Beds with a relief of pins that stand still, and strokes that smooth it, for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.exchange import make_exchange
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Grid
+from numpy.typing import NDArray
+
+__all__ = ["heighten", "make_orders", "make_spike_and_ridge", "measure_roughness", "stay_away"]
+
+Floats = NDArray[np.float64]
+
+
+def make_spike_and_ridge(grid: Grid) -> Floats:
+    """Return a relief over the bed at rest, (n,), m: a pin 10 mm high, and a ridge of 6 mm beside it."""
+    relief = 6e-3 * np.exp(-(((grid.y + 9e-3) / 4e-3) ** 2))
+    relief[grid.at(np.array([0.0]), np.array([0.0]))] += 10e-3
+    return relief
+
+
+def heighten(system: System, relief: Floats) -> State:
+    """Return the state of a bed whose pins stand still at a relief.
+
+    Parameters
+    ----------
+    system : System
+    relief : ndarray (n,)
+        Above the heights at rest, m.
+    """
+    state = begin(system)
+    height = system.cell.actuator.rest_height + relief
+    state.rows[0] = state.rows[system.rows.target] = height
+    state.modes[:] = np.where(np.abs(relief) > 1e-6, Mode.HOLD, Mode.REST)
+    return state._replace(peak=float(height.max()))
+
+
+def make_orders(periods: int, start: float, end: float, y: float, radius: float, settle: int = 60) -> Floats:
+    """Return the orders of a stroke along a row at full strength, and of the wait for its pins.
+
+    Parameters
+    ----------
+    periods : int
+        Control periods of the stroke.
+    start, end, y, radius : float
+        m.
+    settle : int, optional
+        Control periods of the wait.
+    """
+    orders = np.zeros((periods + settle, 4))
+    orders[:periods, 0] = np.linspace(start, end, periods)
+    orders[periods:, 0] = end
+    orders[:, 1:3], orders[:periods, 3] = (y, radius), 1.0
+    return orders
+
+
+def stay_away(periods: int) -> Floats:
+    """Return the path of a finger that meets nothing, (t + 1, 1, 7)."""
+    return np.tile([0.0, 0.0, 0.2, *LEVEL], (periods + 1, 1, 1))
+
+
+def measure_roughness(grid: Grid, height: Floats) -> float:
+    """Return the rms of how far the pins are off the mean of their neighbors, m; exact but for a factor.
+
+    Parameters
+    ----------
+    grid : Grid
+    height : ndarray (n,)
+        m.
+    """
+    cells = np.arange(grid.count)
+    # Ten times what the exchange of so short a time moves.
+    off = make_exchange(grid, 1e-6, 1e-3).even_out(cells, height) - height
+    return float(np.sqrt(np.mean(off**2)))

@@ -1,0 +1,188 @@
+"""Pins in a disc are driven to smoothed heights: the bed gets even, keeps its volume, and stays elsewhere."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.drive import DriveParameters
+from digiclay.core.control.methods import METHODS
+from digiclay.core.control.smoothing import find_fault
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.physics import find_speeds
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_periods import simulate_path
+from numpy.typing import NDArray
+
+from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
+
+Floats = NDArray[np.float64]
+ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
+BAND = DriveParameters().dead_band
+RADIUS = 10e-3
+#: A stroke between spike and ridge: both are in the disc.
+STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
+
+
+@cache
+def bed(arrangement: str = "aligned", method: str = "virtual_master", size: int = 13) -> System:
+    """Return a small bed."""
+    layout = {"rows": size, "columns": size, "arrangement": arrangement}
+    control: object = "absent" if method == "absent" else {"method": method}
+    return assemble(resolve({"layout": layout, "control": control}))
+
+
+def smooth(system: System, state: State, orders: Floats) -> list[Floats]:
+    """Return the heights after each period of orders, (t, n), m; `state` is used up."""
+    states = simulate_path(system, state, stay_away(len(orders)), orders)
+    return [state.row(0) for state in states]
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(arrangement: str) -> None:
+    system = bed(arrangement)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    first = state.row(0)
+    rough = [measure_roughness(system.grid, first)]
+    for _ in range(3):
+        *_, state = simulate_path(system, state, stay_away(len(STROKE)), STROKE)
+        rough.append(measure_roughness(system.grid, state.row(0)))
+        # A pin stands within the dead band of its height; the heights' own sum does not change.
+        assert abs((state.row(0) - first).sum()) <= BAND * first.size
+        assert abs((state.row(system.rows.target) - first).sum()) < 1e-12
+    assert rough[1] < 0.4 * rough[0]
+    assert np.diff(rough).max() < 0.0
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_pins_outside_the_ring_stay_exactly_where_they_are(arrangement: str) -> None:
+    system = bed(arrangement)
+    relief = np.random.default_rng(1).uniform(-5e-3, 5e-3, system.grid.count)
+    state = heighten(system, relief)
+    before = state.row(0)
+    after = smooth(system, state, make_orders(60, 0.0, 0.0, 0.0, RADIUS))[-1]
+    outside = np.hypot(system.grid.x, system.grid.y) >= RADIUS
+    np.testing.assert_array_equal(after[outside], before[outside])
+    assert np.abs(after - before)[~outside].max() > 1e-3
+
+
+def test_a_spike_sinks_without_swinging_and_no_pin_leaves_the_range_of_the_others() -> None:
+    system = bed()
+    relief = make_spike_and_ridge(system.grid)
+    state = heighten(system, relief)
+    first, spike = state.row(0), int(relief.argmax())
+    heights = np.array(smooth(system, state, make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100)))
+    assert np.diff(heights[:, spike]).max() <= 1e-9
+    assert heights.min() >= first.min() - BAND
+    assert heights.max() <= first.max() + BAND
+    # Still before the wait is over.
+    assert np.abs(heights[-20:] - heights[-1]).max() < 1e-9
+
+
+def test_pins_go_no_faster_than_their_valves_let_them() -> None:
+    system = bed()
+    heights = np.array(smooth(system, heighten(system, make_spike_and_ridge(system.grid)), STROKE))
+    speed = np.diff(heights, axis=0) / system.period
+    limit = find_speeds(system.cell)
+    assert speed.max() <= limit.rise * (1.0 + 1e-9)
+    assert speed.min() >= limit.fall * (1.0 + 1e-9)
+    assert speed.min() < 0.9 * limit.fall
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_strokes_over_edge_and_corners_stay_finite_and_keep_the_volume(arrangement: str) -> None:
+    system = bed(arrangement, "absent", 6)
+    relief = np.random.default_rng(2).uniform(-5e-3, 5e-3, system.grid.count)
+    state = heighten(system, relief)
+    first, edge = state.row(0), float(system.grid.x.max())
+    for y in (-edge, edge, 3.0 * edge):
+        orders = make_orders(30, -1.5 * edge, 1.5 * edge, y, RADIUS, 100)
+        *_, state = simulate_path(system, state, stay_away(len(orders)), orders)
+    assert abs((state.row(0) - first).sum()) <= BAND * first.size
+    assert measure_roughness(system.grid, state.row(0)) < measure_roughness(system.grid, first)
+
+
+@pytest.mark.parametrize("method", [*METHODS, "absent"])
+def test_every_method_lets_its_pins_be_smoothed(method: str) -> None:
+    system = bed(method=method)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    spike = int(state.row(0).argmax())
+    before = float(state.row(0)[spike])
+    *_, state = simulate_path(system, state, stay_away(100), STROKE[:100])
+    assert float(state.row(0)[spike]) < before - 5e-3
+    *_, state = simulate_path(system, state, stay_away(60), STROKE[100:])
+    # The shape display goes on with its own shape elsewhere.
+    near = np.hypot(system.grid.x, system.grid.y) < RADIUS
+    assert method == "shape_display" or not (state.mode() == Mode.BLISTER)[near].any()
+
+
+@pytest.mark.parametrize("method", ["virtual_master", "cell_states", "plastic", "push_pull"])
+def test_a_method_that_keeps_heights_keeps_smoothed_ones(method: str) -> None:
+    system = bed(method=method)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    *_, state = simulate_path(system, state, stay_away(len(STROKE)), STROKE)
+    smoothed = state.row(0)
+    *_, state = simulate_path(system, state, stay_away(100))
+    assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
+
+
+def test_a_session_kept_in_mid_stroke_goes_on_bit_for_bit() -> None:
+    system = bed()
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    *_, state = simulate_path(system, state, stay_away(40), STROKE[:40])
+    back = snapshot.load(system, snapshot.dump(system, state))
+    ends = []
+    for one in (state, back):
+        *_, last = simulate_path(system, one, stay_away(30), STROKE[40:70])
+        ends.append(snapshot.dump(system, last))
+    assert ends[0] == ends[1]
+
+
+def test_pins_that_a_stroke_leaves_in_motion_are_driven_home_by_the_method() -> None:
+    system = bed()
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
+    target = state.row(system.rows.target)
+    assert np.abs(state.row(0) - target).max() > 1e-3
+    *_, state = simulate_path(system, state, stay_away(300))
+    # Method I comes to a height like 1/t.
+    assert np.abs(state.row(0) - target).max() < 0.2e-3
+
+
+def test_periods_without_an_order_are_those_of_the_method_alone() -> None:
+    system, ends = bed(), []
+    for orders in (None, np.zeros((60, 4))):
+        path = stay_away(60)
+        path[:, 0, 2] = np.linspace(44e-3, 36e-3, 61)
+        *_, state = simulate_path(system, heighten(system, np.zeros(system.grid.count)), path, orders)
+        ends.append(snapshot.dump(system, state))
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        (np.nan, 0.0, 1e-2, 1.0),
+        (0.0, np.inf, 1e-2, 1.0),
+        (0.0, 0.0, -1e-2, 1.0),
+        (0.0, 0.0, 1e-9, 1.0),
+        (0.0, 0.0, 1e9, 1.0),
+        (0.0, 0.0, 1e-2, 1.1),
+        (0.0, 0.0, 1e-2, -0.1),
+    ],
+)
+def test_an_order_that_is_none_is_found(order: tuple[float, ...]) -> None:
+    orders = np.zeros((3, 4))
+    assert find_fault(orders, 3) == ""
+    orders[1] = order
+    assert find_fault(orders, 3).startswith("row 1 is [")
+
+
+@pytest.mark.parametrize("shape", [(0, 4), (2, 4), (3, 5), (12,)])
+def test_orders_of_another_shape_are_found(shape: tuple[int, ...]) -> None:
+    assert find_fault(np.zeros(shape), 3) == f"an array of the shape {shape}"
