@@ -17,12 +17,12 @@ from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..core.studies.series import finish
 from .arguments import add_command
 from .batch_folder import Folder, open_batch
+from .evaluation_pool import read_count
 from .exit_codes import FAILED, STOPPED
 from .job import ERROR, PROGRESS
 from .job_steps import check_outputs
 from .progress import Counted, format_duration
 from .stop import Stop
-from .sweep import read_count
 from .worker import Process, Processes, count_cores
 
 __all__ = ["JobProcess", "add"]

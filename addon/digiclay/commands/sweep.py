@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +18,10 @@ from ..core.studies.evaluation import (
     ERRORS,
     Bundles,
     Record,
-    evaluate_bundle,
     explain_failed_batches,
     find_figure,
     make_bundles,
 )
-from ..core.studies.series import finish
 from ..core.studies.sweep_plan import (
     Folder,
     find_unfinished,
@@ -35,16 +31,12 @@ from ..core.studies.sweep_plan import (
     select_done,
 )
 from .arguments import add_scene, settings_of
-from .evaluator import Evaluator, evaluate_elsewhere
+from .evaluation_pool import add_pool, open_pool
 from .exit_codes import STOPPED
 from .progress import Counted
 from .stop import Stop
-from .worker import Processes, count_cores, in_blender
 
-__all__ = ["add", "read_count"]
-
-#: The most processes of a command.
-MOST = 61
+__all__ = ["add"]
 
 EXAMPLES = """\
 examples:
@@ -76,18 +68,9 @@ def add(commands: Any) -> None:
         "--metric", metavar="M,...", default="rfd,lag", help="metrics of table and plot; default: rfd,lag"
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder")
-    parser.add_argument(
-        "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
-    )
+    add_pool(parser)
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
-
-
-def read_count(text: str) -> int:
-    """Read a number of processes."""
-    if not text.isdecimal() or not 1 <= int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST} (got {text!r})")
-    return int(text)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
@@ -159,16 +142,14 @@ def _finish(
             records.setdefault(point.index, {"error": why})
 
     if todo:
-        count = min(arguments.workers or count_cores(), MOST, len(todo)) if not in_blender() else 1
         bar = Counted(sys.stderr, "sweep", "points", len(records))
-        draw = (lambda: None) if arguments.quiet else (lambda: bar(len(records), total))
-        with ThreadPoolExecutor(count) as threads, bar, Processes(stop, draw) as processes:
-            task: Callable[[Sequence[Point]], list[Record | None]]
-            if count == 1:
-                task = partial(evaluate_bundle, stopped=processes.stopping, errors=errors)
-            else:
-                task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
-            finish(threads, task, todo, keep, fail, stopped=processes.stopped)
+
+        def draw(note: str) -> None:
+            if not arguments.quiet:
+                bar(len(records), total, note)
+
+        with bar, open_pool(arguments, len(todo), stop, draw, errors=errors) as pool:
+            pool.evaluate(todo, keep, fail)
     return records
 
 

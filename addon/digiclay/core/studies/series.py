@@ -7,6 +7,7 @@ of its pieces is done by an executor; each is kept as soon as it is done.
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import ExitStack, contextmanager, suppress
@@ -156,8 +157,13 @@ def finish(
     """
     arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
     waiting: dict[Future[Outcome], Piece] = {}
+    looked = -PAUSE
     try:
         for piece in pieces:
+            if time.monotonic() - looked >= PAUSE:  # thousands of pieces take seconds to hand over
+                if stopped():
+                    break
+                looked = time.monotonic()
             future = executor.submit(task, piece)
             waiting[future] = piece
             future.add_done_callback(arrived.put)
@@ -180,9 +186,9 @@ def finish(
                 fail(piece, describe_error(error))
             else:
                 keep(piece, outcome)
-    except BrokenExecutor:
-        rule = "A worker died, perhaps for lack of memory; what was done is kept."
-        raise OutputError(f"{rule} Run the same again with fewer --workers.") from None
+    except BrokenExecutor as error:
+        rule = "What is done is kept, and the same command goes on from there."
+        raise OutputError(f"{one_line(error)} {rule}") from None
     finally:
         for future in waiting:
             future.cancel()

@@ -1,0 +1,239 @@
+"""Evaluation of bundles on a Dask cluster: connection, comparison of versions, executor.
+
+Dask is imported only here and in tasks, and only when somebody names a scheduler.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import logging
+import pickle
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any
+
+from ..core.base.errors import DigiclayError, one_line
+from .cluster_task import UnfitWorkerError, Versions, call_on_worker, describe_versions
+from .refusals import refuse_without
+from .stop import allow_interrupt
+from .worker import in_blender
+
+__all__ = ["Cluster", "open_cluster"]
+
+#: Seconds to reach the scheduler, and to hear from its workers.
+PATIENCE = 10.0
+#: Seconds between two looks at how many workers there are, and without any before that is told.
+LOOK, ALONE = 1.0, 10.0
+
+
+class Cluster(Executor):
+    """Executor on the workers of a Dask scheduler.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    address : str
+        Of the scheduler, for messages.
+    """
+
+    def __init__(self, client: Any, address: str) -> None:
+        self._client, self._address, self._versions = client, address, describe_versions()
+        self._remote: set[Any] = set()  # Dask releases a task whose future nobody holds
+        self._workers, self._looked, self._manned = 0, 0.0, time.monotonic()
+
+    def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
+        """Have a worker call a function, and return its result by value."""
+        future: Future[Any] = Future()
+        try:
+            packed = pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL)
+            remote = self._client.submit(call_on_worker, packed, self._versions, pure=False)
+            self._remote.add(remote)
+            remote.add_done_callback(partial(self._hand_back, future))
+        except Exception:  # Dask's client is closed when it has given up
+            future.set_exception(self._lost())
+        return future
+
+    def _hand_back(self, future: Future[Any], remote: Any) -> None:
+        """Take the outcome of a task over, unless nobody waits for it."""
+        self._remote.discard(remote)
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            outcome = remote.result()
+        except BaseException as error:  # Dask's cancellation is no Exception
+            future.set_exception(self._explain(error))
+        else:
+            future.set_result(outcome)
+
+    def _explain(self, error: BaseException) -> BaseException:
+        """Return the error of a task as this program has it."""
+        from distributed import CancelledError, KilledWorker
+
+        if isinstance(error, KilledWorker):
+            deaths, last = error.allowed_failures + 1, error.last_worker.address
+            rule = f"{deaths} workers died of this, the last one {last}, perhaps for lack of memory"
+            return DigiclayError(f"{rule}.")
+        if isinstance(error, UnfitWorkerError):
+            return BrokenExecutor(f"{error}; here it is {self._versions}.")
+        if isinstance(error, ModuleNotFoundError):
+            return BrokenExecutor(f"A worker of {self._address} lacks {error.name}.")
+        return self._lost() if isinstance(error, (CancelledError, OSError)) else error
+
+    def _lost(self) -> BrokenExecutor:
+        """Return the error of a scheduler that is gone."""
+        return BrokenExecutor(f"The scheduler {self._address} is gone.")
+
+    def describe(self) -> str:
+        """Return how many workers there are now, for the progress line."""
+        now = time.monotonic()
+        if now - self._looked >= LOOK and self._client.status == "running":
+            self._looked = now
+            with suppress(Exception):  # tasks tell when the scheduler is gone
+                self._workers = self._client.scheduler_info(n_workers=0)["n_workers"]
+        if self._workers:
+            self._manned = now
+            return f", {self._workers} workers" if self._workers > 1 else ", 1 worker"
+        if now - self._manned >= ALONE:
+            self._manned = now + 6 * ALONE
+            _tell(f"{self._address} has no workers: waiting for some.")
+        return ", no workers: waiting"
+
+    def wait_for_workers(self, stop: Callable[[], bool], draw: Callable[[str], None]) -> None:
+        """Wait for a first worker, visibly.
+
+        Parameters
+        ----------
+        stop : callable
+            Whether somebody asks to stop.
+        draw : callable
+            Told again and again what is waited for.
+        """
+        said = self.describe()
+        if not self._workers:
+            _tell(f"{self._address} has no workers yet: start some with 'dask worker {self._address}'.")
+        while not self._workers and not stop():
+            draw(said)
+            time.sleep(0.1)
+            said = self.describe()
+
+    def refuse_other_versions(self) -> None:
+        """Refuse a cluster of which a part runs another digiclay, numpy or Python."""
+        try:
+            scheduler: Any = self._client.run_on_scheduler(describe_versions)
+        except Exception as error:
+            scheduler = error
+        found = {f"The scheduler {self._address}": scheduler}
+        workers = self._client.run(describe_versions, on_error="return")
+        found |= {f"Worker {name}": versions for name, versions in workers.items()}
+        _refuse_others(found, self._versions)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Release what is left of the tasks: workers stop at the next control period."""
+        with suppress(Exception):  # the scheduler may be gone
+            if self._client.status == "running" and self._remote:
+                self._client.cancel(list(self._remote), force=True)
+
+
+def _refuse_others(found: Mapping[str, Any], here: Versions) -> None:
+    """Refuse versions other than those here; whoever has no digiclay at all has an error in their place."""
+    others = {name: versions for name, versions in found.items() if versions != here}
+    if not others:
+        return
+    (name, versions), *rest = others.items()
+    more = f" (and {len(rest)} more like it)" if rest else ""
+    if isinstance(versions, ModuleNotFoundError):
+        has = f"lacks {versions.name}"
+    elif isinstance(versions, Versions):
+        has = f"has {versions}"
+    else:
+        has = f"cannot run digiclay ({type(versions).__name__}: {versions})"
+    raise DigiclayError(one_line(f"{name} {has}{more}; here it is {here}. Install the same there."))
+
+
+def _tell(line: str) -> None:
+    """Say what a person should know even without a progress line."""
+    start = "\r\033[K" if sys.stderr.isatty() else ""
+    print(f"{start}{line}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], None]) -> Iterator[Cluster]:
+    """Connect with a Dask scheduler, wait for workers, and compare versions.
+
+    At the end of the block, whatever ends it, the cluster has no task of this process any more.
+
+    Parameters
+    ----------
+    address : str
+        ``tcp://HOST:PORT``, ``tls://HOST:PORT``.
+    stop : callable
+        Whether somebody asks to stop.
+    draw : callable
+        Told again and again what is waited for.
+
+    Raises
+    ------
+    DigiclayError
+        In one line: without Dask, without a scheduler there, with other versions.
+    """
+    if in_blender():
+        raise DigiclayError("--scheduler needs Dask, which is not in Blender: use 'digiclay' outside of it.")
+    refuse_without("distributed", "--scheduler", "pip install digiclay[cluster]")
+    importlib.import_module("distributed")
+    if stop():
+        raise KeyboardInterrupt
+    with _be_quiet():
+        client = _connect(address)
+        try:
+            with Cluster(client, address) as cluster:
+                cluster.wait_for_workers(stop, draw)
+                if not stop():
+                    cluster.refuse_other_versions()
+                yield cluster
+        finally:
+            with suppress(Exception):
+                client.close(timeout=PATIENCE)
+
+
+def _connect(address: str) -> Any:
+    """Return a client of a scheduler."""
+    from distributed import Client
+
+    try:
+        with allow_interrupt():
+            asyncio.run(_try_address(address))
+            return Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError):
+        rule = f"No Dask scheduler answers at {address} within {PATIENCE:g} s"
+    except Exception as error:
+        why = one_line(error).rstrip(".")
+        rule = f"--scheduler must be an address such as tcp://127.0.0.1:8786 (got {address!r}: {why})"
+    raise DigiclayError(f"{rule}.")
+
+
+async def _try_address(address: str) -> None:
+    """Connect and disconnect: a client of Dask that has failed to connect hangs at the end of the program."""
+    from distributed import Security
+    from distributed.comm import connect
+
+    # Whoever accepts the connection need not be a scheduler, and may keep silent.
+    security = Security().get_connection_args("client")
+    comm = await asyncio.wait_for(connect(address, PATIENCE, **security), PATIENCE)
+    await comm.close()
+
+
+@contextmanager
+def _be_quiet() -> Iterator[None]:
+    """Keep Dask's log off the terminal: what matters is told in lines of this program."""
+    log = logging.getLogger("distributed")
+    former = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(former)

@@ -1,0 +1,131 @@
+"""Evaluation of bundles of points: in this process, in processes of this machine, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+from ..core.studies.axes import Point
+from ..core.studies.evaluation import Record, evaluate_bundle
+from ..core.studies.series import finish
+from .evaluator import Evaluator, evaluate_elsewhere
+from .worker import Processes, count_cores, in_blender
+
+__all__ = ["Pool", "add_pool", "open_pool", "read_count"]
+
+#: The most processes of a command.
+MOST = 61
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Evaluation of bundles, for one or several series of them.
+
+    Attributes
+    ----------
+    executor : Executor
+    task : callable
+        What the executor calls for a bundle; it returns the records.
+    stopped : callable
+        Whether somebody asks to stop; draws the progress.
+    """
+
+    executor: Executor
+    task: Callable[[Sequence[Point]], list[Record | None]]
+    stopped: Callable[[], bool]
+
+    def evaluate(
+        self,
+        bundles: Sequence[Sequence[Point]],
+        keep: Callable[[Sequence[Point], Sequence[Record | None]], None],
+        fail: Callable[[Sequence[Point], str], None],
+    ) -> None:
+        """Evaluate bundles, in any order, until all are done or somebody asks to stop.
+
+        Parameters
+        ----------
+        bundles : sequence of sequence of Point
+            See `core.studies.evaluation.make_bundles`.
+        keep : callable
+            Told of each bundle that is done, and of its records, None for a point that was stopped.
+        fail : callable
+            Told of each bundle that no worker survives, and why in one line.
+
+        Raises
+        ------
+        OutputError
+            When there is nobody any more to evaluate them, as after the end of the scheduler.
+        """
+        finish(self.executor, self.task, bundles, keep, fail, stopped=self.stopped)
+
+
+def add_pool(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where bundles are evaluated."""
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
+    )
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster instead, such as tcp://127.0.0.1:8786"
+    )
+
+
+def read_count(text: str) -> int:
+    """Read a number of processes."""
+    if not text.isdecimal() or not 1 <= int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST} (got {text!r})")
+    return int(text)
+
+
+@contextmanager
+def open_pool(
+    arguments: argparse.Namespace,
+    pieces: int,
+    stop: Callable[[], bool],
+    draw: Callable[[str], None],
+    *,
+    errors: bool = False,
+) -> Iterator[Pool]:
+    """Open what the options of `add_pool` name; at the end of the block nothing of it runs any more.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+    pieces : int
+        Most bundles at a time: there are no more processes than that.
+    stop : callable
+        Whether somebody asks to stop; processes and tasks end then.
+    draw : callable
+        Called again and again, with a note for the end of the progress line.
+    errors : bool, optional
+        Whether errors of the points are estimated.
+
+    Raises
+    ------
+    DigiclayError
+        When the scheduler cannot be used, see `cluster.open_cluster`.
+    """
+    if arguments.scheduler is not None:
+        from .cluster import open_cluster
+        from .cluster_task import evaluate_on_worker
+
+        with open_cluster(arguments.scheduler, stop, draw) as cluster:
+
+            def stopped() -> bool:
+                draw(cluster.describe())
+                return stop()
+
+            yield Pool(cluster, partial(evaluate_on_worker, errors=errors), stopped)
+        return
+    count = max(1, min(arguments.workers or count_cores(), MOST, pieces)) if not in_blender() else 1
+    with ThreadPoolExecutor(count) as threads, Processes(stop, partial(draw, "")) as processes:
+        task: Callable[[Sequence[Point]], list[Record | None]]
+        if count == 1:
+            task = partial(evaluate_bundle, stopped=processes.stopping, errors=errors)
+        else:
+            task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
+        yield Pool(threads, task, processes.stopped)
