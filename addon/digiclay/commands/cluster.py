@@ -47,7 +47,15 @@ class Cluster(Executor):
         self._workers, self._looked, self._manned = 0, 0.0, time.monotonic()
 
     def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
-        """Have a worker call a function, and return its result by value."""
+        """Have a worker call a function, and return its result by value.
+
+        Parameters
+        ----------
+        task : callable
+            Of a module that the workers have too.
+        *arguments, **known
+            Handed on to it.
+        """
         future: Future[Any] = Future()
         try:
             packed = pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL)
@@ -133,7 +141,13 @@ class Cluster(Executor):
         _refuse_others(found, self._versions)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Release what is left of the tasks: workers stop at the next control period."""
+        """Release what is left of the tasks: workers stop at the next control period.
+
+        Parameters
+        ----------
+        wait, cancel_futures : bool
+            Without effect: nobody waits, and all are cancelled.
+        """
         with suppress(Exception):  # the scheduler may be gone
             if self._client.status == "running" and self._remote:
                 self._client.cancel(list(self._remote), force=True)
