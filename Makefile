@@ -65,4 +65,4 @@ test-proof: ## judge exported meshes by admesh, assimp and PrusaSlicer, which ro
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find addon benchmarks digiclay_paper tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+	find addon benchmarks digiclay_paper digiclay_study tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -15,7 +15,15 @@ from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
 #: All that a wheel is built from, and the benchmarks, which must not get into it.
-SOURCES = ("addon", "benchmarks", "digiclay_paper", "pyproject.toml", "README.md", "LICENSE")
+SOURCES = (
+    "addon",
+    "benchmarks",
+    "digiclay_paper",
+    "digiclay_study",
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+)
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +44,14 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def test_the_wheel_has_the_package_and_the_paper_and_no_benchmark(wheel: Path) -> None:
+def test_the_wheel_has_the_package_the_paper_and_the_studies_and_no_benchmark(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as zipped:
         names = set(zipped.namelist())
     packages = {name.split("/")[0] for name in names if ".dist-info/" not in name}
-    assert packages == {"digiclay", "digiclay_paper"}
-    paper = {f"digiclay_paper/{path.name}" for path in (ROOT / "digiclay_paper").glob("*.py")}
-    assert len(paper) > 15
-    assert paper - names == set()
+    assert packages == {"digiclay", "digiclay_paper", "digiclay_study"}
+    beside = [path for name in ("digiclay_paper", "digiclay_study") for path in (ROOT / name).glob("*.py")]
+    assert len(beside) > 25
+    assert {f"{path.parent.name}/{path.name}" for path in beside} - names == set()
     assert {"digiclay/core/scene/schema.py", "digiclay/sample_shapes/sessions/tap.toml"} <= names
 
 

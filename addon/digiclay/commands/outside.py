@@ -1,7 +1,8 @@
-"""Commands outside the extension: ``digiclay paper`` and ``digiclay benchmark``.
+"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune`` and ``benchmark``.
 
-The paper's reproduction is a package of its own beside this one, which adds the command itself where it
-is installed. Here stands what is said where it is not, and where the benchmarks are.
+The paper's reproduction and the studies are packages of their own beside this one, which add their
+commands themselves where they are installed. Here stands what is said where they are not, and where the
+benchmarks are.
 """
 
 from __future__ import annotations
@@ -15,18 +16,25 @@ from ..core.base.errors import DigiclayError
 
 __all__ = ["add"]
 
-#: The package that adds ``digiclay paper``; it stands beside this one, under the same name above both.
-PAPER = f"{__name__.removesuffix('digiclay.commands.outside')}digiclay_paper"
-NO_PAPER = "digiclay paper is not part of the extension: run 'pip install digiclay[plots]' first."
+#: Where packages stand beside this one: above both.
+BESIDE = __name__.removesuffix("digiclay.commands.outside")
+#: Commands of packages beside this one: package, module, extra, and what the list of commands says.
+COMMANDS = {
+    "paper": ("digiclay_paper", "reproduce", "plots", "reproduce the paper's results"),
+    "study": ("digiclay_study", "study_command", "study", "find which parameters matter for which metric"),
+    "tune": ("digiclay_study", "tune_command", "study", "find the best trade-off of two metrics"),
+}
 NO_BENCHMARK = "The benchmarks are run from a checkout: 'python -m benchmarks --help' lists them."
 
 
 def add(commands: Any) -> None:
-    """Add ``paper``, or its install message, and ``benchmark``, which names the place of the benchmarks."""
-    if find_spec(PAPER):
-        import_module(f"{PAPER}.reproduce").add(commands)
-    else:
-        _add_absent(commands, "paper", "reproduce the paper's results (not part of the extension)", NO_PAPER)
+    """Add the commands of other packages, or their install messages, and the place of the benchmarks."""
+    for name, (package, module, extra, help) in COMMANDS.items():
+        if find_spec(f"{BESIDE}{package}"):
+            import_module(f"{BESIDE}{package}.{module}").add(commands)
+        else:
+            said = f"digiclay {name} is not part of the extension: run 'pip install digiclay[{extra}]' first."
+            _add_absent(commands, name, f"{help} (not part of the extension)", said)
     _add_absent(commands, "benchmark", "where the benchmarks are", NO_BENCHMARK)
 
 

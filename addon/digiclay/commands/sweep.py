@@ -94,10 +94,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 return STOPPED
         columns = make_columns(points, axes)
         values = itertools.product(*(one.values for one in columns))
-        table = format_table([(one.key, one.unit) for one in columns], values, records, names)
+        every = [record for _, record in sorted(records.items())]
+        table = format_table([(one.key, one.unit) for one in columns], values, every, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
         notes = _draw_pictures(arguments.out, columns, axes, records, names)
-        failed = [record["error"] for _, record in sorted(records.items()) if "error" in record]
+        failed = [record["error"] for record in every if "error" in record]
         if len(failed) == len(points):
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
         if not arguments.quiet:

@@ -16,7 +16,10 @@ from ..base.quantity import list_quantities
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 
-__all__ = ["MOST", "Axis", "Column", "Point", "make_columns", "make_points", "place_points", "read_axis"]
+__all__ = [
+    "MOST", "Axis", "Column", "Point", "find_value", "make_columns", "make_points", "place_points",
+    "read_axis",
+]  # fmt: skip
 
 #: More points than this are refused: a slip of the keyboard, not a sweep.
 MOST = 10_000
@@ -239,7 +242,7 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     columns = []
     for number, one in enumerate(axes):
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
-        values = tuple(_find_value(scenes[word], one.key, word) for word in one.words)
+        values = tuple(find_value(scenes[word], one.key, word) for word in one.words)
         section, _, name = one.key.partition(".")
         part = next((scene.section(section) for scene in scenes.values()), None)
         known = list_quantities(part).get(name) if name and part else None
@@ -247,8 +250,16 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     return columns
 
 
-def _find_value(scene: Scene, key: str, word: str) -> Any:
-    """Return what a scene made of a word, if it is a number."""
+def find_value(scene: Scene, key: str, word: str) -> Any:
+    """Return what a scene made of a word, if it is a number; else the word.
+
+    Parameters
+    ----------
+    scene : Scene
+    key : str
+        Section and key.
+    word : str
+    """
     section, _, name = key.partition(".")
     value = getattr(scene.section(section), name, None) if name else None
     number = isinstance(value, (int, float)) and not isinstance(value, bool)

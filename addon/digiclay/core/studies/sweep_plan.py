@@ -221,7 +221,7 @@ def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) ->
 def format_table(
     varied: Sequence[tuple[str, str]],
     rows: Iterable[Sequence[Any]],
-    records: Mapping[int, Record],
+    records: Iterable[Record],
     names: Sequence[str],
 ) -> str:
     """Return points as CSV: the varied parameters, the metrics, and the error; SI units, in the header.
@@ -232,8 +232,8 @@ def format_table(
         Key and unit of each parameter.
     rows : iterable of sequence
         Their values at each point.
-    records : mapping of int to Record
-        Of every point, by its index.
+    records : iterable of Record
+        Of each point.
     names : sequence of str
         Keys of `evaluation.FIGURES`.
     """
@@ -241,7 +241,7 @@ def format_table(
     writer = csv.writer(lines, lineterminator="\n")
     units = [*varied, *((name, FIGURES[name][0]) for name in names)]
     writer.writerow([*(f"{name} ({unit})" if unit else name for name, unit in units), "error"])
-    for values, (_, record) in zip(rows, sorted(records.items()), strict=True):
+    for values, record in zip(rows, records, strict=True):
         figures = record.get("figures", {})
         written = [repr(figures[name]) if figures.get(name) is not None else "" for name in names]
         writer.writerow([*values, *written, record.get("error", "")])

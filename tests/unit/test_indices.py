@@ -1,0 +1,138 @@
+"""Sobol indices against the analytic ones of Ishigami's function, and runs without a value."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.commands.evaluation_pool import Pool
+from digiclay.core.base.errors import OutputError
+from digiclay.core.scene.scene_source import find, load
+from digiclay.core.studies.axes import Point
+from digiclay.core.studies.evaluation import Record
+
+pytest.importorskip("SALib", reason="digiclay[study] is not installed")
+
+from digiclay_study.indices import Indices, compute_indices
+from digiclay_study.point_series import Evaluation, open_folder
+from digiclay_study.ranges import Range
+from digiclay_study.responses import find_excess_losses, make_response
+from digiclay_study.sampling import count_points, sample_shares
+from digiclay_study.subject import Subject
+
+#: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by integration.
+A, B = 7.0, 0.1
+BY_FIRST, BY_SECOND = 0.5 * (1.0 + B * np.pi**4 / 5.0) ** 2, A**2 / 8.0
+BY_PAIR = B**2 * np.pi**8 * (1.0 / 18.0 - 1.0 / 50.0)
+VARIANCE = BY_FIRST + BY_SECOND + BY_PAIR
+FIRST = np.array([BY_FIRST, BY_SECOND, 0.0]) / VARIANCE
+TOTAL = np.array([BY_FIRST + BY_PAIR, BY_SECOND, BY_PAIR]) / VARIANCE
+ANGLES = tuple(Range(f"x.{name}", -np.pi, np.pi) for name in "abc")
+
+
+def evaluate_ishigami(bundle: Sequence[Point]) -> list[Record | None]:
+    """Evaluate points as a worker does, by the words of their values."""
+    angles = np.array([[float(word) for word in point.words] for point in bundle])
+    x, y, z = angles.T
+    values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
+    return [{"figures": {"rfd": float(value)}} for value in values]
+
+
+def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
+    """Have Ishigami's function sampled, evaluated as a series in a folder, and analyzed."""
+    shares = sample_shares(samples, len(ANGLES), seed, second=second)
+    words = [tuple(one.find_word(share) for one, share in zip(ANGLES, row, strict=True)) for row in shares]
+    points = [Point(index, row, None) for index, row in enumerate(words, 1)]
+    bundles = [points[first : first + 64] for first in range(0, len(points), 64)]
+    subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
+    with (
+        open_folder(out, "study", subject, {"samples": samples}) as folder,
+        ThreadPoolExecutor(2) as threads,
+    ):
+        pool = Pool(threads, evaluate_ishigami, lambda: False)
+        assert Evaluation(subject, folder, pool, {}).evaluate(bundles, subject.keys) == {}
+        records = folder.read_records()
+    reference: Record = {"figures": {}}
+    found = [records[point.index] for point in points]
+    response = make_response("rfd", found, find_excess_losses(found, reference))
+    indices = compute_indices(response.values, len(ANGLES), seed, second=second)
+    assert indices is not None
+    return indices
+
+
+def test_the_indices_of_ishigami_are_within_their_intervals(tmp_path: Path) -> None:
+    found = run_study(tmp_path / "out", 128, 1, second=True)
+    # 95 % intervals: with this seed each of the nine indices is within its own.
+    assert np.all(np.abs(found.first - FIRST) <= found.first_interval)
+    assert np.all(np.abs(found.total - TOTAL) <= found.total_interval)
+    pairs = np.array([0.0, BY_PAIR, 0.0]) / VARIANCE
+    rows = np.triu_indices(3, 1)
+    assert np.all(np.abs(found.second[rows] - pairs) <= found.second_interval[rows])
+    # The intervals say something: wider ones would hold any value.
+    assert (
+        max(found.first_interval.max(), found.total_interval.max(), found.second_interval[rows].max()) < 0.45
+    )
+
+
+def test_first_and_total_indices_need_no_second_order(tmp_path: Path) -> None:
+    found = run_study(tmp_path / "out", 128, 2, second=False)
+    assert np.all(np.abs(found.first - FIRST) <= found.first_interval)
+    assert np.all(np.abs(found.total - TOTAL) <= found.total_interval)
+    assert np.isnan(found.second).all()
+
+
+def test_a_design_has_a_block_of_points_a_sample() -> None:
+    assert sample_shares(8, 3, 1, second=False).shape == (count_points(8, 3, second=False), 3) == (40, 3)
+    assert sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
+
+
+def test_the_same_seed_gives_the_same_design_and_intervals() -> None:
+    one, same, other = (sample_shares(16, 2, seed, second=False) for seed in (3, 3, 4))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
+    values = one[:, 0] + one[:, 1] ** 2
+    found = [compute_indices(values, 2, seed, second=False) for seed in (3, 3, 4)]
+    intervals = [indices.first_interval.tolist() for indices in found if indices is not None]
+    assert intervals[0] == intervals[1] != intervals[2]
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-12])
+def test_an_output_that_does_not_vary_has_no_indices(size: float) -> None:
+    noise = np.random.default_rng(1).normal(0.0, size, 40)
+    assert compute_indices(5.0 + noise, 3, 1, second=False) is None
+
+
+def record(rfd: float | None, loss: float | None = 0.0) -> Record:
+    """Return the record of a run."""
+    return {"figures": {"rfd": rfd, "contact_loss_share": loss}}
+
+
+#: Runs: two that keep the fingertip, one that failed, one without contact, one that loses the fingertip.
+RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, None), record(0.01, 0.3)]
+
+
+def test_runs_without_a_value_and_those_that_lose_the_fingertip_have_the_largest_of_the_others() -> None:
+    found = make_response("rfd", RUNS, find_excess_losses(RUNS, record(0.1)))
+    assert found.values.tolist() == [0.2, 0.5, 0.5, 0.5, 0.5]
+    assert (found.absent, found.lost) == (2, 1)
+
+
+def test_what_the_unchanged_scene_loses_is_no_loss() -> None:
+    found = make_response("rfd", RUNS, find_excess_losses(RUNS, record(0.1, 0.26)))
+    assert found.values.tolist() == [0.2, 0.5, 0.5, 0.5, 0.01]
+    assert (found.absent, found.lost) == (2, 0)
+
+
+def test_the_loss_itself_keeps_its_value() -> None:
+    found = make_response("contact_loss_share", RUNS, find_excess_losses(RUNS, record(0.1)))
+    assert found.values.tolist() == [0.0, 0.04, 0.3, 0.3, 0.3]
+    assert (found.absent, found.lost) == (2, 0)
+
+
+def test_an_output_that_no_run_has_is_told_with_the_first_error() -> None:
+    runs = [record(None), {"error": "There is not enough memory."}]
+    with pytest.raises(OutputError, match=r"No run has the metric rfd: There is not enough memory\."):
+        make_response("rfd", runs, find_excess_losses(runs, record(0.1)))

@@ -1,0 +1,79 @@
+"""Pareto fronts and knees of known sets of points; generations of NSGA-II on a known front."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+pytest.importorskip("optuna", reason="digiclay[study] is not installed")
+
+from digiclay_study.genetic import Outcome, propose_generations
+from digiclay_study.pareto import find_front, find_knee
+
+POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
+
+
+def test_a_front_has_the_points_that_none_dominates_in_order() -> None:
+    assert find_front(POINTS).tolist() == [0, 1, 4]
+
+
+def test_every_other_point_is_dominated_by_one_of_the_front() -> None:
+    values = np.random.default_rng(5).random((200, 2))
+    front = find_front(values)
+    better = np.all(values[front][:, None] <= values[None], axis=2) & np.any(
+        values[front][:, None] < values[None], axis=2
+    )
+    assert better.any(axis=0).sum() == len(values) - len(front)
+    assert not better[:, front].any()
+
+
+def test_the_knee_is_where_both_are_small() -> None:
+    front = np.array([[0.0, 100.0], [1.0, 20.0], [6.0, 10.0], [10.0, 0.0]])
+    assert find_knee(front) == 1
+
+
+@pytest.mark.parametrize("front", [[[1.0, 2.0]], [[1.0, 2.0], [2.0, 1.0]]])
+def test_a_front_of_one_or_two_points_has_a_knee(front: list[list[float]]) -> None:
+    assert find_knee(np.array(front)) == 0
+
+
+def measure(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return two outputs whose front is the line x0 from 0 to 1, x1 = 0.5: y1 = 1 - sqrt(y0)."""
+    off = 1.0 + 8.0 * np.abs(shares[:, 1] - 0.5)
+    return np.column_stack([shares[:, 0], off * (1.0 - np.sqrt(shares[:, 0] / off))])
+
+
+def evolve(count: int, seed: int = 1) -> NDArray[np.float64]:
+    """Return the outputs of all generations; a third of the plane is forbidden, a few points fail."""
+    generations = propose_generations(2, 24, seed)
+    shares, found = next(generations), []
+    for _ in range(count):
+        values = measure(shares)
+        outcomes = [
+            Outcome((np.inf, np.inf), 2.0) if number == 3 else Outcome((one, other), max(share - 0.67, 0.0))
+            for number, ((one, other), share) in enumerate(zip(values, shares[:, 0], strict=True))
+        ]
+        found.append(np.where((shares[:, :1] > 0.67), np.nan, values))
+        shares = generations.send(outcomes)
+    return np.concatenate(found)
+
+
+def find_gap(values: NDArray[np.float64]) -> float:
+    """Return how far the front is above the known one at most, between outputs of 0.1 and 0.6."""
+    front = values[find_front(values)]
+    x = np.linspace(0.1, 0.6, 50)
+    best = np.array([front[front[:, 0] <= one, 1].min() for one in x])
+    return float(np.max(best - (1.0 - np.sqrt(x))))
+
+
+def test_generations_come_near_the_known_front_and_nearer_than_the_same_number_of_random_points() -> None:
+    found = evolve(12)
+    shares = np.random.default_rng(1).random((len(found), 2))
+    assert find_gap(found) < 0.1
+    assert find_gap(found) < 0.5 * find_gap(measure(shares))
+
+
+def test_the_same_outcomes_lead_to_the_same_generations() -> None:
+    assert np.array_equal(evolve(4), evolve(4), equal_nan=True)
+    assert not np.array_equal(evolve(4), evolve(4, 2), equal_nan=True)

@@ -1,0 +1,243 @@
+"""digiclay study: files, continuation, mistakes; on a bed of a few pins."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from digiclay.cli import main
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.axes import Point
+from digiclay.core.studies.sweep_plan import Folder
+
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+
+pytest.importorskip("SALib", reason="digiclay[study] is not installed")
+
+SCENE = scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER)
+GAINS = ["--vary", "control.position_gain=100:1000:log", "--vary", "control.force_gain=1:10"]
+STUDY = ["study", "my.toml", *GAINS, "--samples", "8", "--workers", "1", "--metric", "rfd,lag,max_cell_force"]
+QUIET = [*STUDY, "--quiet", "--out", "out"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(SCENE, tmp_path, monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study that nobody stopped."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "my.toml").write_text(SCENE, encoding="utf-8")
+    study = [str(folder / "my.toml") if word == "my.toml" else word for word in STUDY]
+    assert main([*study, "--second", "--out", str(folder / "out"), "--quiet"]) == 0
+    return folder / "out"
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    """Return the lines of a table."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Return the content of all files but those that name the run time."""
+    texts = ("points.csv", "indices.csv", "study.json")
+    return {name: (folder / name).read_bytes() for name in texts}
+
+
+def test_a_study_leaves_tables_a_page_and_a_plot(whole: Path) -> None:
+    left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
+    assert left == {"indices.csv", "indices.png", "points", "points.csv", "study.json", "study.md"}
+    # Two parameters of first and total order, and a pair; a press in the middle has no lag.
+    orders = ("first", "first", "total", "total", "second")
+    found = rows(whole / "indices.csv")
+    assert [(row["output"], row["order"]) for row in found] == [
+        *(("rfd", order) for order in orders),
+        *(("lag_mean", order) for order in orders[:4]),
+        *(("max_cell_force", order) for order in orders),
+    ]
+    assert [row["index"] == "" for row in found] == [row["output"] == "lag_mean" for row in found]
+    assert all(float(row["interval (95%, +-)"]) > 0.0 for row in found if row["index"])
+    assert (whole / "indices.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
+    found = rows(whole / "points.csv")
+    assert len(found) == 1 + 8 * 6
+    for row, settings in (
+        (found[0], []),
+        (found[5], [Setting(key, found[5][f"{key} ({unit})"]) for key, unit in KEYS]),
+    ):
+        alone = run(load(find("my.toml"), settings)).metrics
+        assert float(row["rfd (N)"]) == pytest.approx(alone["rfd"], rel=1e-9)
+    assert all(100.0 <= float(row["control.position_gain (1/m)"]) <= 1000.0 for row in found)
+
+
+KEYS = (("control.position_gain", "1/m"), ("control.force_gain", "1/N"))
+
+
+def test_the_page_names_ranges_outputs_and_the_command_that_repeats_the_study(whole: Path) -> None:
+    page = (whole / "study.md").read_text(encoding="utf-8")
+    command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
+    assert "| `control.position_gain` | 100 to 1000, log |" in page
+    assert "| `rfd` | N |" in page
+    assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
+    again = command.split()[1:-1]
+    assert main([*again, "again", "--workers", "1", "--quiet"]) == 0
+    assert files(Path("again")) == files(whole)
+
+
+def test_points_that_are_missing_are_run_again_and_all_is_as_before(whole: Path, here: Path) -> None:
+    shutil.copytree(whole, here / "out")
+    for path in [*sorted((here / "out" / "points").iterdir())[3::4], here / "out" / "indices.csv"]:
+        path.unlink()
+    assert main([*QUIET, "--second"]) == 0
+    assert files(here / "out") == files(whole)
+
+
+def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have this process get Ctrl-C when so many points are kept."""
+    keep: Callable[..., None] = Folder.keep
+    kept: list[Point] = []
+
+    def told(self: Folder, point: Point, *given: Any) -> None:
+        keep(self, point, *given)
+        kept.append(point)
+        if len(kept) == count:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Folder, "keep", told)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_study_that_is_stopped_goes_on_from_there(
+    here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patch:
+        interrupt_after(1, patch)
+        assert main([*STUDY, "--second", "--out", "out"]) == 130
+    said = capsys.readouterr().out
+    assert "of 49 points are done and kept in out. The same command goes on from there." in said
+    assert not (here / "out" / "study.md").exists()
+    assert main([*QUIET, "--second"]) == 0
+    assert files(here / "out") == files(whole)
+
+
+def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path) -> None:
+    # A bed of 3 x 4 has no room for a recording of a million seconds.
+    durations = ["--vary", "simulation.duration=0.08,0.1,1e6", "--vary", "control.position_gain=100:1000"]
+    command = [
+        "study",
+        "my.toml",
+        *durations,
+        "--samples",
+        "4",
+        "--workers",
+        "1",
+        "--metric",
+        "rfd",
+        "--quiet",
+    ]
+    assert main([*command, "--out", "out"]) == 0
+    found = rows(here / "out" / "points.csv")
+    failed = [row for row in found if row["error"]]
+    assert 0 < len(failed) < len(found) - 1
+    assert f"| {len(failed)} | 0 |" in (here / "out" / "study.md").read_text(encoding="utf-8")
+    assert all(row["index"] for row in rows(here / "out" / "indices.csv"))
+
+
+def test_an_output_that_no_run_has_is_omitted_and_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*STUDY[:-1], "rfd,relief", "--samples", "4", "--out", "out"]) == 0
+    said = capsys.readouterr().out
+    assert "No run has the metric ridge_error without losing the fingertip." in said
+    assert {row["output"] for row in rows(Path("out/indices.csv"))} == {"rfd"}
+
+
+def test_another_metric_can_be_had_of_a_finished_study(whole: Path, here: Path) -> None:
+    shutil.copytree(whole, here / "out")
+    assert main([*QUIET[:-4], "highest", "--second", "--quiet", "--out", "out"]) == 0
+    assert {row["output"] for row in rows(here / "out" / "indices.csv")} == {"highest"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--samples", "0"], "digiclay study: argument --samples: must be a power of two"),
+        (["--samples", "100"], "digiclay study: argument --samples: must be a power of two"),
+        (["--samples", "9" * 99], "digiclay study: argument --samples: must be a power of two"),
+        (["--samples", "4096"], "--samples must come to 10000 points at most (got 16384 points)."),
+        (["--seed", "0"], "digiclay study: argument --seed: must be a whole number from 1 to"),
+        (["--vary", "control.force_gian=1:2"], "--vary: control.force_gian must be a known key"),
+        (["--vary", "control.travel=2e-3:1e-3"], "--vary control.travel must have LOW below HIGH"),
+        (["--vary", "control.force_gain=1:2"], "--vary control.force_gain must be given once (got 2 times)."),
+        (["--metric", "rdf"], "--metric must be a known metric (got 'rdf')."),
+        (["--set", "recorder=absent"], "Metrics need a recorder, and the scene has recorder = 'absent'."),
+        (["--set", "simulation.duration=1e6"], "The unchanged scene fails: recorder.every must be at least"),
+        (["--method", "no"], "--method: control.method must be one of"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_in_one_line_and_leaves_no_point(
+    arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*QUIET, *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(message)
+    assert err.count("\n") == 1
+    assert len(list(here.glob("out/points/*"))) <= 1
+
+
+def test_one_parameter_is_no_study(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "my.toml", *GAINS[:2], "--out", "out"]) == 2
+    assert capsys.readouterr().err.startswith("A study needs at least two --vary")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (["--samples", "4"], "samples 8"),
+        (["--seed", "2"], "seed 1"),
+        (["--set", "layout.pitch=2.9 mm"], "with another scene"),
+        ([], "orders first, second"),
+    ],
+)
+def test_a_folder_of_another_study_is_refused(
+    change: list[str], said: str, whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(whole, here / "out")
+    before = files(here / "out")
+    assert main([*QUIET, *(["--second"] if change else []), *change]) == 2
+    err = capsys.readouterr().err
+    assert err == f"out holds another study ({said}): choose another folder with --out.\n"
+    assert files(here / "out") == before
+
+
+def test_a_folder_of_a_sweep_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "out" / "points").mkdir(parents=True)
+    (here / "out" / "sweep.json").write_text(json.dumps({}), encoding="utf-8")
+    assert main(QUIET) == 2
+    assert (
+        capsys.readouterr().err == "out holds other things than a study: choose another folder with --out.\n"
+    )
+
+
+@pytest.mark.parametrize(("command", "library"), [("study", "SALib"), ("tune", "optuna")])
+def test_a_missing_library_is_told_with_the_extra_that_has_it(
+    command: str, library: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
+    assert main([command, "my.toml", *GAINS, "--out", "out"]) == 2
+    assert (
+        capsys.readouterr().err == f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
+    )

@@ -1,0 +1,198 @@
+"""digiclay tune: front, chosen scene, continuation bit for bit, mistakes; on a bed of a few pins."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.scene.scene_source import load
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.axes import Point
+from digiclay.core.studies.sweep_plan import Folder
+
+from tests.scene_files import SMALL_BLISTER, folder_with
+
+pytest.importorskip("optuna", reason="digiclay[study] is not installed")
+
+#: A press that moves to the side, so that there is a lag.
+SCENE = f"""
+[layout]
+rows = 3
+columns = 4
+{SMALL_BLISTER}
+[trajectory]
+waypoints = [
+  {{ time = 0.0, position = [-0.002, 0, 0.041] }},
+  {{ time = 0.05, position = [0, 0, 0.038] }},
+  {{ time = 0.1, position = [0.002, 0, 0.038] }},
+]
+"""
+VARIED = ["--vary", "control.position_gain=100:1000:log", "--vary", "control.force_gain=1:10"]
+SMALL = ["--population", "8", "--workers", "1"]
+TUNE = ["tune", "my.toml", *VARIED, *SMALL, "--out", "out", "--quiet"]
+#: Four generations after the unchanged scene.
+ALL = 1 + 4 * 8
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(SCENE, tmp_path, monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a tuning that nobody stopped."""
+    folder = tmp_path_factory.mktemp("tune")
+    (folder / "my.toml").write_text(SCENE, encoding="utf-8")
+    command = ["tune", str(folder / "my.toml"), *VARIED, *SMALL, "--generations", "4"]
+    assert main([*command, "--out", str(folder / "out"), "--quiet"]) == 0
+    return folder / "out"
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    """Return the lines of a table."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def values(path: Path) -> Any:
+    """Return both metrics of a table."""
+    return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Return the content of tables and scene."""
+    return {
+        name: (folder / name).read_bytes() for name in ("points.csv", "front.csv", "chosen.toml", "tune.json")
+    }
+
+
+def test_a_tuning_leaves_tables_a_plot_and_a_scene(whole: Path) -> None:
+    left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
+    assert left == {"chosen.toml", "front.csv", "front.png", "points", "points.csv", "tune.json"}
+    assert len(rows(whole / "points.csv")) == len(list((whole / "points").iterdir())) == ALL
+    assert (whole / "front.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_no_point_dominates_the_front_and_the_unchanged_scene_is_one_of_them(whole: Path) -> None:
+    every, front = values(whole / "points.csv"), values(whole / "front.csv")
+    for one in front:
+        assert not np.any(np.all(every <= one, axis=1) & np.any(every < one, axis=1))
+    # Every point is on the front, or not better than some of it.
+    assert all(np.any(np.all(front <= one, axis=1)) for one in every)
+    assert rows(whole / "points.csv")[0]["control.position_gain (1/m)"] == "500.0"
+
+
+def test_the_chosen_scene_is_a_scene_file_that_gives_the_same_metrics(whole: Path) -> None:
+    scene = load(whole / "chosen.toml")
+    metrics = run(scene).metrics
+    # A stack takes sums in another order than a run by itself.
+    near = np.isclose(values(whole / "front.csv"), [metrics["rfd"], metrics["lag_mean"]], rtol=1e-9)
+    assert np.all(near, axis=1).any()
+    assert scene.name == "my_tuned"
+    assert scene.description.startswith("Chosen by digiclay tune from 32 runs, knee of the front: rfd ")
+
+
+@pytest.mark.parametrize(("metric", "column"), [("rfd", 0), ("lag", 1)])
+def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(
+    metric: str, column: int, whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(whole, here / "out")
+    assert main([*TUNE[:-1], "--generations", "4", "--choose", metric]) == 0
+    front = values(here / "out" / "front.csv")
+    chosen = front[np.argmin(front[:, column])]
+    metrics = run(load(here / "out" / "chosen.toml")).metrics
+    assert [metrics["rfd"], metrics["lag_mean"]] == pytest.approx(chosen, rel=1e-9)
+    assert f"chosen ({'lag_mean' if column else 'rfd'}): rfd " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("left", [0, 1, 9, 20, ALL - 1])
+def test_a_tuning_of_which_points_are_missing_proposes_the_same_ones_again(
+    left: int, whole: Path, here: Path
+) -> None:
+    shutil.copytree(whole, here / "out")
+    for name in ("points.csv", "front.csv", "chosen.toml", "front.png"):
+        (here / "out" / name).unlink()
+    for path in sorted((here / "out" / "points").iterdir())[left:]:
+        path.unlink()
+    assert main([*TUNE, "--generations", "4"]) == 0
+    assert files(here / "out") == files(whole)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(
+    here: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keep = Folder.keep
+    kept: list[Point] = []
+
+    def told(self: Folder, point: Point, *given: Any) -> None:
+        keep(self, point, *given)
+        kept.append(point)
+        if len(kept) == 12:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Folder, "keep", told)
+        assert main([*TUNE[:-1], "--generations", "4"]) == 130
+    # The second generation is one stack, which is kept whole.
+    assert f"Stopped: 17 of {ALL} points are done and kept in out." in capsys.readouterr().out
+    assert not (here / "out" / "front.csv").exists()
+    assert main([*TUNE, "--generations", "4"]) == 0
+    assert files(here / "out") == files(whole)
+
+
+def test_more_generations_go_on_from_fewer(here: Path, whole: Path) -> None:
+    assert main([*TUNE, "--generations", "2"]) == 0
+    assert len(rows(here / "out" / "points.csv")) == 17
+    assert main([*TUNE, "--generations", "4"]) == 0
+    assert files(here / "out") == files(whole)
+
+
+def test_points_of_another_search_are_refused(
+    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(whole, here / "out")
+    one, other = (here / "out" / "points" / f"{index:06d}.json" for index in (12, 13))
+    one.write_bytes(other.read_bytes())
+    assert main([*TUNE, "--generations", "4"]) == 2
+    assert capsys.readouterr().err.startswith("out holds points of another version of optuna")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--metric", "rfd"], "--metric must name two metrics (got 'rfd')."),
+        (["--metric", "rfd,lag,relief"], "--metric must name two metrics"),
+        (["--choose", "relief"], "--choose must be knee, rfd or lag_mean (got 'ridge_error')."),
+        (["--choose", "kneee"], "--choose must be knee, rfd or lag_mean (got 'kneee')."),
+        (["--population", "3"], "digiclay tune: argument --population: must be a whole number from 4 to"),
+        (["--generations", "0"], "digiclay tune: argument --generations: must be a whole number from 1 to"),
+        (["--generations", "4096"], "--population times --generations must come to 10000 points at most"),
+        (
+            ["--vary", "control.travel=1:nan"],
+            "--vary control.travel must have finite numbers at LOW and HIGH",
+        ),
+    ],
+)
+def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(
+    arguments: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*TUNE, *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(message)
+    assert (err.count("\n"), (here / "out").exists()) == (1, False)
+
+
+def test_without_any_contact_there_is_no_front(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "my.toml").write_text(SCENE.replace("0.038", "0.045"), encoding="utf-8")
+    assert main([*TUNE, "--generations", "1"]) == 2
+    assert capsys.readouterr().err.startswith("No run has both metrics without losing the fingertip")
