@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
 
 BLENDER = os.environ.get("DIGICLAY_BLENDER_WINDOW", "")
+#: The words of a command for a Blender that draws on the display of its environment.
+ON_DISPLAY = shlex.split(os.environ.get("DIGICLAY_BLENDER_DISPLAY", ""))
 HERE = Path(__file__).parent
 ADDON = HERE.parents[1] / "addon" / "digiclay"
 #: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
@@ -18,7 +21,7 @@ LIMIT = 1200
 
 
 def played(
-    script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False
+    script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False, display: str = ""
 ) -> dict[str, Any]:
     """Play a script of this folder in a Blender with a copy of the extension installed.
 
@@ -32,6 +35,8 @@ def played(
         The window's, pixels: software GL draws a small one much quicker.
     by_hand : bool
         Events come from outside Blender, as a hand's do: Blender takes those or simulated ones, not both.
+    display : str
+        Of a screen that is there already.
 
     Returns
     -------
@@ -41,13 +46,14 @@ def played(
     installed = out / "extensions" / "user_default" / "digiclay"
     shutil.copytree(ADDON, installed, ignore=shutil.ignore_patterns("__pycache__", ".*"))
     # `timeout` ends Blender with SIGTERM, so that a launcher can take its children along.
-    command = ["timeout", "--kill-after=10", str(LIMIT), BLENDER]
+    command = ["timeout", "--kill-after=10", str(LIMIT), *(ON_DISPLAY if display else [BLENDER])]
     command += ["--factory-startup", "--python-exit-code", "3"]
     command += [] if by_hand else ["--enable-event-simulate"]
     command += ["--window-geometry", "0", "0", str(size[0]), str(size[1])]
     command += ["--python", str(HERE / "driver.py"), "--", str(out), str(HERE / script)]
     # A launcher that makes a screen for Blender makes it as large as the window.
     screen = {"BLENDER_WINDOW_SCREEN": f"{size[0]}x{size[1]}x24"}
+    screen |= {"DISPLAY": display} if display else {}
     environment = os.environ | screen | {"BLENDER_USER_EXTENSIONS": str(out / "extensions")}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     kept = os.environ.get("DIGICLAY_SCREENSHOTS")

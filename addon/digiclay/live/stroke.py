@@ -64,6 +64,8 @@ class Sample:
         How far below the surface, or above it where it is raised, m.
     share : float
         Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
+    lean : (float, float)
+        How far the finger leans towards x and y of the bed, rad; see `lean.lean_finger`.
     """
 
     time: float
@@ -71,6 +73,7 @@ class Sample:
     y: float
     depth: float
     share: float = 1.0
+    lean: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +115,8 @@ class Stroke:
         How fast the finger rises with the blister, m/s.
     left : float
         When a finger that smooths came to the end of the path, s of `clock`.
+    turn : ndarray (4,) or None
+        Orientation of the finger when it began, which it has again when it is done; None before.
     """
 
     number: int
@@ -131,6 +136,7 @@ class Stroke:
     tracking: Tracking | None = None
     climb: float = 0.0
     left: float = 0.0
+    turn: Floats | None = None
 
     @property
     def done(self) -> bool:
@@ -152,24 +158,27 @@ class Stroke:
 
 def start(
     number: int, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
-    brush: Brush = Brush.LOWER, share: float = 1.0,
+    brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
 ) -> Stroke:  # fmt: skip
     """Return the stroke of a mouse that goes down at a place, m.
 
     Parameters
     ----------
     number : int
-    x, y, depth, share : float
+    x, y, depth, share, lean
         See `Sample`.
     mirrors : tuple of (float, float), optional
         See `SYMMETRIES`.
     brush : Brush, optional
     """
-    first = Sample(0.0, x, y, _limit_depth(depth), share)
+    first = Sample(0.0, x, y, _limit_depth(depth), share, lean)
     return Stroke(number, (first,), mirrors=mirrors, brush=brush)
 
 
-def draw(stroke: Stroke, time: float, x: float, y: float, depth: float, share: float = 1.0) -> Stroke:
+def draw(
+    stroke: Stroke, time: float, x: float, y: float, depth: float, share: float = 1.0,
+    lean: tuple[float, float] = (0.0, 0.0),
+) -> Stroke:  # fmt: skip
     """Return the stroke drawn on to a place; nothing is added to one that is let go.
 
     Parameters
@@ -177,12 +186,12 @@ def draw(stroke: Stroke, time: float, x: float, y: float, depth: float, share: f
     stroke : Stroke
     time : float
         When Blender tells of the move, since the mouse went down, s; see `BURST`.
-    x, y, depth, share : float
+    x, y, depth, share, lean
         See `Sample`.
     """
     if not stroke.held:
         return stroke
-    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth), share))
+    samples = (*stroke.samples, Sample(time, x, y, _limit_depth(depth), share, lean))
     together = time - stroke.heard < BURST and stroke.burst > 0
     first = stroke.burst if together else len(samples) - 1
     start = max(samples[first - 1].time, time - DRAWING)
@@ -206,7 +215,7 @@ def deepen(stroke: Stroke, time: float, by: float) -> Stroke:
         m.
     """
     last = stroke.samples[-1]
-    return draw(stroke, time, last.x, last.y, last.depth + by, last.share)
+    return draw(stroke, time, last.x, last.y, last.depth + by, last.share, last.lean)
 
 
 def _limit_depth(depth: float) -> float:

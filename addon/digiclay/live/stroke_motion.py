@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
+from .lean import advance_turn
 from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
 from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, Place, cross, drag, finish_image, run_clock
 from .tracking import Tracking
@@ -83,11 +84,14 @@ def follow(
         Poses between the periods, row 0 where the finger was; k is at most `count`.
     """
     if stroke.height is None:
-        stroke = _begin(stroke, height, tracking)
+        stroke = replace(_begin(stroke, height, tracking), turn=pose[3:])
+    assert stroke.height is not None
     path, peak = [pose], float(height.max())
+    clear = max(peak, float(stroke.height.max())) + CLEARANCE - NEAR
     while len(path) <= count and not stroke.done:
         stroke, place = _step(stroke, grid, finger, path[-1], peak, period, now)
-        path.append(np.array([*place, *pose[3:]]))
+        turn = advance_turn(stroke, path[-1][3:], place[2] >= clear, period)
+        path.append(np.array([*place, *turn]))
     return stroke, np.array(path)
 
 

@@ -23,14 +23,14 @@ Floats = NDArray[np.float64]
 
 def queue_stroke(
     running: Running, x: float, y: float, depth: float, mirrors: tuple[Mirror, ...] = SYMMETRIES["NONE"],
-    brush: Brush = Brush.LOWER, share: float = 1.0,
+    brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Running, int]:  # fmt: skip
     """Queue the stroke of a mouse that goes down at a place, m; return its number as well.
 
     Parameters
     ----------
     running : Running
-    x, y, depth, share : float
+    x, y, depth, share, lean
         See `stroke.Sample`.
     mirrors : tuple of (float, float), optional
         See `stroke.SYMMETRIES`.
@@ -38,7 +38,7 @@ def queue_stroke(
     """
     number = 1 + (running.strokes[-1].number if running.strokes else running.finished_strokes)
     return replace(
-        running, strokes=(*running.strokes, start(number, x, y, depth, mirrors, brush, share))
+        running, strokes=(*running.strokes, start(number, x, y, depth, mirrors, brush, share, lean))
     ), number
 
 
@@ -77,8 +77,10 @@ def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stro
 
 
 def drop_strokes(running: Running) -> Running:
-    """Return the session without what the finger has not finished; it stays where it is."""
-    return replace(running, strokes=(), stroke_start=None)
+    """Return the session without what the finger has not finished; it stays there, upright."""
+    pose, turn = running.pose, running.strokes[0].turn if running.strokes else None
+    pose = pose if turn is None else np.concatenate([pose[:3], turn])
+    return replace(running, strokes=(), stroke_start=None, pose=pose)
 
 
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Floats | None]:

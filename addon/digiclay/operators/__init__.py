@@ -94,6 +94,7 @@ MENUS = (
     ("VIEW3D_MT_mesh_add", add_bed.entry),
     ("TOPBAR_MT_file_import", import_run.entry),
     ("TOPBAR_MT_file_export", export_mesh.entry),
+    ("VIEW3D_MT_editor_menus", session_start.leave_entry),
     *open_scene.MENUS,
 )
 

@@ -17,102 +17,26 @@ from ..press import aim, brush, pen
 from ..settings.declared import title
 from . import status
 from .action import Polled
+from .press_settings import PressSettings
 
 __all__ = ["Press", "open_session"]
 
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
+MOVES = frozenset({"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"})
 WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
 KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
 #: What is told where a brush cannot work.
 NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
 
 
-class Press(Polled, bpy.types.Operator):
+class Press(PressSettings, Polled, bpy.types.Operator):
     """Press the fingertip into the pins under the mouse, and drag it"""
 
     bl_idname = "digiclay.press"
     bl_label = "Press"
     # No undo step of its own: the session makes it when the finger has finished the stroke.
     bl_options = {"INTERNAL"}
-
-    brush: bpy.props.EnumProperty(
-        name="Brush",
-        description="What a stroke does to the surface",
-        items=brush.BRUSH_ITEMS,
-        default="LOWER",
-    )
-    depth: bpy.props.FloatProperty(
-        name="Depth (mm)",
-        description="How far a stroke of Lower goes below the surface, in mm",
-        default=4.0,
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=10.0,
-        precision=2,
-        step=25,
-    )
-    height: bpy.props.FloatProperty(
-        name="Height (mm)",
-        description="How far a stroke of Raise goes above the surface, in mm",
-        default=15.0,
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=30.0,
-        precision=2,
-        step=100,
-    )
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description=(
-            "Share of the depth, of the height, or of the way to the level that a stroke reaches; "
-            "pen pressure scales it further"
-        ),
-        default=1.0,
-        min=0.01,
-        max=1.0,
-        subtype="FACTOR",
-        precision=2,
-    )
-    symmetry: bpy.props.EnumProperty(
-        name="Symmetry",
-        description=(
-            "Mirror images of a stroke about the middle of the bed. The device has one finger: "
-            "it forms them one after the other, as one undo step"
-        ),
-        items=brush.SYMMETRY_ITEMS,
-        default="NONE",
-    )
-    path: bpy.props.EnumProperty(
-        name="Stroke",
-        description="Path of a stroke",
-        items=brush.PATH_ITEMS,
-        default="FREE",
-    )
-    stabilizer: bpy.props.FloatProperty(
-        name="Stabilizer (mm)",
-        description=(
-            "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
-            "its end is reached. 0: none"
-        ),
-        default=0.0,
-        min=0.0,
-        max=50.0,
-        soft_max=15.0,
-        precision=1,
-        step=50,
-    )
-    use_pressure: bpy.props.BoolProperty(
-        name="Pen Pressure",
-        description="Pen pressure scales depth, height and strength, up to their values",
-        default=True,
-    )
-    pressure_curve: bpy.props.EnumProperty(
-        name="Pressure Curve",
-        description="Share of the values that a pen reaches with part of its pressure",
-        items=pen.CURVE_ITEMS,
-        default="LINEAR",
-    )
 
     @classmethod
     def poll_message(cls, context: Any) -> str:
@@ -138,13 +62,14 @@ class Press(Polled, bpy.types.Operator):
         self.uid, self.grid, self.surface = session.uid, found.grid, found.height.copy()
         self.region, self.began = context.region, time.perf_counter()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
-        self.pressure, self.ticked = 1.0, 0.0
-        self._feel(event)
+        self.pressure, self.lean, self.ticked = 1.0, (0.0, 0.0), 0.0
+        self.keyed = False
+        self._feel(context, found.bed, event)
         place = float(found.point[0]), float(found.point[1])
         self.lagged = place
         depth, share = self._amount()
         session, self.number = queue_stroke(
-            session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share
+            session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share, self.lean
         )
         running.put(session)
         context.window_manager.modal_handler_add(self)
@@ -163,7 +88,10 @@ class Press(Polled, bpy.types.Operator):
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             tick.withdraw_strokes(context, self.uid)
             return self._end({"CANCELLED"})
-        if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE"):
+        if self._is_released(event):
+            self._change(lambda stroke: replace(stroke, held=False))
+            return self._end({"FINISHED", "PASS_THROUGH"})
+        if event.type in MOVES:
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl:
             self._deepen(context, WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
@@ -189,16 +117,16 @@ class Press(Polled, bpy.types.Operator):
 
     def _move(self, context: Any, bed: Any, event: Any) -> None:
         """Draw on to the place under the mouse."""
-        self._feel(event)
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
+            self._feel(bpy.context, bed, event)
             point = aim.hit_point(bpy.context, bed, self.grid, self.surface, xy)
         if point is not None and event.value != "PRESS":
             # Released, the stroke goes on to the mouse: a stabilized one has not come there yet.
             string = 1e-3 * self.stabilizer if event.type != "LEFTMOUSE" else 0.0
             x, y = self.lagged = pull(self.lagged, (float(point[0]), float(point[1])), string)
             depth, share = self._amount()
-            self._change(partial(draw, time=self._time(), x=x, y=y, depth=depth, share=share))
+            self._change(partial(draw, time=self._time(), x=x, y=y, depth=depth, share=share, lean=self.lean))
 
     def _deepen(self, context: Any, by: float) -> None:
         """Change depth or height, m, from here on; the tool shows it beside the cursor and in the header."""
@@ -221,10 +149,22 @@ class Press(Polled, bpy.types.Operator):
         """Return the time since the mouse went down, s."""
         return time.perf_counter() - self.began
 
-    def _feel(self, event: Any) -> None:
-        """Take a pen's pressure."""
+    def _feel(self, context: Any, bed: Any, event: Any) -> None:
+        """Take a pen's pressure and tilt."""
         if self.use_pressure and event.is_tablet:
             self.pressure = pen.find_share(float(event.pressure), self.pressure_curve)
+        if self.use_tilt and event.is_tablet:
+            self.lean = pen.find_lean(tuple(event.tilt), aim.find_view(context, bed))
+
+    def _is_released(self, event: Any) -> bool:
+        """Return whether the button is up though no release has come: a pie menu, for instance, has had it.
+
+        A move tells of the last key or button; a timer's event of the one before that, which is one of this
+        stroke only after another key has come.
+        """
+        self.keyed |= event.type not in MOVES and event.type not in ("TIMER", "LEFTMOUSE")
+        tells = event.type in MOVES or (event.type == "TIMER" and self.keyed)
+        return tells and (event.type_prev, event.value_prev) == ("LEFTMOUSE", "RELEASE")
 
     def _keep_amount(self, context: Any) -> None:
         """Let the next stroke of this brush have the depth or height of this one."""

@@ -12,7 +12,7 @@ from .action import Action
 from .poll_messages import baked, linked, no_bed, session_runs
 from .session_loop import LoopMixin
 
-__all__ = ["LeaveMode", "Session"]
+__all__ = ["LeaveMode", "Session", "leave_entry"]
 
 
 def leave_mode(context: Any) -> None:
@@ -38,6 +38,18 @@ class LeaveMode(Action, bpy.types.Operator):
         leave_mode(context)
         if context.window is not None:
             tool.take_up(context)
+
+
+def leave_entry(menu: Any, context: Any) -> None:
+    """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace.
+
+    Parameters
+    ----------
+    menu : bpy.types.Menu
+    context : bpy.types.Context
+    """
+    if not LeaveMode.poll_message(context):
+        menu.layout.operator(LeaveMode.bl_idname, icon="LOOP_BACK")
 
 
 class Session(LoopMixin, Action, bpy.types.Operator):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compat import bpy
-from . import appearance, live_session, parameters, shape_exchange
+from . import appearance, live_session, parameters, press_options, shape_exchange
 
 __all__ = ["register", "unregister"]
 
@@ -14,6 +14,7 @@ CLASSES: tuple[type, ...] = (
     *live_session.CLASSES,
     *appearance.CLASSES,
     *shape_exchange.CLASSES,
+    *press_options.CLASSES,
 )
 
 

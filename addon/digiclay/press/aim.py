@@ -18,7 +18,7 @@ from ..live import running
 from ..settings import properties
 from .occlusion import is_hidden, shown_stretch
 
-__all__ = ["Target", "find_target", "hit_point", "project", "read_surface"]
+__all__ = ["Target", "find_target", "find_view", "hit_point", "project", "read_surface"]
 
 Floats = NDArray[np.float64]
 
@@ -137,6 +137,18 @@ def project(context: Any, bed: Any, points: Floats) -> Floats:
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
     size = np.array([context.region.width, context.region.height])
     return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
+
+
+def find_view(context: Any, bed: Any) -> Floats:
+    """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    bed : bpy.types.Object
+    """
+    seen = np.array(context.region_data.view_matrix @ bed.matrix_world, np.float64)[:3, :3].T
+    return np.asarray(seen / np.linalg.norm(seen, axis=0))
 
 
 def _place(bed: Any, point: Floats) -> Floats:

@@ -15,11 +15,9 @@ from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
 from ..live.stroke import SYMMETRIES, Brush
-from ..settings import finger_size
-from . import aim, marks
-from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, bed_in_use, describe_brush
+from . import aim, header, marks
+from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, describe_brush
 from .drape import drape
-from .fingers import find_kind
 
 __all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
 
@@ -138,31 +136,7 @@ class PressTool(bpy.types.WorkSpaceTool):
         layout : bpy.types.UILayout
         tool : bpy.types.WorkSpaceTool
         """
-        settings = tool.operator_properties(OPERATOR)
-        row = layout.row(align=True)
-        row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
-        row.operator("digiclay.press_brush_save", text="", icon="ADD")
-        row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
-        bed = bed_in_use(context)
-        if bed is not None:
-            row = layout.row(align=True)
-            kind = find_kind(finger_size.read_finger(bed.digiclay))
-            row.menu("DIGICLAY_MT_fingers", text=kind.label if kind else "Finger")
-            row.prop(bed.digiclay, "size")
-            row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
-        layout.row(align=True).prop(settings, "brush", expand=True)
-        row = layout.row(align=True)
-        if settings.brush != "LEVEL":
-            row.prop(settings, amount_name(Brush(settings.brush)))
-        row.prop(settings, "use_pressure", text="", icon="STYLUS_PRESSURE")
-        if settings.use_pressure:
-            row.prop(settings, "pressure_curve", text="")
-        layout.prop(settings, "strength")
-        layout.prop(settings, "path", text="")
-        if settings.path == "FREE":
-            layout.prop(settings, "stabilizer")
-        layout.prop(settings, "symmetry", text="", icon="MOD_MIRROR")
-        layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
+        header.draw_header(context, layout, tool.operator_properties(OPERATOR))
 
 
 def register() -> None:

@@ -13,3 +13,4 @@ settings.path = "RING"
 settings.stabilizer = 0.0
 settings.use_pressure = True
 settings.pressure_curve = "LINEAR"
+settings.use_tilt = True

@@ -13,3 +13,4 @@ settings.path = "FREE"
 settings.stabilizer = 3.0
 settings.use_pressure = True
 settings.pressure_curve = "LINEAR"
+settings.use_tilt = True

@@ -1,0 +1,59 @@
+"""Draws with a pen that has pressure and tilt: upright, with half the pressure, and leaning to the right."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from hand_strokes import add_bed, finish, focus_window, note, on_the_screen, take_tool
+
+HAND = Path(__file__).parent / "tablet" / "pen_hand.py"
+#: Row, mm, pressure, and tilt to the right and to the user, of each stroke; half its length, mm.
+STROKES = {
+    "firm": (24.0, 1.0, 0.0, 0.0),
+    "light": (0.0, 0.5, 0.0, 0.0),
+    "leaning": (-24.0, 1.0, 0.8, 0.0),
+}
+HALF = 12.0
+
+
+def draw(blender: Any, row: float, pressure: float, right: float, near: float) -> subprocess.Popen[bytes]:
+    """Start a pen that draws along a row of the bed for a second."""
+    places = (on_the_screen(blender, float(x), row) for x in np.linspace(-HALF, HALF, 31))
+    (x, y), *later = places
+    words = [f"to {x} {y} 0 {right} {near}", "sleep 0.1", f"to {x} {y} {pressure} {right} {near}", "down"]
+    for x, y in later:
+        words += ["sleep 0.033", f"to {x} {y} {pressure} {right} {near}"]
+    return subprocess.Popen([sys.executable, str(HAND), *words, "up"])
+
+
+def pressed(blender: Any, since: int) -> dict[str, Any]:
+    """Return how low the finger came in a recording since a period, mm, and its turns there, w first."""
+    (session,) = blender.part("live.running").list_sessions()
+    poses = session.path[since:, 0]
+    low = poses[:, 2].min()
+    return {"lowest": 1e3 * float(low), "inside": poses[poses[:, 2] < low + 1e-5, 3:].tolist()}
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Draw the strokes while a take is recorded."""
+    add_bed(blender)
+    take_tool(blender)
+    blender.call(bpy.ops.view3d.view_axis, type="TOP")
+    yield from focus_window()
+    blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
+    yield from blender.settle()
+    blender.call(bpy.ops.digiclay.take_record)
+    for name, stroke in STROKES.items():
+        (session,) = blender.part("live.running").list_sessions()
+        since = len(session.path)
+        yield from finish(blender, draw(blender, *stroke))
+        note(blender, name)
+        (session,) = blender.part("live.running").list_sessions()
+        blender.SEEN[name] |= {"outside": session.pose[3:].tolist(), **pressed(blender, since)}
+    blender.shot("pen")
