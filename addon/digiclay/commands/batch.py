@@ -6,7 +6,7 @@ import argparse
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -19,10 +19,11 @@ from .arguments import add_command
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .exit_codes import FAILED, STOPPED
-from .job import ERROR, PROGRESS
+from .job_log import PROGRESS, find_error, read_fraction, read_tail
 from .job_steps import check_outputs
 from .progress import Counted, format_duration
 from .stop import Stop
+from .submit import add_options, refuse_alone, write_farm_files
 from .worker import Process, Processes, count_cores
 
 __all__ = ["JobProcess", "add"]
@@ -31,13 +32,14 @@ EXAMPLES = """\
 examples:
   digiclay batch first                    the sample batch, into ./first
   digiclay batch my.toml --jobs 4         four processes; results in index.html
-  digiclay batch my.toml --prepare        files of the jobs only, for a render farm: see 'digiclay job'
+  digiclay batch my.toml --prepare        files of the jobs only, for another machine: see 'digiclay job'
+  digiclay batch my.toml --submit openjd  a job for a render farm: tasks, their order, ranges of frames
 
 After Ctrl-C or a kill, the same command continues: finished jobs are kept, and repeated only after a change
 in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 """
-#: Bytes at a log's end that are looked at for its last line.
-TAIL = 4096
+#: Seconds between two pages that are written while jobs run, at least, and times that a page's writing takes.
+PAUSE, REST = 2.0, 10.0
 
 
 class JobProcess(Process):
@@ -58,30 +60,16 @@ class JobProcess(Process):
 
     def read_fraction(self) -> float:
         """Return how much of the job is done, from 0 to 1."""
-        for line in reversed(self._read_tail()):
-            _, _, number = line.removeprefix(PROGRESS).partition(" ")
-            if line.startswith(PROGRESS) and number:
-                try:
-                    return min(1.0, max(0.0, float(number)))
-                except ValueError:
-                    break  # a line that is being written
-        return 0.0
+        return read_fraction(read_tail(self._log))
 
     def read_error(self) -> str:
         """Return in one line why the job was not done."""
-        lines = self._read_tail()
-        told = [line.removeprefix(ERROR) for line in lines if line.startswith(ERROR)]
-        if told:
-            return one_line(told[-1])
+        lines = read_tail(self._log)
+        if told := find_error(lines):
+            return told
         others = [line for line in lines if line.strip() and not line.startswith(PROGRESS)]
         said = f": {others[-1].strip()}" if others else ""
         return one_line(f"The process ended with {self.wait()}{said}")
-
-    def _read_tail(self) -> list[str]:
-        """Return the last lines of the log."""
-        with self._log.open("rb") as file:
-            file.seek(max(0, self._log.stat().st_size - TAIL))
-            return file.read().decode("utf-8", errors="replace").splitlines()
 
 
 def add(commands: Any) -> None:
@@ -95,13 +83,16 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--jobs", metavar="N", type=read_count, help="number of processes; default: one a core"
     )
-    parser.add_argument("--prepare", action="store_true", help="write the files of the jobs, run none")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--prepare", action="store_true", help="write the files of the jobs, run none")
+    add_options(parser, instead)
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
     parser.set_defaults(carry_out=carry_out)
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
+    refuse_alone(arguments)
     made = read_jobs(find_jobs_file(arguments.file))
     sound = next((job.scene for job in made.jobs if job.scene is not None), None)
     if sound is not None:  # outputs that cannot be had here at all are refused before any work
@@ -114,7 +105,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
             if not arguments.quiet:
                 print(f"{len(made.jobs)} jobs written to {out / 'jobs'}")
             return 0
-        return _finish(arguments, folder)
+        return _submit(arguments, folder) if arguments.submit else _finish(arguments, folder)
+
+
+def _submit(arguments: argparse.Namespace, folder: Folder) -> int:
+    """Write the files of a farm, print how they are submitted, and return the exit code."""
+    said = write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk)
+    if not arguments.quiet:
+        print("\n".join(said))
+    return _tell_failed(
+        {job.name: job.error for job in folder.batch.jobs if job.error}, len(folder.batch.jobs)
+    )
 
 
 def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
@@ -134,12 +135,26 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before) as bar:
         running: dict[str, JobProcess] = {}
         ended: list[Job] = []
+        due = time.monotonic()
+
+        def refresh() -> None:
+            nonlocal due
+            began = time.monotonic()
+            if began >= due:
+                said = f"{before + len(ended)} of {len(made.jobs)} jobs ended so far"
+                folder.write_index(failed, f"{said}, {len(failed)} failed." if failed else f"{said}.")
+                due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
+
+        def keep(job: Job, _: None) -> None:
+            ended.append(job)
+            refresh()
 
         def fail(job: Job, error: str) -> None:
             ended.append(job)
             if not stop():
                 failed[job.name] = error
                 tell(f"failed: {job.name}: {error}")
+                refresh()
 
         def draw() -> None:
             if not arguments.quiet:
@@ -150,7 +165,7 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
 
         with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
             task = partial(_do_job, processes, running, folder)
-            finish(threads, task, todo, lambda job, _: ended.append(job), fail, stopped=processes.stopped)
+            finish(threads, task, todo, keep, fail, stopped=processes.stopped)
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
     done = before - sum(bool(job.error) for job in made.jobs) + now
@@ -167,12 +182,16 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
     if stopped and done + len(failed) < len(made.jobs):
         tell("Stopped: what is done is kept, and the same command goes on from there.")
         return STOPPED
-    if failed:
-        name, error = next(iter(failed.items()))
-        first = f"{len(failed)} of {len(made.jobs)} jobs failed; the first one: {name}: {error}"
-        print(first, file=sys.stderr)
-        return FAILED
-    return 0
+    return _tell_failed(failed, len(made.jobs))
+
+
+def _tell_failed(failed: Mapping[str, str], count: int) -> int:
+    """Print the first of the jobs that failed, and return the exit code."""
+    if not failed:
+        return 0
+    name, error = next(iter(failed.items()))
+    print(f"{len(failed)} of {count} jobs failed; the first one: {name}: {error}", file=sys.stderr)
+    return FAILED
 
 
 def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder, job: Job) -> None:

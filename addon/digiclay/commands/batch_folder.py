@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from .. import __version__
-from ..core.base.errors import OutputError
-from ..core.base.run_folder import resolve_inside
+from ..core.base.errors import DigiclayError, OutputError
+from ..core.base.run_folder import lock_name, resolve_inside
 from ..core.base.unfinished import remove_abandoned
 from ..core.base.whole_files import read_json, write_whole
 from ..core.scene.toml_table import format_scene
+from ..core.studies.job_outputs import Outputs
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries
 from ..core.studies.series import Kind, open_series
 from .gallery import Card, page
+from .job_log import ERROR, find_error, read_tail
 from .progress import format_duration
 from .run_state import RUNS, TIMING, is_done
 from .thumbnail import NAMES
 
-__all__ = ["JOBS", "MARK", "Folder", "open_batch"]
+__all__ = ["JOBS", "MARK", "Folder", "note_failure", "open_batch", "read_batch", "refresh_page"]
 
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
 #: What a thumbnail leads to: the first of these there is.
 SHOWN = ("film.mp4", "turntable.mp4", "still.png")
+#: What a card says of a job that is not done, and after how many seconds a browser then loads the page again.
+UNDONE, AGAIN = [("not done yet", "")], 30
+#: Seconds to wait for another process that writes the page; and the age from which on jobs write it anew, s.
+PATIENCE, AGE = 20.0, 10.0
 #: What is told of a run: its figure, what it is called, factor and unit.
 FACTS: tuple[tuple[str, str, float, str], ...] = (
     ("method", "method", 0.0, ""),
@@ -75,6 +82,23 @@ class Folder:
         write_whole(self.find_job(job) / SCENE, format_scene(job.scene).encode())
         write_whole(self.find_job(job) / JOB, self.batch.outputs.format().encode())
 
+    def read_failures(self) -> dict[str, str]:
+        """Return why jobs failed that other processes have done, by their names.
+
+        The log of a job that was described anew since says nothing about it.
+        """
+        failed = {job.name: job.error for job in self.batch.jobs if job.error}
+        for job in self.batch.jobs:
+            log = self.find_log(job)
+            try:
+                new = log.stat().st_mtime_ns >= (self.find_job(job) / SCENE).stat().st_mtime_ns
+            except OSError:
+                continue
+            error = find_error(read_tail(log)) if new else ""
+            if error and not self.is_done(job):
+                failed[job.name] = error
+        return failed
+
     def measure_start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
         timings = (read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
@@ -101,10 +125,20 @@ class Folder:
             elif self.is_done(job):
                 cards.append(self._make_card(job))
             else:
-                cards.append(Card(job.name, facts=[("not done yet", "")]))
+                cards.append(Card(job.name, facts=UNDONE))
         path = self.path / INDEX
-        write_whole(path, page(f"Batch {self.batch.name}", said, cards).encode())
+        refresh = AGAIN if any(card.facts == UNDONE for card in cards) else 0
+        with lock_name(path, PATIENCE):
+            write_whole(path, page(f"Batch {self.batch.name}", said, cards, refresh).encode())
         return path
+
+    def write_page(self) -> str:
+        """Write the page from what the folder holds, and return what it says of all jobs."""
+        failed = self.read_failures()
+        done = sum(self.is_done(job) for job in self.batch.jobs)
+        said = f"{done} of {len(self.batch.jobs)} jobs done" + (f", {len(failed)} failed" if failed else "")
+        self.write_index(failed, f"{said}.")
+        return said
 
     def _make_card(self, job: Job) -> Card:
         """Return the content of the page for a finished job."""
@@ -143,9 +177,78 @@ def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
     OutputError
         When it holds other things, cannot be written, or another process works in it.
     """
-    known = {"batch": batch.name, "digiclay": __version__}
+    known = {
+        "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
+    }  # fmt: skip
     with open_series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), known):
         yield Folder(path, batch)
+
+
+def read_batch(path: Path) -> Folder:
+    """Return a batch's folder with the jobs it has, without their definitions.
+
+    Raises
+    ------
+    OutputError
+        When it is none.
+    """
+    known = read_json(path / MARK)
+    if known is None or not isinstance(known.get("batch"), str):
+        raise OutputError(f"{path} is no folder of a job series: it has no {MARK} of 'digiclay batch'.")
+    named = known.get("jobs")
+    if not isinstance(named, dict):  # of an older version
+        named = {job.name: "" for job in sorted((path / JOBS).glob("*/")) if (job / JOB).is_file()}
+    jobs = tuple(Job(str(name), None, str(error)) for name, error in named.items())
+    return Folder(path, JobSeries(known["batch"], jobs, Outputs()))
+
+
+def _find_series(job: Path) -> Folder | None:
+    """Return the series in whose folder the files of a job are; None where they stand alone."""
+    full = job.resolve()
+    path = full.parent.parent
+    if full.parent.name != JOBS or not (path / MARK).is_file():
+        return None
+    found = read_batch(path)
+    return found if any(other.name == full.name for other in found.batch.jobs) else None
+
+
+def note_failure(job: Path, error: str) -> None:
+    """Keep for the page why a job has failed that was started by itself, or take back what was noted.
+
+    Parameters
+    ----------
+    job : Path
+        The folder of the job's files.
+    error : str
+        One line; empty when it begins anew.
+    """
+    with suppress(OSError, DigiclayError):  # the job itself matters more
+        series = _find_series(job)
+        if series is None:
+            return
+        log = series.find_log(Job(job.resolve().name, None))
+        if error:
+            log.parent.mkdir(exist_ok=True)
+            write_whole(log, f"{ERROR}{error}\n".encode())
+        elif find_error(read_tail(log)):
+            log.unlink(missing_ok=True)
+
+
+def refresh_page(job: Path) -> None:
+    """Write the page of a job's series anew, unless another job has just done so.
+
+    Parameters
+    ----------
+    job : Path
+        The folder of the job's files.
+    """
+    with suppress(OSError, DigiclayError):
+        series = _find_series(job)
+        if series is None:
+            return
+        page = series.path / INDEX
+        if not page.is_file() or time.time() - page.stat().st_mtime > AGE:
+            series.write_page()
 
 
 def _format_figure(value: Any, factor: float, unit: str) -> str:

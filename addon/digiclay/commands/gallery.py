@@ -60,7 +60,7 @@ class Card:
     error: str = ""
 
 
-def page(title: str, summary: str, cards: Sequence[Card]) -> str:
+def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> str:
     """Return the page of a batch.
 
     Parameters
@@ -69,12 +69,16 @@ def page(title: str, summary: str, cards: Sequence[Card]) -> str:
     summary : str
     cards : sequence of Card
         One a job.
+    refresh : int, optional
+        Seconds after which a browser loads the page again; 0: never.
     """
+    again = [f'<meta http-equiv="refresh" content="{refresh}">'] if refresh else []
     return "\n".join(
         [
             "<!doctype html>",
             '<html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            *again,
             f"<title>{_safe(title)}</title>",
             f"<style>\n{STYLE}</style></head><body>",
             f"<h1>{_safe(title)}</h1>",

@@ -18,17 +18,19 @@ from ..core.base.errors import DigiclayError, OutputError, one_line
 from ..core.base.run_folder import claim_folder
 from ..core.base.whole_files import format_json, write_whole
 from ..core.scene.scene_source import load
-from ..core.studies.job_outputs import Outputs
+from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
 from .arguments import add_command
+from .batch_folder import note_failure, refresh_page
 from .exit_codes import STOPPED, WRONG
 from .job_films import make_film, make_frames
+from .job_log import ERROR, PROGRESS
 from .job_steps import Tell, check_outputs, make_outputs
 from .progress import Counted
-from .run_state import FILES, MOVING, RUNS, TIMING, RunState, judge_run, list_lacking
+from .run_state import FILES, RUNS, TIMING, RunState, judge_run, list_lacking
 from .stop import Stop
 
-__all__ = ["ERROR", "PROGRESS", "add"]
+__all__ = ["add"]
 
 EXAMPLES = """\
 examples:
@@ -44,8 +46,6 @@ On several machines, a long film in parts:
   digiclay job JOB --only film --frames 0-49      some frames; on any machine, in any order
   digiclay job JOB --only film                    the film of these frames; draws those that are missing
 """
-#: What the lines begin with that are meant for the batch that has started the job.
-PROGRESS, ERROR = "@ ", "! "
 #: Seconds that the process of a batch that was killed gets to end.
 GRACE = 20.0
 
@@ -69,8 +69,15 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the job."""
     if not arguments.follow:
-        with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
-            said = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+        note_failure(arguments.job, "")
+        try:
+            with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
+                said = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+        except DigiclayError as error:
+            note_failure(arguments.job, one_line(error))
+            refresh_page(arguments.job)
+            raise
+        refresh_page(arguments.job)
         if not arguments.quiet:
             print(said)
         return 0

@@ -20,6 +20,7 @@ from . import (
     form,
     job,
     outside,
+    page,
     plot,
     render,
     run,
@@ -107,7 +108,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
     every = (
-        run, batch, job, form, describe, export, features, plot, render, sweep, compare, outside,
+        run, batch, job, page, form, describe, export, features, plot, render, sweep, compare, outside,
     )  # fmt: skip
     for command in every:
         command.add(commands)

@@ -11,18 +11,16 @@ from ..core.base.errors import DigiclayError
 from ..core.base.run_folder import lock_name
 from ..core.base.whole_files import format_json, read_json, write_whole
 from ..core.scene.scene_source import load
-from ..core.session.finished_run import is_whole
-from ..core.studies.job_outputs import Outputs
+from ..core.session.finished_run import has_files, is_whole
+from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
 
 __all__ = [
-    "FILES", "MOVING", "RUNS", "TIMING", "RunState", "is_done", "judge_run", "list_lacking", "note_film",
+    "FILES", "RUNS", "TIMING", "RunState", "is_done", "judge_run", "list_lacking", "note_film",
 ]  # fmt: skip
 
 #: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"
-#: Outputs that can be drawn frame by frame after the run; each is the file of its name with ``.mp4``.
-MOVING = ("turntable", "film")
 #: Seconds to wait for another process that notes its film.
 PATIENCE = 20.0
 
@@ -53,7 +51,10 @@ def judge_run(job: Path, run: Path) -> RunState:
     if not (_is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)):
         return RunState.CHANGED
     timing = read_json(run / TIMING)
-    whole = timing is not None and is_whole(run, load(run / SCENE), timing.get(FILES))
+    if timing is None:
+        return RunState.INCOMPLETE
+    sizes = timing.get(FILES)
+    whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load(run / SCENE))
     return RunState.WHOLE if whole else RunState.INCOMPLETE
 
 

@@ -20,12 +20,14 @@ from typing import Any, TypeVar
 
 from ..core.base.errors import DigiclayError
 
-__all__ = ["Process", "Processes", "count_cores", "in_blender"]
+__all__ = ["Process", "Processes", "count_cores", "find_program", "in_blender", "start_blender"]
 
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
 #: The package, as an extension in Blender or installed with pip.
 PACKAGE = __name__.removesuffix(".commands.worker")
+#: Where Blender keeps the extension when it was installed from a file.
+EXTENSION = "bl_ext.user_default.digiclay"
 
 Started = TypeVar("Started", bound="Process")
 
@@ -47,13 +49,19 @@ def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
     """
     bpy: Any = sys.modules.get("bpy")
     if bpy is not None and bpy.app.binary_path:
-        return [bpy.app.binary_path, "--background", "--addons", PACKAGE, "--command", "digiclay"], {}
+        return start_blender(bpy.app.binary_path), {}
     folders = [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
     bundled = importlib.util.find_spec("trimesh") if PACKAGE.startswith("bl_ext.") else None
     if bundled is not None and bundled.origin is not None:  # what an extension brings along is elsewhere
         folders.append(str(Path(bundled.origin).parents[1]))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
     return [sys.executable, "-m", f"{Path(__file__).resolve().parents[1].name}{module}"], environment
+
+
+def start_blender(program: str) -> list[str]:
+    """Return a command that runs the extension in a Blender, this one or another machine's."""
+    package = PACKAGE if in_blender() else EXTENSION
+    return [program, "--background", "--addons", package, "--command", "digiclay"]
 
 
 def count_cores() -> int:

@@ -20,7 +20,7 @@ from ..scene.scene_source import load
 from ..scene.schema import Scene
 from .memory_limit import measure_available_memory
 
-__all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "is_whole", "read_run"]
+__all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "has_files", "is_whole", "read_run"]
 
 #: The file of the arrays.
 HISTORY = "history.npz"
@@ -88,22 +88,30 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
         raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(held)}).")
 
 
-def is_whole(folder: Path, scene: Scene, sizes: object = None) -> bool:
-    """Return whether a run's folder has all that belongs into it: copies break off half way.
+def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
+    """Return whether a run's folder has all that was written into it: copies break off half way.
+
+    Parameters
+    ----------
+    folder : Path
+    sizes : mapping of str to int
+        Bytes of each file, as they were written.
+    """
+    try:
+        return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
+    except OSError:
+        return False
+
+
+def is_whole(folder: Path, scene: Scene) -> bool:
+    """Return whether a run's folder has what belongs into each, where no sizes were noted.
 
     Parameters
     ----------
     folder : Path
     scene : Scene
         Of the run.
-    sizes : dict of str to int, optional
-        Bytes of each file, as they were written; older runs have not noted them.
     """
-    if isinstance(sizes, dict):
-        try:
-            return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
-        except OSError:
-            return False
     whole = read_json(folder / MARK) is not None
     # The names of an archive's parts stand at its end.
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))

@@ -1,0 +1,1 @@
+"""Files for render farms: the tasks of a job series, in the form each farm reads."""

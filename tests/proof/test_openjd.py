@@ -1,0 +1,74 @@
+"""A job template with a film is checked and run by openjd, the program of Open Job Description."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+
+from tests.proof.conftest import told
+from tests.timeouts import TIMEOUT
+
+JOBS = """
+scenes = ["tap"]
+errors = false
+settings.short.simulation.duration = 0.3
+[film]
+width = 64
+height = 40
+rate = 10
+"""
+
+
+def openjd(*arguments: str | Path) -> str:
+    """Run openjd and return all it says; it must end well."""
+    return told(sys.executable, "-m", "openjd", *arguments)
+
+
+def test_openjd_checks_a_template_and_runs_its_steps_in_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my film.toml").write_text(JOBS, encoding="utf-8")
+    out = tmp_path / "das Büro's Laufwerk"
+    assert (
+        main(["batch", "my film.toml", "--out", str(out), "--submit", "openjd", "--chunk", "3", "--quiet"])
+        == 0
+    )
+    template = out / "openjd.json"
+    assert "passes validation checks" in openjd("check", template)
+    said = openjd("run", template, "-p", f"Program={sys.executable}")
+    steps = re.findall(r"Running step '(.*)'", said)
+    assert steps == ["tap-short: run", "tap-short: frames of film", "tap-short: film", "page"]
+    assert re.findall(r"frames (\S+) of .*film.mp4 (.*)", said) == [("0+3", "drawn"), ("3+3", "drawn")]
+    run = out / "runs" / "tap-short"
+    files = json.loads((run / "timing.json").read_text(encoding="utf-8"))["files"]
+    assert (run / "film.mp4").stat().st_size == files["film.mp4"] > 1000
+    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
+    # A task that is sent again ends well and changes nothing.
+    before = {path: path.stat().st_mtime_ns for path in run.iterdir()}
+    again = openjd("run", template, "-p", f"Program={sys.executable}", "--step", "tap-short: film")
+    assert "was done already" in again
+    assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
+
+
+def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> None:
+    jobs = tmp_path / "two.toml"
+    jobs.write_text(JOBS.replace("0.3", "0.05"), encoding="utf-8")
+    assert main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"]) == 0
+    (tmp_path / "out" / "jobs" / "tap-short" / "scene.toml").write_text("name = 3\n", encoding="utf-8")
+    template, program = tmp_path / "out" / "openjd.json", f"Program={sys.executable}"
+    done = subprocess.run(
+        [sys.executable, "-m", "openjd", "run", template, "-p", program],
+        capture_output=True, text=True, check=False, timeout=TIMEOUT,
+    )  # fmt: skip
+    said = done.stdout + done.stderr
+    assert done.returncode != 0
+    assert re.findall(r"Running step '(.*)'", said) == ["tap-short: run"]
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "0 of 1 jobs done, 1 failed." in page
