@@ -74,7 +74,11 @@ TERMS = (
     ),
     ("trace", "sums of each row from which the metrics are computed"),
     ("snapshot", "state as bytes, in a file or a .blend"),
-    ("take", "initial state and fingertip path of a live session, one pose a control period"),
+    ("smoothing order", "disc of the bed and strength with which its pins are smoothed in a control period"),
+    (
+        "take",
+        "initial state and fingertip path of a live session, a pose and a smoothing order a control period",
+    ),
     ("bake", "Blender animation made from a take"),
     ("batch", "several runs that are simulated in one call, with the run as the last array axis"),
     ("job", "one run of a job series, with its meshes and pictures"),

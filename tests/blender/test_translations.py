@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bpy
 import pytest
 from digiclay import translations
 
@@ -35,3 +36,15 @@ def test_a_label_is_found_among_operators_and_elsewhere() -> None:
     entries = translations.make_entries({"Take Back a Gesture", "Nobody has written this"}, "de")
     wanted = "Geste zurücknehmen"
     assert entries == {("*", "Take Back a Gesture"): wanted, ("Operator", "Take Back a Gesture"): wanted}
+
+
+def test_a_brush_has_the_name_of_what_it_does_where_other_things_are_smooth() -> None:
+    entries = translations.make_entries({"Smooth"}, "de")
+    assert (entries["*", "Smooth"], entries["Brush", "Smooth"]) == ("Glatt", "Glätten")
+
+
+def test_every_brush_has_a_translation_among_brushes() -> None:
+    known = bpy.ops.digiclay.press.get_rna_type().properties["brush"]
+    entries = translations.make_entries(translations.collect_strings(), "de")
+    names = [known.name, *(item.name for item in known.enum_items)]
+    assert [name for name in names if (known.translation_context, name) not in entries] == []

@@ -49,6 +49,16 @@ class Brush(Enum):
         """What Ctrl makes of it."""
         return {Brush.LOWER: Brush.RAISE, Brush.RAISE: Brush.LOWER}.get(self, self)
 
+    @property
+    def has_amount(self) -> bool:
+        """Whether it has a depth or height, not a strength alone."""
+        return self in (Brush.LOWER, Brush.RAISE)
+
+    @property
+    def needs_blister(self) -> bool:
+        """Whether the blister of the device has to follow the finger."""
+        return self in (Brush.RAISE, Brush.LEVEL)
+
 
 @dataclass(frozen=True)
 class Sample:

@@ -15,6 +15,7 @@ class PressSettings:
         description="What a stroke does to the surface",
         items=brush.BRUSH_ITEMS,
         default="LOWER",
+        translation_context="Brush",
     )
     depth: bpy.props.FloatProperty(
         name="Depth (mm)",
@@ -39,8 +40,8 @@ class PressSettings:
     strength: bpy.props.FloatProperty(
         name="Strength",
         description=(
-            "Share of the depth, of the height, or of the way to the level that a stroke reaches; "
-            "pen pressure scales it further"
+            "Share of the depth, of the height, or of the way to the level that a stroke reaches, and "
+            "strength of Smooth; pen pressure scales it further"
         ),
         default=1.0,
         min=0.01,

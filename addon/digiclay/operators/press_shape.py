@@ -42,13 +42,13 @@ class PressShape(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points."""
-        found = aim.find_target(context, (event.mouse_region_x, event.mouse_region_y))
+        found = aim.find_target(context, brush.find_press(context, event))
         if found is None:
             return {"PASS_THROUGH"}
         settings: Any = brush.tool_settings(context)
         self.uid, self.grid, self.height = found.bed.session_uid, found.grid, found.height.copy()
         self.region, self.shape = context.region, settings.path
-        self.kind = Brush(settings.brush).inverse if event.ctrl else Brush(settings.brush)
+        self.kind = brush.choose_brush(settings.brush, event)
         self.start = self.end = float(found.point[0]), float(found.point[1])
         self.handler = bpy.types.SpaceView3D.draw_handler_add(
             self._draw, (context.area,), "WINDOW", "POST_PIXEL"

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
+from ..core.control.methods import METHODS
 from ..device import view
 from ..live import running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
@@ -26,8 +27,10 @@ WHEEL = 0.25e-3
 MOVES = frozenset({"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"})
 WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
 KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
+KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
 #: What is told where a brush cannot work.
 NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
+RECOVERS = "Smoothed pins will not stay so: the method {} brings all pins back"
 
 
 class Press(PressSettings, Polled, bpy.types.Operator):
@@ -50,11 +53,11 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         """Begin where the mouse points; beside the bed there is nothing to press."""
         if self.path != "FREE":
             return {"PASS_THROUGH"}  # to the operator of lines and rings
-        found = aim.find_target(context, (event.mouse_region_x, event.mouse_region_y))
+        found = aim.find_target(context, brush.find_press(context, event))
         if found is None:
             return {"PASS_THROUGH"}
-        # Ctrl inverts the brush, for as long as this stroke lasts.
-        self.kind = Brush(self.brush).inverse if event.ctrl else Brush(self.brush)
+        # Shift and Ctrl change the brush for as long as this stroke lasts.
+        self.kind = brush.choose_brush(self.brush, event)
         session = open_session(self, context, found.bed, self.kind)
         if session is None:
             return {"CANCELLED"}
@@ -93,7 +96,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             return self._end({"FINISHED", "PASS_THROUGH"})
         if event.type in MOVES:
             self._move(context, bed, event)
-        elif event.type in WHEELS and event.ctrl:
+        elif event.type in WHEELS and event.ctrl and self.kind.has_amount:
             self._deepen(context, WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
@@ -177,7 +180,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
     def _tell(self, context: Any) -> None:
         """Show brush, depth or height, and keys in the status bar."""
         said = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
-        status.show(context, KEYS.format(said))
+        status.show(context, (KEYS if self.kind.has_amount else KEYS_PLAIN).format(said))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar."""
@@ -201,9 +204,11 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
     except (DigiclayError, RuntimeError) as error:
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
-    if kind is not Brush.LOWER and find_tracking(session.scene, session.system) is None:
+    if kind.needs_blister and find_tracking(session.scene, session.system) is None:
         operator.report({"ERROR"}, NO_BLISTER.format(brush.LABELS[kind], title(session.scene.method)))
         return None
+    if kind is Brush.SMOOTH and session.scene.control and METHODS[session.scene.method].recovers:
+        operator.report({"WARNING"}, RECOVERS.format(title(session.scene.method)))
     if session.paused:
         operator.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
     selection.deselect(bed)

@@ -11,14 +11,15 @@ from ..live.stroke import Brush
 
 __all__ = [
     "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "PATH_ITEMS", "SYMMETRY_ITEMS", "TOOL", "amount_name",
-    "bed_in_use", "describe_brush", "describe_stroke", "find_bed", "tool_settings",
+    "bed_in_use", "choose_brush", "describe_brush", "describe_stroke", "find_bed", "find_press",
+    "tool_settings",
 ]  # fmt: skip
 
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
 ADJUSTING = frozenset({"DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength"})
-LABELS = {Brush.LOWER: "Lower", Brush.RAISE: "Raise", Brush.LEVEL: "Level"}
+LABELS = {Brush.LOWER: "Lower", Brush.RAISE: "Raise", Brush.LEVEL: "Level", Brush.SMOOTH: "Smooth"}
 BRUSH_ITEMS = (
     ("LOWER", LABELS[Brush.LOWER], "Press a valley of the given depth. With Ctrl: Raise"),
     (
@@ -30,6 +31,11 @@ BRUSH_ITEMS = (
         "LEVEL",
         LABELS[Brush.LEVEL],
         "Bring hills and hollows to the height of the surface under the first touch",
+    ),
+    (
+        "SMOOTH",
+        LABELS[Brush.SMOOTH],
+        "Drive the pins in the ring to smoothed heights, without a touch. Shift and drag: with any brush",
     ),
 )
 SYMMETRY_ITEMS = (
@@ -72,6 +78,34 @@ def bed_in_use(context: Any) -> Any | None:
     return seen[0] if len(seen) == 1 else None
 
 
+def choose_brush(name: str, event: Any) -> Brush:
+    """Return the brush of a stroke that begins: Shift smooths, Ctrl inverts the tool's brush.
+
+    Parameters
+    ----------
+    name : str
+        Of the tool's brush.
+    event : bpy.types.Event
+        By which the stroke begins.
+    """
+    brush = Brush.SMOOTH if event.shift else Brush(name)
+    return brush.inverse if event.ctrl else brush
+
+
+def find_press(context: Any, event: Any) -> tuple[int, int]:
+    """Return where the mouse went down, pixels of the region; a drag is told after a move on from there.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    event : bpy.types.Event
+        By which the stroke begins.
+    """
+    if event.value != "CLICK_DRAG":
+        return event.mouse_region_x, event.mouse_region_y
+    return event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y
+
+
 def amount_name(brush: Brush) -> str:
     """Return which of the tool's settings says how far a brush goes: depth or height."""
     return "height" if brush is Brush.RAISE else "depth"
@@ -103,7 +137,7 @@ def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     strength : float, optional
         Share of it.
     """
-    if brush is Brush.LEVEL:
+    if not brush.has_amount:
         return f"{LABELS[brush]} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
     return f"{LABELS[brush]}, {amount_name(brush)} {1e3 * depth:.3g} mm{share}"

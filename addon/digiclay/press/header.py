@@ -39,7 +39,7 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
         row = layout.row(align=True)
         _number(row, bed.digiclay, "size", SIZE)
         row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
-    if settings.brush != "LEVEL":
+    if Brush(settings.brush).has_amount:
         _number(layout, settings, amount_name(Brush(settings.brush)), AMOUNT)
     _number(layout, settings, "strength", STRENGTH)
     if bed is not None:

@@ -7,17 +7,21 @@ from typing import Any
 
 import numpy as np
 
+from ..core.base.modes import COLORS, Mode
+from ..overlay.look import Color
 from ..overlay.picture import Line, Words
 
-__all__ = ["make_label", "make_lines"]
+__all__ = ["LIGHT", "SMOOTHING", "make_label", "make_lines"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: A light line on a dark one is seen on everything.
 DARK, LIGHT = (0.05, 0.05, 0.05), (1.0, 1.0, 1.0)
+#: That of a stroke that smooths has the color of the pins that the device drives.
+SMOOTHING = COLORS[Mode.BLISTER]
 
 
-def make_lines(paths: Sequence[Floats], width: float) -> list[Line]:
+def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> list[Line]:
     """Return light lines on dark ones.
 
     Parameters
@@ -26,8 +30,10 @@ def make_lines(paths: Sequence[Floats], width: float) -> list[Line]:
         Pixels.
     width : float
         Of a thin line, pixels.
+    color : (float, float, float), optional
+        Of the light ones.
     """
-    return [Line(path, *look) for look in ((DARK, 4.0 * width), (LIGHT, 2.0 * width)) for path in paths]
+    return [Line(path, *look) for look in ((DARK, 4.0 * width), (color, 2.0 * width)) for path in paths]
 
 
 def make_label(text: str, xy: tuple[float, float], scale: float) -> list[Words]:

@@ -9,12 +9,14 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.model.layout import Grid
+from ..core.model.fingertip import Fingertip
+from ..core.model.layout import Grid, Layout
 from ..core.surface.pointing import find_contact_outline
 from ..device import view
 from ..device.instant import find_ellipsoid
 from ..live import running
 from ..live.stroke import SYMMETRIES, Brush
+from ..live.sweep import find_radius
 from . import aim, header, marks
 from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, describe_brush
 from .drape import drape
@@ -24,8 +26,10 @@ __all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: float) -> Floats:
-    """Return the rim of what a bed's finger would touch at a place, lying on the pins, (k, 3), m.
+def touch_outline(
+    bed: Any, cells: Grid, height: Floats, place: Floats, depth: float, kind: Brush = Brush.LOWER
+) -> Floats:
+    """Return the rim of what a brush would form at a place, lying on the pins, (k, 3), m.
 
     Parameters
     ----------
@@ -37,11 +41,33 @@ def touch_outline(bed: Any, cells: Grid, height: Floats, place: Floats, depth: f
     place : ndarray (3,)
         Where the mouse points, m.
     depth : float
-        How deep it would be pressed, m.
+        How deep the finger would be pressed, m.
+    kind : Brush, optional
+        The rim of Smooth is a circle, that of the others where the finger would touch.
     """
     tip = view.fingertip_of(bed)
-    rim = place[:2] + find_contact_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth)
-    return drape(cells, height, rim)
+    outline = find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, cells.layout)
+    return drape(cells, height, place[:2] + outline)
+
+
+def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
+    """Return the rim of what a brush would form about the origin, (k, 2), m.
+
+    Parameters
+    ----------
+    finger : Fingertip
+    turn : ndarray (4,)
+        Its orientation, quaternion w, x, y, z.
+    depth : float
+        How deep it would be pressed, m.
+    kind : Brush
+    layout : Layout
+        Of the bed.
+    """
+    if kind is Brush.SMOOTH:
+        radius = find_radius(finger, layout)
+        return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
+    return find_contact_outline(finger, turn, depth)
 
 
 def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
@@ -57,9 +83,9 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     if found is None or view.fingertip_of(found.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)
-    depth = 1e-3 * settings.depth
+    depth, kind = 1e-3 * settings.depth, _shown_brush(found.bed, settings)
     rims = [
-        touch_outline(found.bed, found.grid, found.height, found.point * [*mirror, 1.0], depth)
+        touch_outline(found.bed, found.grid, found.height, found.point * [*mirror, 1.0], depth, kind)
         for mirror in SYMMETRIES[settings.symmetry]
     ]
     drawn = [*(np.concatenate([rim, rim[:1]]) for rim in rims), *_trail(found)]
@@ -67,10 +93,11 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     lines = [corner + aim.project(context, found.bed, points) for points in drawn]
     width = context.preferences.system.pixel_size
     shown = [points for points in lines if np.isfinite(points).all()]
-    brush = _shown_brush(found.bed, settings)
-    amount = 1e-3 * getattr(settings, amount_name(brush))
-    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), brush, amount, settings.strength)
-    cursor(marks.make_lines(shown, width), marks.make_label(text, xy, context.preferences.system.ui_scale))
+    amount = 1e-3 * getattr(settings, amount_name(kind))
+    text = describe_brush(bridge.finger_of(view.fingertip_of(found.bed)), kind, amount, settings.strength)
+    color = marks.SMOOTHING if kind is Brush.SMOOTH else marks.LIGHT
+    label = marks.make_label(text, xy, context.preferences.system.ui_scale)
+    cursor(marks.make_lines(shown, width, color), label)
 
 
 def _shown_brush(bed: Any, settings: Any) -> Brush:
@@ -85,8 +112,9 @@ def _trail(found: aim.Target) -> list[Floats]:
     session = running.find(found.bed)
     if session is None or not session.strokes:
         return []
-    finger, pose = find_ellipsoid(session.scene), session.pose
-    rim = pose[:2] + find_contact_outline(finger, pose[3:], float(found.height.max()) - pose[2])
+    finger, pose, kind = find_ellipsoid(session.scene), session.pose, session.strokes[0].brush
+    depth = float(found.height.max()) - pose[2]
+    rim = pose[:2] + find_outline(finger, pose[3:], depth, kind, found.grid.layout)
     first, *later = [path for stroke in session.strokes for path in stroke.ahead]
     ways = [np.concatenate([rim, rim[:1]]), np.concatenate([pose[None, :2], first]), *later]
     return [drape(found.grid, found.height, way) for way in ways if len(way) > 1]
@@ -107,8 +135,8 @@ class PressTool(bpy.types.WorkSpaceTool):
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; Ctrl inverts Lower and Raise; F, Shift F and Ctrl F set size, depth or height, and "
-        "strength; a pen presses by itself"
+        "Drag to sculpt; Shift smooths; Ctrl inverts Lower and Raise; F, Shift F and Ctrl F set size, depth "
+        "or height, and strength; a pen presses by itself"
     )
     bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
@@ -116,7 +144,10 @@ class PressTool(bpy.types.WorkSpaceTool):
         ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
         ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        # Shift and a click form a line, Shift and a drag smooths: Blender tells the two apart.
         ("digiclay.press_line", {"type": "LEFTMOUSE", "value": "CLICK", "shift": True}, None),
+        ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
+        (OPERATOR, {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
         ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),

@@ -25,6 +25,8 @@ EXTENSION = __package__.rpartition(".")[0]
 LANGUAGES = ("de",)
 #: Contexts in which Blender looks up a text: labels of operators have one of their own.
 CONTEXTS = ("*", "Operator")
+#: That of the brushes: as a brush, "Smooth" is what is done, elsewhere what something is.
+BRUSH = "Brush"
 
 
 @cache
@@ -111,7 +113,8 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
         One of `LANGUAGES`.
     """
     found = {text: translate(text, language) for text in texts}
-    return {(context, text): said for text, said in found.items() if said for context in CONTEXTS}
+    brushes = {(BRUSH, text): said for text, said in _catalog(language)["brushes"].items() if text in found}
+    return brushes | {(context, text): said for text, said in found.items() if said for context in CONTEXTS}
 
 
 def register() -> None:
