@@ -58,10 +58,10 @@ test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 -- tests/window
 
-test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd
+test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids
 	@tools/proof .reports
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs" 600 -- tests/proof
+	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids" 600 -- tests/proof
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -160,4 +160,4 @@ def _write_pairs(keys: Sequence[str], found: Indices) -> Iterator[str]:
 
 
 def _pair(index: float, interval: float) -> str:
-    return f"{index:.2f} ± {interval:.2f}"
+    return f"{round(index, 2) + 0.0:.2f} ± {interval:.2f}"  # no minus before a zero

@@ -120,7 +120,7 @@ def _evaluate(
             each = unchanged["figures"]["run_time"]
             time = format_duration(left * each)
             print(
-                f"{left} runs: about {time} of one core if each is run by itself, less in stacks", flush=True
+                f"{left} runs: about {time} of one core if each is run by itself, less in batches", flush=True
             )
         failed = evaluation.evaluate(every, subject.keys)
         return {**evaluation.records, **failed}

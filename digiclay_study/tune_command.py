@@ -121,7 +121,7 @@ def _evolve(
         if left > 0 and not arguments.quiet:
             time = format_duration(left * unchanged["figures"]["run_time"])
             print(
-                f"{left} runs: about {time} of one core if each is run by itself, less in stacks", flush=True
+                f"{left} runs: about {time} of one core if each is run by itself, less in batches", flush=True
             )
         shares = next(generations)
         while True:

@@ -88,23 +88,23 @@ def test_every_point_is_the_run_with_its_settings(whole: Path) -> None:
 KEYS = (("control.position_gain", "1/m"), ("control.force_gain", "1/N"))
 
 
-def test_the_page_names_ranges_outputs_and_the_command_that_repeats_the_study(whole: Path) -> None:
+def test_the_page_names_ranges_and_outputs(whole: Path) -> None:
     page = (whole / "study.md").read_text(encoding="utf-8")
-    command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
     assert "| `control.position_gain` | 100 to 1000, log |" in page
     assert "| `rfd` | N |" in page
     assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
-    again = command.split()[1:-1]
-    assert main([*again, "again", "--workers", "1", "--quiet"]) == 0
-    assert files(Path("again")) == files(whole)
 
 
-def test_points_that_are_missing_are_run_again_and_all_is_as_before(whole: Path, here: Path) -> None:
-    shutil.copytree(whole, here / "out")
-    for path in [*sorted((here / "out" / "points").iterdir())[3::4], here / "out" / "indices.csv"]:
+def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_before(
+    whole: Path, here: Path
+) -> None:
+    shutil.copytree(whole, here / "again")
+    for path in [*sorted((here / "again" / "points").iterdir())[3::4], here / "again" / "indices.csv"]:
         path.unlink()
-    assert main([*QUIET, "--second"]) == 0
-    assert files(here / "out") == files(whole)
+    page = (whole / "study.md").read_text(encoding="utf-8")
+    command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
+    assert main([*command.split()[1:-1], "again", "--workers", "1", "--quiet"]) == 0
+    assert files(Path("again")) == files(whole)
 
 
 def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,16 +158,12 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path)
     assert all(row["index"] for row in rows(here / "out" / "indices.csv"))
 
 
-def test_an_output_that_no_run_has_is_omitted_and_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*STUDY[:-1], "rfd,relief", "--samples", "4", "--out", "out"]) == 0
-    said = capsys.readouterr().out
-    assert "No run has the metric ridge_error without losing the fingertip." in said
-    assert {row["output"] for row in rows(Path("out/indices.csv"))} == {"rfd"}
-
-
-def test_another_metric_can_be_had_of_a_finished_study(whole: Path, here: Path) -> None:
+def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is_omitted_and_told(
+    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     shutil.copytree(whole, here / "out")
-    assert main([*QUIET[:-4], "highest", "--second", "--quiet", "--out", "out"]) == 0
+    assert main([*STUDY[:-1], "highest,relief", "--second", "--out", "out"]) == 0
+    assert "No run has the metric ridge_error without losing the fingertip." in capsys.readouterr().out
     assert {row["output"] for row in rows(here / "out" / "indices.csv")} == {"highest"}
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.sweep_plan import Folder
@@ -97,24 +98,24 @@ def test_the_chosen_scene_is_a_scene_file_that_gives_the_same_metrics(whole: Pat
     # A stack takes sums in another order than a run by itself.
     near = np.isclose(values(whole / "front.csv"), [metrics["rfd"], metrics["lag_mean"]], rtol=1e-9)
     assert np.all(near, axis=1).any()
+    # A preset of Blender is a file of this text.
+    assert (whole / "chosen.toml").read_text(encoding="utf-8") == format_scene(scene)
     assert scene.name == "my_tuned"
     assert scene.description.startswith("Chosen by digiclay tune from 32 runs, knee of the front: rfd ")
 
 
-@pytest.mark.parametrize(("metric", "column"), [("rfd", 0), ("lag", 1)])
 def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(
-    metric: str, column: int, whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
+    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(whole, here / "out")
-    assert main([*TUNE[:-1], "--generations", "4", "--choose", metric]) == 0
+    assert main([*TUNE[:-1], "--generations", "4", "--choose", "lag"]) == 0
     front = values(here / "out" / "front.csv")
-    chosen = front[np.argmin(front[:, column])]
     metrics = run(load(here / "out" / "chosen.toml")).metrics
-    assert [metrics["rfd"], metrics["lag_mean"]] == pytest.approx(chosen, rel=1e-9)
-    assert f"chosen ({'lag_mean' if column else 'rfd'}): rfd " in capsys.readouterr().out
+    assert [metrics["rfd"], metrics["lag_mean"]] == pytest.approx(front[np.argmin(front[:, 1])], rel=1e-9)
+    assert "chosen (lag_mean): rfd " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("left", [0, 1, 9, 20, ALL - 1])
+@pytest.mark.parametrize("left", [1, 20])
 def test_a_tuning_of_which_points_are_missing_proposes_the_same_ones_again(
     left: int, whole: Path, here: Path
 ) -> None:
