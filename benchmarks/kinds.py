@@ -7,7 +7,18 @@ import argparse
 from digiclay.commands.arguments import Help
 from digiclay.commands.parser import Parser
 
-from . import bed_size, mesh_export, precision, runs_together, session_parts, stiff, terms, ticks, viewport
+from . import (
+    bed_size,
+    made,
+    mesh_export,
+    precision,
+    runs_together,
+    session_parts,
+    stiff,
+    terms,
+    ticks,
+    viewport,
+)
 
 __all__ = ["parser"]
 
@@ -22,6 +33,7 @@ examples:
   python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
   python -m benchmarks ticks          how the time of a tick is distributed
+  python -m benchmarks made           things formed by recorded strokes, beside what was intended
 """
 
 
@@ -36,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     )
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
     for kind in (
-        session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together,
+        session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
     ):  # fmt: skip
         kind.add(kinds)
     return top

@@ -58,7 +58,7 @@ def note(blender: Any, name: str) -> None:
     bed = blender.beds()[0]
     session = blender.part("live.running").find(bed)
     area, _ = blender.view()
-    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(25, 25)
+    height = blender.part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
     blender.SEEN[name] |= {
         "bed": (1e3 * height).round(3).tolist(),
         "drawn": session.finished_strokes if session else 0,

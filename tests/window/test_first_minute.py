@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.settings.beds import BEDS, FIRST
 
 from tests.window.blender_window import played
 
 REST = 40.0
+#: Half the length of the stroke, mm.
+HALF = 27.0
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +23,12 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
     assert seen["added"] == 1
-    # The factory file looks from 17 units away at its cube; bed and fingertip are 0.9 units wide.
-    assert 0.5 < seen["distance"] < 3.0
+    # The factory file looks from 17 units away at its cube; bed and fingertip are 1.6 units wide.
+    assert 1.0 < seen["distance"] < 6.0
+
+
+def test_add_makes_a_bed_to_design_on(seen: dict[str, Any]) -> None:
+    assert np.array(seen["drawn"]["bed"]).shape == (BEDS[FIRST].rows, BEDS[FIRST].columns) == (100, 100)
 
 
 def test_start_sculpting_takes_the_press_tool_in_hand(seen: dict[str, Any]) -> None:
@@ -30,7 +37,9 @@ def test_start_sculpting_takes_the_press_tool_in_hand(seen: dict[str, Any]) -> N
 
 
 def test_the_first_form_is_drawn_within_a_minute(seen: dict[str, Any]) -> None:
-    row = REST - np.array(seen["drawn"]["bed"])[12, 4:21]
+    bed = BEDS[FIRST]
+    along = np.abs(np.arange(bed.columns) - (bed.columns - 1) / 2) * bed.pitch < HALF * 1e-3
+    row = REST - np.array(seen["drawn"]["bed"])[bed.rows // 2, along]
     assert (row > 1.0).mean() > 0.9
     assert seen["took"] < 60.0
 

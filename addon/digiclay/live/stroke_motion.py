@@ -23,7 +23,7 @@ from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
 from .lean import advance_turn
 from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
-from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, Place, cross, drag, finish_image, run_clock
+from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, SPAN, Place, cross, drag, finish_image, run_clock
 from .tracking import Tracking
 
 __all__ = ["APPROACH", "SPEED", "follow"]
@@ -140,7 +140,7 @@ def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: floa
     assert height is not None
     x, y, z = place
     if stroke.phase == DRAGGING:
-        stroke, x, y = drag(stroke, x, y, DRAG * period)
+        stroke, x, y = drag(stroke, x, y, min(DRAG, SPAN * radius) * period)
     surface = find_ground_height(grid, height, x, y, radius)
     # Pins bottom out on the bed's floor.
     if stroke.tracking is None:

@@ -13,7 +13,7 @@ from ..device.instant import Instant, find_ellipsoid
 from ..device.roles import BALL
 from ..device.view import bed_of
 from ..settings import own_presets, properties
-from ..settings.beds import BEDS, FIRST
+from ..settings.beds import BEDS, FIRST, UNNAMED
 from ..settings.declared import title
 from ..settings.devices import make_scene
 from ..settings.groups import PRESET_WORDS, method_items
@@ -67,7 +67,7 @@ class AddBed(Action, bpy.types.Operator):
         name="Bed",
         description="Number and distance of the pins, and size of fingertip and blister",
         items=[(name, title(name), bed.use) for name, bed in BEDS.items()],
-        default=FIRST,
+        default=UNNAMED,
         update=take_bed,
     )
     rows: bpy.props.IntProperty(
@@ -121,13 +121,15 @@ class AddBed(Action, bpy.types.Operator):
         return edited(context, "Leave Edit Mode first: the device is an object of its own")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Add it, and show all of it; the redo panel leaves the view as it is then.
+        """Add it by hand, at first the bed to design on, and show all of it; the redo panel leaves the view.
 
         Parameters
         ----------
         context : bpy.types.Context
         event : bpy.types.Event
         """
+        if not self.properties.is_property_set("bed"):
+            self.bed = FIRST
         done = self.execute(context)
         if done == {"FINISHED"}:
             frame(context, bed_of(context))

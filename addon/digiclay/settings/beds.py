@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..core.model.layout import Layout
 
-__all__ = ["BEDS", "FIRST", "Bed"]
+__all__ = ["BEDS", "FIRST", "UNNAMED", "Bed"]
 
 
 @dataclass(frozen=True)
@@ -46,5 +46,7 @@ BEDS = {
         "22,500 pins, fingertip and blister a third as large: for details, on a fast computer",
     ),
 }  # fmt: skip
-#: What Add offers first by hand.
-FIRST = "paper"
+#: Bed that Add makes by hand unless another is chosen: a letter can be read on it (docs/gallery.md).
+FIRST = "design"
+#: Bed that Add makes in a script that names none, as before there were several.
+UNNAMED = "paper"

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..core.base.quantity import list_quantities
+from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load
 from ..core.scene.schema import Finger, Scene
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from ..core.control.blister import Blister
     from ..core.control.methods import ControlParameters
 
-__all__ = ["change_layout", "fit_blister", "make_scene"]
+__all__ = ["change_finger", "change_layout", "fit_blister", "make_scene"]
 
 #: Bore of the cylinders, as a share of the pitch, where a preset's would overlap.
 BORE = 2 / 3
@@ -63,6 +64,23 @@ def change_layout(scene: Scene, layout: Layout) -> Scene:
         actuator = replace(actuator, bore=BORE * layout.pitch)
     blister = scene.blister and fit_blister(scene.blister, layout)
     return replace(scene, layout=layout, actuator=actuator, blister=blister)
+
+
+def change_finger(scene: Scene, before: Fingertip, finger: Fingertip) -> Scene:
+    """Return a scene with another fingertip, and with a blister in proportion to its width.
+
+    Parameters
+    ----------
+    scene : Scene
+    before : Fingertip
+        Its present one.
+    finger : Fingertip
+    """
+    blister = scene.blister
+    if blister is not None:
+        blister = fit_blister(_scale_blister(blister, finger.width / before.width), scene.layout)
+    fingers = tuple(replace(one, fingertip=finger) for one in scene.fingers)
+    return replace(scene, fingers=fingers, blister=blister)
 
 
 def _scale_finger(scene: Scene, share: float) -> Scene:

@@ -1,0 +1,209 @@
+"""Recorded strokes of the Press tool: their file, and their replay in a live session. No Blender.
+
+A file has the bed's name and a table a stroke: what the header of the tool was set to, and the times and
+places of the pointer. The replay hands each move to the session when its time has come, as the tool does,
+and waits until the fingertip has finished a stroke before the next one begins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from ..core.base.errors import ParameterError, SceneError, StateError
+from ..core.base.part_table import read_part, refuse_unknown, show_value
+from ..core.base.quantity import Parameters, quantity
+from ..core.model.fingertip import Fingertip
+from ..core.scene.scene_source import read_table
+from ..core.scene.schema import Scene
+from ..device.instant import find_ellipsoid
+from ..settings.beds import BEDS
+from ..settings.devices import change_finger
+from .running import Running
+from .sculpting import change_scene, follow_finger
+from .stroke import DEEPEST, SHALLOWEST, SYMMETRIES, Brush, Stroke, draw
+from .stroke_path import lay_line, lay_path, lay_ring, pull
+from .stroke_queue import change_stroke, find_stroke, queue_stroke
+from .tracking import find_tracking
+
+__all__ = ["PointerStroke", "Recorded", "play_strokes", "read_strokes"]
+
+#: Ticks a second of the replay.
+RATE = 60.0
+#: How long the hand rests when the fingertip has finished a stroke, s: the pins come to rest meanwhile.
+REST = 0.3
+#: Longest that the fingertip may need for a stroke beyond the hand's time, s.
+PATIENCE = 300.0
+#: Keys of a file beside its strokes.
+TEXTS = ("name", "description", "bed")
+Move = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PointerStroke(Parameters):
+    """Stroke of the pointer, and the settings of the Press tool during it."""
+
+    brush: str = quantity(
+        Brush.LOWER.value.lower(), "effect on the surface", choices=tuple(one.value.lower() for one in Brush)
+    )
+    ctrl: bool = quantity(False, "whether Ctrl is held, which inverts the brush")
+    depth: float = quantity(4e-3, "depth of Lower", unit="m", at_least=SHALLOWEST, at_most=DEEPEST)
+    height: float = quantity(15e-3, "height of Raise", unit="m", at_least=SHALLOWEST, at_most=DEEPEST)
+    strength: float = quantity(1.0, "share of depth, height or way to the level", above=0.0, at_most=1.0)
+    path: str = quantity("free", "path between the moves", choices=("free", "line", "ring"))
+    symmetry: str = quantity("none", "mirror images", choices=tuple(name.lower() for name in SYMMETRIES))
+    stabilizer: float = quantity(0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3)
+    length: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
+    width: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
+    thickness: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
+    moves: tuple[Move, ...] = quantity(((0.0, 0.0, 0.0),), "time, s, and place, m, of the pointer")
+
+    def check(self) -> None:
+        """Times begin at 0 and never go back; a move has three finite numbers."""
+        wrong = [move for move in self.moves if len(move) != 3 or not all(map(math.isfinite, move))]
+        if wrong:
+            rule = "must be lists of time, x and y, finite numbers"
+            raise ParameterError("PointerStroke", "moves", rule, str(list(wrong[0])))
+        times = [move[0] for move in self.moves]
+        late = [times[0]] if times[0] != 0.0 else [later for one, later in pairwise(times) if later < one]
+        if late:
+            rule = "must begin at 0 s and be in the order of time"
+            raise ParameterError("PointerStroke", "moves", rule, f"{late[0]:g} s")
+
+    @property
+    def kind(self) -> Brush:
+        """Brush that the stroke is formed with."""
+        brush = Brush(self.brush.upper())
+        return brush.inverse if self.ctrl else brush
+
+    @property
+    def amount(self) -> float:
+        """Depth or height with its strength, m."""
+        return self.strength * (self.height if self.kind is Brush.RAISE else self.depth)
+
+    def size_finger(self, usual: Fingertip) -> Fingertip:
+        """Return the fingertip of the stroke; what it leaves open is that of the bed."""
+        return Fingertip(
+            0.5 * self.length or usual.length, 0.5 * self.width or usual.width,
+            0.5 * self.thickness or usual.height,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Strokes of a file, and the bed they were drawn on: a name of `settings.beds.BEDS`."""
+
+    name: str
+    bed: str
+    strokes: tuple[PointerStroke, ...]
+
+
+def read_strokes(path: Path) -> Recorded:
+    """Read a file of recorded strokes.
+
+    Raises
+    ------
+    SceneError
+        One line: file, stroke, key, rule, value.
+    """
+    table = read_table(path)
+    try:
+        refuse_unknown("", table, (*TEXTS, "stroke"))
+        name, bed = (_read_text(table, key, usual) for key, usual in (("name", path.stem), ("bed", "design")))
+        if bed not in BEDS:
+            raise ParameterError("bed", "", f"must be one of {', '.join(BEDS)}", repr(bed))
+        given = table.get("stroke", [])
+        if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
+            raise ParameterError("stroke", "", "must be a list of tables, [[stroke]]", show_value(given))
+        strokes = tuple(
+            read_part(f"stroke #{number}", PointerStroke, {}, one) for number, one in enumerate(given, 1)
+        )
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+    return Recorded(name, bed, strokes)
+
+
+def _read_text(table: Mapping[str, Any], key: str, usual: str) -> str:
+    """Return a text of the file."""
+    value = table.get(key, usual)
+    if not isinstance(value, str):
+        raise ParameterError(key, "", "must be a text", show_value(value))
+    return value
+
+
+def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterator[Running]:
+    """Play strokes in a session, as fast as the machine can; yield the session after each of them.
+
+    Parameters
+    ----------
+    running : Running
+        Used up. At the end its fingertip has the size that it has now.
+    strokes : tuple of PointerStroke
+
+    Raises
+    ------
+    DigiclayError
+        When a brush needs a blister that the method has not, or the session diverges.
+    """
+    usual = running.scene
+    for number, stroke in enumerate(strokes, 1):
+        running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
+        needs_blister = stroke.kind in (Brush.RAISE, Brush.LEVEL)
+        if needs_blister and find_tracking(running.scene, running.system) is None:
+            raise StateError(f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister.")
+        running = _play(running, stroke, number)
+        yield running
+    last, _ = change_scene(running, usual)
+    yield last
+
+
+def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
+    """Return the session with a fingertip of another size, and a blister in proportion."""
+    return change_scene(running, change_finger(usual, find_ellipsoid(usual), finger))[0]
+
+
+def _play(running: Running, stroke: PointerStroke, number: int) -> Running:
+    """Draw a stroke, and let the session go on until the fingertip has finished it and the pins rest."""
+    (_, x, y), last = stroke.moves[0], stroke.moves[-1][0]
+    running = replace(running, clock=running.clock.stopped())
+    running, known = queue_stroke(
+        running, x, y, stroke.amount, SYMMETRIES[stroke.symmetry.upper()], stroke.kind, stroke.strength
+    )
+    drawn, place, time = 1, (x, y), 0.0
+    if stroke.path != "free":
+        lay = lay_line if stroke.path == "line" else lay_ring
+        points = lay(place, stroke.moves[-1][1:])
+        running = change_stroke(running, known, partial(lay_path, points=points))
+        drawn = len(stroke.moves)
+    while find_stroke(running, known) is not None:
+        time += 1.0 / RATE
+        while drawn < len(stroke.moves) and stroke.moves[drawn][0] <= time:
+            moved, x, y = stroke.moves[drawn]
+            drawn += 1
+            # Released, the stroke goes on to the pointer.
+            string = stroke.stabilizer if drawn < len(stroke.moves) else 0.0
+            place = pull(place, (x, y), string)
+            running = change_stroke(running, known, partial(_draw, time=moved, place=place, stroke=stroke))
+        held = drawn < len(stroke.moves)
+        running = _tick(change_stroke(running, known, partial(replace, held=held, known=time)))
+        if time > last + PATIENCE:
+            raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
+    for _ in range(round(REST * RATE)):
+        running = _tick(running)
+    return running
+
+
+def _draw(drawn: Stroke, time: float, place: tuple[float, float], stroke: PointerStroke) -> Stroke:
+    """Return a stroke drawn on by a move of the pointer."""
+    return draw(drawn, time, *place, stroke.amount, stroke.strength)
+
+
+def _tick(running: Running) -> Running:
+    """Simulate the control periods of a tick, whatever time they take."""
+    count = max(1, round(1.0 / (RATE * running.system.period)))
+    return follow_finger(replace(running, tick=running.tick + 1), running.pose, count)

@@ -1,0 +1,148 @@
+"""Recorded strokes of the Press tool: their file, and that a replay forms what a hand's strokes form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import ParameterError, SceneError, StateError
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.scene.toml_table import resolve
+from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.live.running import Running
+from digiclay.live.sculpting import begin_session
+from digiclay.live.stroke import Brush
+from digiclay.settings.beds import FIRST
+
+from benchmarks.intended_reliefs import RELIEFS, find_relief
+from benchmarks.made_things import STROKES, make
+from tests.hand import heights
+
+ALONG = ((0.0, -9e-3, 0.0), (0.1, 0.0, 0.0), (0.2, 9e-3, 0.0))
+STROKE = "[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.01, 0]]\n"
+
+
+def begin(**control: object) -> Running:
+    """Return a session of a small bed."""
+    scene = resolve({"layout": {"rows": 11, "columns": 15}, "control": control})
+    return begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
+
+
+def play(*strokes: PointerStroke) -> Running:
+    """Play strokes on a small bed."""
+    *_, session = play_strokes(begin(), strokes)
+    return session
+
+
+def test_a_replay_presses_along_the_whole_stroke() -> None:
+    session = play(PointerStroke(moves=ALONG))
+    risen = 1e3 * (heights(session) - 40e-3).reshape(11, 15)
+    assert (risen[5, 4:11] < -2.0).all()
+    # The blister reaches 15 mm to each side.
+    assert np.abs(risen[0]).max() < 0.1
+    assert (session.strokes, session.finished_strokes) == ((), 1)
+
+
+def test_a_replay_is_the_same_each_time() -> None:
+    once, again = (heights(play(PointerStroke(moves=ALONG))) for _ in range(2))
+    np.testing.assert_array_equal(once, again)
+
+
+def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
+    line = PointerStroke(moves=((0.0, 9e-3, -6e-3), (0.3, 9e-3, 6e-3)), path="line", symmetry="x")
+    deep = 1e3 * (40e-3 - heights(play(line)).reshape(11, 15))
+    half = 1e3 * (40e-3 - heights(play(replace(line, strength=0.5))).reshape(11, 15))
+    assert deep[5, 10] > 2.0
+    assert deep[5, 4] == pytest.approx(deep[5, 10], abs=0.3)
+    assert half[5, 10] < deep[5, 10] - 1.0
+
+
+def test_ctrl_inverts_the_brush() -> None:
+    assert PointerStroke(ctrl=True).kind is Brush.RAISE
+    assert PointerStroke(ctrl=True).amount == 15e-3
+
+
+def test_a_stroke_has_its_own_fingertip_and_the_bed_has_its_own_again_after_it() -> None:
+    begun = begin()
+    sessions = list(play_strokes(begun, (PointerStroke(width=6e-3, moves=ALONG),)))
+    sizes = [one.scene.fingers[0].fingertip.width for one in sessions]
+    assert sizes == [3e-3, 8e-3]
+    blisters = [one.scene.blister.radius for one in sessions]
+    assert blisters[0] == pytest.approx(3 / 8 * begun.scene.blister.radius)
+    assert sessions[-1].scene == begun.scene
+
+
+def test_a_brush_without_its_blister_is_refused_in_one_line() -> None:
+    with pytest.raises(StateError, match=r"^Stroke 1 \(raise\) needs a method with a blister\.$"):
+        list(play_strokes(begin(method="elastic"), (PointerStroke(brush="raise"),)))
+
+
+def test_a_file_gives_its_strokes(tmp_path: Path) -> None:
+    path = tmp_path / "two.toml"
+    path.write_text(f'bed = "paper"\n{STROKE}depth = "2 mm"\n{STROKE}brush = "level"\n', encoding="utf-8")
+    recorded = read_strokes(path)
+    assert (recorded.name, recorded.bed, len(recorded.strokes)) == ("two", "paper", 2)
+    assert (recorded.strokes[0].depth, recorded.strokes[1].kind) == (2e-3, Brush.LEVEL)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", r"stroke must be a list of tables, \[\[stroke\]\]"),
+        ("stroke = 3", r"stroke must be a list of tables"),
+        (f'bed = "huge"\n{STROKE}', r"bed must be one of paper, design, fine \(got 'huge'\)"),
+        (f"{STROKE}dept = 1", r"Did you mean stroke #1\.depth\?"),
+        (f"{STROKE}depth = nan", r"stroke #1\.depth must be a finite number"),
+        (f"{STROKE}depth = -1", r"stroke #1\.depth must be at least"),
+        (f'{STROKE}brush = "smear"', r"stroke #1\.brush must be one of"),
+        ("[[stroke]]\nmoves = []", r"stroke #1\.moves must be a list"),
+        ("[[stroke]]\nmoves = [[0, 0]]", r"stroke #1\.moves must be lists of time, x and y"),
+        ("[[stroke]]\nmoves = [[0, nan, 0]]", r"stroke #1\.moves must be lists of time, x and y"),
+        ("[[stroke]]\nmoves = [[0, 1, 0], [-1, 0, 0]]", r"stroke #1\.moves must begin at 0 s .*\(got -1 s\)"),
+        ("[[stroke]]\nmoves = [[2, 0, 0]]", r"stroke #1\.moves must begin at 0 s .*\(got 2 s\)"),
+        ("[[stroke", r"line 1"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=said) as caught:
+        read_strokes(path)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="cannot be read"):
+        read_strokes(tmp_path / "none.toml")
+
+
+def test_moves_are_checked_in_python_too() -> None:
+    with pytest.raises(ParameterError, match="order of time"):
+        PointerStroke(moves=((0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.1, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("name", RELIEFS)
+def test_each_thing_has_strokes_at_a_hands_speed_and_a_relief_that_ends_within_the_bed(name: str) -> None:
+    recorded = read_strokes(STROKES / f"{name}.toml")
+    for stroke in recorded.strokes:
+        moves = np.array(stroke.moves)
+        steps = np.linalg.norm(np.diff(moves[:, 1:], axis=0), axis=1)
+        # A hand draws at some 0.1 m/s, and tells of its moves some 30 times a second.
+        assert (steps <= 0.3 * np.diff(moves[:, 0]) + 1e-3).all()
+        assert np.abs(moves[:, 1:]).max() < 75e-3
+    border = np.linspace(-75e-3, 75e-3, 101)
+    edges = [find_relief(name, *at) for at in ((border, border * 0 + 75e-3), (border * 0 - 75e-3, border))]
+    np.testing.assert_allclose(edges, 0.0, rtol=0, atol=1e-6)
+
+
+def test_a_letter_can_be_read_on_the_bed_that_add_offers_first_and_not_on_the_papers() -> None:
+    design, paper = make("letter_a"), make("letter_a", "paper")
+    assert design.bed == FIRST
+    assert design.correlation > 0.9
+    assert paper.correlation < 0.6
+    # A relief of another height would correlate as well: it is as deep as intended, to a fifth.
+    assert design.slope == pytest.approx(1.0, abs=0.25)
+    assert design.error < 1e-3
