@@ -22,13 +22,13 @@ LETTER_A: tuple[Corners, ...] = (
     ((46.0, -53.0), (34.0, -53.0), (-6.0, 53.0), (6.0, 53.0)),
     ((-28.0, -17.5), (28.0, -17.5), (28.0, -6.5), (-28.0, -6.5)),
 )
-LETTER_DEPTH = 6.0
+LETTER_DEPTH = 5.0
 #: Half of a torus: radius of its center line, and of its tube.
 RING, TUBE = 45.0, 8.0
 #: Paraboloid of a bowl: radius and depth; its rim: radius, height and half its breadth.
 BOWL, RIM = (44.0, 12.0), (48.0, 5.0, 10.0)
 #: Leaf between two arcs from tip to tip, each so far from the midrib at most; half the breadth of its lines.
-TIPS, BULGE, LINE = ((0.0, -55.0), (0.0, 60.0)), 34.0, 5.0
+TIPS, BULGE, LINE = ((0.0, -55.0), (0.0, 60.0)), 34.0, 6.0
 #: Heights of outline and midrib, and of the veins; the midrib goes on as a stalk to here.
 OUTLINE_HEIGHT, VEIN_HEIGHT, STALK = 5.0, 3.0, -70.0
 #: Beginnings and ends of the veins on the right.

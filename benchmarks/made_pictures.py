@@ -24,9 +24,11 @@ from .made_things import Made
 __all__ = ["draw_made", "draw_relief"]
 
 #: Size of one of the two pictures, pixels, and samples a pixel.
-WIDTH, HEIGHT, SAMPLES = 640, 500, 16
+WIDTH, HEIGHT, SAMPLES = 640, 500, 6
 #: Turn of the bed, so that its lower edge is in front, rad; what is kept free around it, by sides.
 TURN, MARGINS = radians(28.0), (0.04, 0.04, 0.05, 0.12)
+#: How far the housing ends below the lowest pin, m.
+CLEAR = 1e-3
 #: Size of the letters, pixels, their distance from the corner, and their color.
 LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 
@@ -49,15 +51,16 @@ def draw_made(made: Made, out: Path) -> Path:
         f"{made.title}: formed on the bed {made.bed}, correlation {made.correlation:.3f}",
         f"{made.title}: intended",
     )
+    lowest = min(float(made.formed.min()), float(made.intended.min()))
     with tempfile.TemporaryDirectory() as folder:
         files = [
-            draw_relief(made.scene, height, Path(folder) / f"{number}.png")
+            draw_relief(made.scene, height, lowest, Path(folder) / f"{number}.png")
             for number, height in enumerate((made.formed, made.intended))
         ]
         return join(files, words, out)
 
 
-def draw_relief(scene: Scene, relief: NDArray[Any], out: Path) -> Path:
+def draw_relief(scene: Scene, relief: NDArray[Any], lowest: float, out: Path) -> Path:
     """Draw the skin over a bed's pins, without fingertip.
 
     Parameters
@@ -65,15 +68,17 @@ def draw_relief(scene: Scene, relief: NDArray[Any], out: Path) -> Path:
     scene : Scene
     relief : ndarray (n,)
         Heights of the pins above rest, m.
+    lowest : float
+        Lowest place of a pin's top in the pictures to be compared, above rest, m.
     out : Path
         The PNG.
     """
-    looks = Still(width=WIDTH, height=HEIGHT, samples=SAMPLES)
+    looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)
     instant = replace(rest, height=rest.height + relief)
     with scratch():
         drawn = add_picture_scene("Digital Clay Made Thing", looks)
-        bed = view.build(instant, drawn.collection)
+        bed = view.build(instant, drawn.collection, scene.actuator.rest_height + lowest - CLEAR)
         apply_style(bed, looks)
         form.set_form(bed, "skin")
         bed.rotation_euler.z = TURN
@@ -81,7 +86,9 @@ def draw_relief(scene: Scene, relief: NDArray[Any], out: Path) -> Path:
         if tip is not None:
             for part in (tip, *tip.children_recursive):
                 part.hide_render = True
-        stage.set_up(drawn, bed, instant, points=stage.outline(bed)[: len(relief)], modes=(), margins=MARGINS)
+        points = stage.outline(bed)
+        below = points[points[:, 2] <= points[: len(relief), 2].max()]  # without the fingertip
+        stage.set_up(drawn, bed, instant, points=below, modes=(), margins=MARGINS)
         render_picture(drawn, out, out)
     return out
 

@@ -55,7 +55,8 @@ def test_symmetry_strength_and_line_are_those_of_the_tool() -> None:
     deep = 1e3 * (40e-3 - heights(play(line)).reshape(11, 15))
     half = 1e3 * (40e-3 - heights(play(replace(line, strength=0.5))).reshape(11, 15))
     assert deep[5, 10] > 2.0
-    assert deep[5, 4] == pytest.approx(deep[5, 10], abs=0.3)
+    # The second image is pressed beside the first one.
+    assert deep[5, 4] == pytest.approx(deep[5, 10], abs=0.6)
     assert half[5, 10] < deep[5, 10] - 1.0
 
 
