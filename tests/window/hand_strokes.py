@@ -79,11 +79,11 @@ def reset(blender: Any) -> Iterator[float | None]:
     yield from blender.settle(5)
 
 
-def add_bed(blender: Any) -> None:
+def add_bed(blender: Any, **chosen: Any) -> None:
     """Have a bed alone in the scene, in full view."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
-    blender.call(bpy.ops.mesh.digital_clay_add)
+    blender.call(bpy.ops.mesh.digital_clay_add, **chosen)
     blender.call(bpy.ops.view3d.view_all)
     # A frame takes software GL half a second: the session catches up between two of them.
     entry = bpy.context.preferences.addons.new()

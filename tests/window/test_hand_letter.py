@@ -1,0 +1,32 @@
+"""The letter A of the gallery, drawn by a hand in a window, is what was intended: X events from outside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.settings.beds import BEDS
+
+from benchmarks.intended_reliefs import find_relief
+from tests.window.blender_window import played
+
+REST = 40.0
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Play the script once; return what stood in the scene at its end."""
+    return played("hand_letter.py", tmp_path_factory.mktemp("letter"), size=(800, 560), by_hand=True)
+
+
+def test_a_letter_drawn_by_a_hand_is_what_was_intended(seen: dict[str, Any]) -> None:
+    bed = BEDS["design"]
+    grid = make_grid(Layout(rows=bed.rows, columns=bed.columns, pitch=bed.pitch))
+    intended = find_relief("letter_a", *grid.positions.T)
+    formed = 1e-3 * (np.array(seen["formed"]["bed"]).ravel() - REST)
+    assert seen["formed"]["drawn"] == 3
+    assert np.corrcoef(formed, intended)[0, 1] >= 0.9
+    slope = np.cov(formed, intended)[0, 1] / intended.var(ddof=1)
+    assert 0.75 <= slope <= 1.25
