@@ -99,7 +99,7 @@ def measure(rows: int, columns: int, pitch: float, bore: float, ticks: int) -> T
                     bpy.context.evaluated_depsgraph_get()
                     ended = time.perf_counter(), time.process_time()
                     if count >= WARM_UP:
-                        clock["evaluate"] = ended[1] - evaluating
+                        clock["evaluate"] += ended[1] - evaluating
                         clock["simulate"] -= clock["monitor"] + clock["pack"]
                         elapsed.append(ended[0] - began[0])
                         spent.append(ended[1] - began[1])
@@ -147,8 +147,8 @@ def _time_parts() -> Iterator[_Clock]:
     clock = _Clock()
     places = [
         (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "follow", "monitor"),
-        (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"), (tick, "place_finger", "finger"),
-        (bed_state, "write", "store"), (view, "show_state", "show"),
+        (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
+        (tick, "_evaluate", "evaluate"), (bed_state, "write", "store"), (view, "show_state", "show"),
     ]  # fmt: skip
     former = [(module, name, getattr(module, name)) for module, name, _ in places]
     for module, name, part in places:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from .device.primitives import Shape
 from .device.roles import ELLIPSOID, ROLE
 
 __all__ = [
-    "SCALE", "finger_of", "linear", "mesh", "place_fingertip", "points", "pose", "read_cells",
-    "resize_fingertip", "srgb", "uniform", "write_cells",
+    "SCALE", "finger_of", "linear", "mesh", "move_fingertip", "place_fingertip", "points", "pose",
+    "read_cells", "resize_fingertip", "srgb", "uniform", "write_cells",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -119,12 +120,27 @@ def place_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
         Lowest point, m, and quaternion w, x, y, z.
     finger : Fingertip
     """
+    move_fingertip(tip, at, finger)
+    resize_fingertip(tip, finger)
+
+
+def move_fingertip(tip: Any, at: Floats, finger: Fingertip) -> None:
+    """Put the fingertip to a pose; the size of its ellipsoid stays.
+
+    Parameters
+    ----------
+    tip : bpy.types.Object
+        The empty, in the space of its bed.
+    at : ndarray (7,)
+        Lowest point, m, and quaternion w, x, y, z.
+    finger : Fingertip
+        Of that size.
+    """
     tip.matrix_parent_inverse.identity()
     tip.rotation_mode = "QUATERNION"
     tip.rotation_quaternion = at[3:]
     tip.location = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
     tip.scale = (1.0, 1.0, 1.0)
-    resize_fingertip(tip, finger)
 
 
 def resize_fingertip(tip: Any, finger: Fingertip) -> None:
@@ -184,22 +200,30 @@ def uniform(bed: Any) -> float:
         When the bed, or what it is parented to, is scaled differently along its axes, sheared,
         mirrored, or scaled to nothing: lengths in it would mean nothing.
     """
-    matrix = np.array(bed.matrix_world, np.float64)[:3, :3]
+    scale, fault = _judge_scale(tuple(tuple(row) for row in bed.matrix_world))
+    if fault:
+        remedy = "Set it with Object > Apply or in the sidebar's Item tab."
+        raise DigiclayError(f"The scale of {bed.name}, that of its parents included, {fault}. {remedy}")
+    return scale
+
+
+@lru_cache(maxsize=32)  # A session asks in every tick, and a bed seldom moves.
+def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
+    """Return the largest scale of a matrix (4, 4), and why it is not uniform; empty: it is."""
+    matrix = np.array(rows)[:3, :3]
     scales = np.linalg.norm(matrix, axis=0)
     largest = float(scales.max())
     shown = " x ".join(f"{scale:.4g}" for scale in scales)
-    name = f"The scale of {bed.name}, that of its parents included,"
-    remedy = "Set it with Object > Apply or in the sidebar's Item tab."
     if not np.isfinite(matrix).all() or scales.min() <= SMALLEST_SCALE:
-        raise DigiclayError(f"{name} must be above 0 along x, y and z (got {shown}). {remedy}")
+        return largest, f"must be above 0 along x, y and z (got {shown})"
     angles = matrix.T @ matrix / np.outer(scales, scales) - np.eye(3)
     if np.abs(angles).max() > UNEVEN:
-        raise DigiclayError(f"{name} must not shear it (got {shown}, sheared). {remedy}")
+        return largest, f"must not shear it (got {shown}, sheared)"
     if np.ptp(scales) > UNEVEN * largest:
-        raise DigiclayError(f"{name} must be the same along x, y and z (got {shown}). {remedy}")
+        return largest, f"must be the same along x, y and z (got {shown})"
     if np.linalg.det(matrix) < 0.0:
-        raise DigiclayError(f"{name} must not mirror it (got {shown}, mirrored). {remedy}")
-    return largest
+        return largest, f"must not mirror it (got {shown}, mirrored)"
+    return largest, ""
 
 
 def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:

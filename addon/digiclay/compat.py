@@ -59,6 +59,21 @@ def node_setting(modifier: Any, name: str) -> Any:
     return modifier[identifier]
 
 
+def read_stored(owner: Any, name: str) -> dict[str, Any]:
+    """Return all that is stored in a property group of an object, nested; what was never set is not in it.
+
+    Parameters
+    ----------
+    owner : bpy.types.ID
+    name : str
+        Of the group.
+    """
+    # From 5.0 on these values are kept apart from the custom properties.
+    kept = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
+    group = kept.get(name) if kept is not None else None
+    return group.to_dict() if group is not None else {}
+
+
 def set_node_setting(modifier: Any, name: str, value: Any) -> None:
     """Set an input of a geometry nodes modifier's tree, for the object that has the modifier.
 

@@ -186,6 +186,8 @@ class Running:
         How many strokes the finger has finished.
     last_place : (float, float) or None
         Where the last of those ended, x and y, m.
+    settings : tuple or None
+        Settings of the bed, as Blender stores them, of which `scene` was made; None: they are not known.
     """
 
     uid: int
@@ -212,6 +214,7 @@ class Running:
     stroke_start: Gesture | None = None
     finished_strokes: int = 0
     last_place: tuple[float, float] | None = None
+    settings: tuple[Any, ...] | None = None
 
     @property
     def factor(self) -> float:

@@ -242,6 +242,7 @@ def change_scene(running: Running, scene: Scene) -> tuple[Running, str]:
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
     other = replace(
         other,
+        clock=running.clock,
         paused=running.paused,
         blocking_reason=running.blocking_reason,
         trace=trace,

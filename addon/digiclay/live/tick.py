@@ -24,9 +24,6 @@ from .waiting import blocking_reason, find_bed
 
 __all__ = ["Note", "place_finger", "show", "start", "stop", "tick", "withdraw_strokes"]
 
-#: Ticks from one look at the bed's settings to the next.
-LOOK = 8
-
 
 class Note(NamedTuple):
     """Message to the user: level of Blender's operator reports, and text."""
@@ -50,7 +47,7 @@ def start(context: Any, bed: Any) -> list[Note]:
     """
     if is_baked(bed):
         raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
-    scene, notes = properties.scene_of(bed), []
+    settings, scene, notes = properties.read_stored_settings(bed), properties.scene_of(bed), []
     if bed.data.users > 1:
         bed.data = bed.data.copy()
         notes.append(Note("INFO", f"{bed.name} got pins of its own: it shared them with another bed"))
@@ -65,7 +62,7 @@ def start(context: Any, bed: Any) -> list[Note]:
         bed.session_uid, bed.name, scene, bridge.pose(view.fingertip_of(bed)),
         bed_state.read_snapshot(bed), bed_state.read_tick(bed),
     )  # fmt: skip
-    show(bed, begun)
+    show(bed, replace(begun, settings=settings))
     return [*notes, Note("WARNING", f"{bed.name}: {said}")] if said else notes
 
 
@@ -98,10 +95,16 @@ def place_finger(context: Any, bed: Any, session: Running) -> None:
     bed : bpy.types.Object
     session : Running
     """
+    if _move_finger(bed, session):
+        _evaluate(context)
+
+
+def _move_finger(bed: Any, session: Running) -> bool:
+    """Put the fingertip where a session has it, without evaluation; return whether there is one."""
     tip = view.fingertip_of(bed)
     if tip is not None:
-        bridge.place_fingertip(tip, session.pose, find_ellipsoid(session.scene))
-        context.view_layer.update()
+        bridge.move_fingertip(tip, session.pose, find_ellipsoid(session.scene))
+    return tip is not None
 
 
 def withdraw_strokes(context: Any, uid: int | None = None) -> bool:
@@ -165,21 +168,33 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     session = replace(session, blocking_reason="", name=bed.name)
     seen = _visible_rows(session)
     try:
-        later = sculpting.advance(
-            session, bridge.pose(view.fingertip_of(bed)), now, most, display.picked_pins(bed)
-        )
+        # The finger of a stroke is where the session has put it.
+        pose = session.pose if session.strokes else bridge.pose(view.fingertip_of(bed))
+        later = sculpting.advance(session, pose, now, most, display.picked_pins(bed))
     except DivergenceError as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
         notes.append(Note("ERROR", f"The session of {bed.name} is paused: {error}"))
     running.put(later)
-    if session.strokes:
-        place_finger(context, bed, later)
+    moved = bool(session.strokes) and _move_finger(bed, later)
     bed_state.write(bed, later, before)
     # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
     if before.stale or said or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)
+    if moved:  # One evaluation of pins and fingertip takes less time than one of each.
+        _evaluate(context)
     return notes
+
+
+def _evaluate(context: Any) -> None:
+    """Have Blender evaluate what has changed: only then the world's matrix of a moved fingertip is right."""
+    context.view_layer.update()
+
+
+def _has_changed(bed: Any, session: Running, settings: properties.StoredSettings) -> bool:
+    """Return whether the scene of a bed's settings may differ from that of its session, or from its pins."""
+    mismatch = properties.find_layout_mismatch(bed, session.scene.layout)
+    return settings != session.settings or bool(mismatch)
 
 
 def _visible_rows(session: Running) -> Floats:
@@ -189,12 +204,13 @@ def _visible_rows(session: Running) -> Floats:
 
 
 def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
-    """Detect changes by the user; return the reason to wait, the session, and the messages."""
+    """Detect changes of settings and undo; return the reason to wait, the session, and the messages."""
     why, said = blocking_reason(context, bed, session.system.grid.count), ""
     if why:
         return why, session, said
     try:
-        if session.stale or session.blocking_reason or session.tick % LOOK == 0:
+        settings = properties.read_stored_settings(bed)
+        if session.stale or session.blocking_reason or _has_changed(bed, session, settings):
             scene = properties.scene_of(bed)
             if scene != session.scene:
                 before = session
@@ -202,6 +218,7 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
                 # A take is of one scene: what was recorded under the former one is not lost.
                 said = ". ".join(filter(None, (said, takes.keep_recording(bed, before))))
                 bridge.resize_fingertip(view.fingertip_of(bed), find_ellipsoid(scene))
+            session = replace(session, settings=settings)
         if session.stale:
             pose, tick_read = bed_state.read_pose(bed), bed_state.read_tick(bed)
             pose = session.pose if pose is None else pose

@@ -10,7 +10,7 @@ import pytest
 from digiclay.core.model.set_point import SetPoint
 from digiclay.core.session import snapshot
 from digiclay.device import view
-from digiclay.live import bed_state, running, sculpting, tick
+from digiclay.live import bed_state, running, sculpting
 
 from tests.blender.session.live import (
     FLOAT32,
@@ -109,7 +109,7 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     press(bed, clock)
     before = exact(bed)
     bed.digiclay.method = "plastic"
-    notes = clock.tick(tick.LOOK)
+    notes = clock.tick()
     assert ["heights were taken up" in note.message for note in notes] == [True]
     np.testing.assert_allclose(exact(bed), before, rtol=0, atol=1e-5)  # pins were still coming to rest
     assert running.find(bed).scene.method == "plastic"
@@ -118,7 +118,7 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
 def test_a_parameter_that_is_changed_in_mid_session_takes_effect(bed: Any, clock: Clock) -> None:
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
-    assert clock.tick(tick.LOOK) == []
+    assert clock.tick() == []
     assert running.find(bed).scene.set_point == SetPoint(0.8)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import digiclay
 from digiclay.device import view
-from digiclay.live import bed_state, handlers, running, tick
+from digiclay.live import bed_state, handlers, running
 
 from tests.blender.session.live import (
     Clock,
@@ -80,8 +80,7 @@ def test_a_session_waits_while_the_bed_is_scaled_unevenly(bed: Any, clock: Clock
 def test_a_session_waits_while_the_pins_are_not_those_of_the_layout(bed: Any, clock: Clock) -> None:
     started(bed)
     bed.digiclay.layout.rows = 14
-    clock.tick(tick.LOOK)
-    assert "169 pins" in running.find(bed).blocking_reason
+    waits(bed, clock, words="169 pins, not 182")
     bed.digiclay.layout.rows = 13
     goes_on(clock)
 

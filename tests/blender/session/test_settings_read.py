@@ -1,0 +1,157 @@
+"""A live session makes a scene of its bed's settings when they have changed, in the very next tick."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, import_parameters
+from digiclay.live import handlers, running
+from digiclay.settings import properties
+
+from tests.blender.session.live import TICK, Clock, move, started, undone, waits
+
+#: Set point of the force, N, and where it stands.
+DEFAULT, SET_POINT = 0.4, "digiclay.control.virtual_master.force_setpoint"
+
+
+def set_point() -> float:
+    """Return the set point that the only session simulates, N."""
+    (session,) = running.list_sessions()
+    return session.scene.control.force_setpoint
+
+
+def parameters() -> Iterator[tuple[str, str, str]]:
+    """Give method, section and name of every parameter; those of a method once a method."""
+    for method in METHODS:
+        for section in SECTIONS if method == "virtual_master" else ("control",):
+            for field in dataclasses.fields(import_parameters(section, method)):
+                yield method, section, field.name
+
+
+def change(group: Any, name: str) -> None:
+    """Give a property another value."""
+    known, value = group.bl_rna.properties[name], getattr(group, name)
+    if known.type == "BOOLEAN":
+        other: Any = not value
+    elif known.type == "ENUM":
+        other = next(item.identifier for item in known.enum_items if item.identifier != value)
+    elif known.type == "STRING":
+        other = f"{value}, 1"
+    else:
+        other = value + 1 if value + 1 <= known.hard_max else value / 2 if value else known.hard_min
+    setattr(group, name, other)
+    assert getattr(group, name) != value, name
+
+
+def test_a_session_whose_settings_stay_makes_no_scene_of_them(
+    bed: Any, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    scene_of = properties.scene_of
+
+    def counted(which: Any) -> Any:
+        made.append(which.name)
+        return scene_of(which)
+
+    started(bed)
+    monkeypatch.setattr(properties, "scene_of", counted)
+    assert move(bed, clock, [(0.0, z) for z in np.linspace(46, 37, 20)]) == []
+    assert made == []
+    bed.digiclay.control.virtual_master.force_setpoint = 0.8
+    clock.tick(20)
+    assert made == [bed.name]
+
+
+def test_every_parameter_that_is_changed_changes_the_stored_settings(bed: Any) -> None:
+    settings = bed.digiclay
+    for method, section, name in parameters():
+        settings.method = method
+        before = properties.read_stored_settings(bed)
+        change(properties.part_group(settings, section), name)
+        assert properties.read_stored_settings(bed) != before, (section, name)
+
+
+def test_every_choice_that_is_changed_changes_the_stored_settings(bed: Any) -> None:
+    for name in ("preset", "method", "notes", *(f"use_{part}" for part in OPTIONAL)):
+        before = properties.read_stored_settings(bed)
+        assert properties.read_stored_settings(bed) == before
+        change(bed.digiclay, name)
+        assert properties.read_stored_settings(bed) != before, name
+
+
+def test_a_setting_changed_by_hand_is_simulated_from_the_next_tick_on(bed: Any, clock: Clock) -> None:
+    started(bed)
+    for wanted in (0.8, 0.9, DEFAULT):
+        bed.digiclay.control.virtual_master.force_setpoint = wanted
+        assert clock.tick() == []
+        assert set_point() == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("how", ["animation", "driver"])
+def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick_on(
+    bed: Any, clock: Clock, how: str
+) -> None:
+    if how == "animation":
+        for frame in (1, 11):
+            bed.digiclay.control.virtual_master.force_setpoint = 0.1 * frame
+            bed.keyframe_insert(SET_POINT, frame=frame)
+    else:
+        bed.driver_add(SET_POINT).driver.expression = "0.1 * frame"
+    bpy.context.scene.frame_set(1)
+    started(bed)
+    found = []
+    for frame in (2, 5, 6):
+        bpy.context.scene.frame_set(frame)
+        shown = bed.digiclay.control.virtual_master.force_setpoint
+        clock.tick()
+        assert set_point() == pytest.approx(shown)
+        found.append(set_point())
+    assert found[0] < found[1] < found[2]
+
+
+def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed: Any, clock: Clock) -> None:
+    started(bed)
+    clock.tick()
+    before = running.list_sessions()[0].state.period
+    for count in range(12):
+        bed.digiclay.control.virtual_master.force_setpoint = 0.1 + 0.1 * count
+        assert clock.tick() == []
+    (session,) = running.list_sessions()
+    # A control period less where the ticks do not end with one.
+    assert session.state.period - before >= 12 * TICK // session.system.period - 1
+
+
+def test_a_setting_that_undo_puts_back_is_simulated_with_the_state_it_puts_back(
+    bed: Any, clock: Clock
+) -> None:
+    bpy.ops.ed.undo_push(message="Add")
+    started(bed)
+    bed.digiclay.control.virtual_master.force_setpoint = 0.8
+    bpy.ops.ed.undo_push(message="Set")
+    clock.tick()
+    assert set_point() == pytest.approx(0.8)
+    undone(clock)
+    assert set_point() == pytest.approx(DEFAULT)
+    bpy.ops.ed.redo()
+    clock.tick(handlers.STALE)
+    assert set_point() == pytest.approx(0.8)
+
+
+def test_a_pin_that_was_moved_aside_stops_the_session_in_the_next_tick(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bed.data.vertices[0].co.x += 0.01
+    waits(bed, clock, words="differ from the parameters of Layout")
+
+
+def test_a_session_is_told_by_the_new_name_of_its_bed(bed: Any, clock: Clock) -> None:
+    started(bed)
+    bed.name = "Renamed"
+    clock.tick()
+    (session,) = running.list_sessions()
+    assert session.name == session.scene.name == "Renamed"
