@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import statistics
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from digiclay.core.base.errors import DivergenceError
@@ -29,6 +30,7 @@ __all__ = [
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
+Integrate = Callable[[str, float, float], Floats]
 
 STEPS = (1e-3, 5e-3, 20e-3, 50e-3)
 #: Control period of the shorter steps, s; that of the longer ones is the step.
@@ -219,7 +221,9 @@ def calls_of(case: Case, commands: Floats, step: float = 1e-3) -> float:
     return statistics.median(period_calls(system, trajectories, count // 2)[0])
 
 
-def reference(case: Case, commands: Floats, step: float = FINE) -> tuple[Floats, float]:
+def reference(
+    case: Case, commands: Floats, step: float = FINE, integrate: Integrate | None = None
+) -> tuple[Floats, float]:
     """Return the heights every 5 ms, (t, n), and how far they may be off, m.
 
     Parameters
@@ -229,14 +233,24 @@ def reference(case: Case, commands: Floats, step: float = FINE) -> tuple[Floats,
         Held for `HOLD` each.
     step : float
         Physics step, s.
+    integrate : callable, optional
+        See `outcome`.
     """
-    fine = replayed(case, commands, "richardson", step, PERIOD)
-    coarse = replayed(case, commands, "richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
+    integrate = integrate or partial(replayed, case, commands)
+    fine = integrate("richardson", step, PERIOD)
+    coarse = integrate("richardson", 1e-3 if step < ROUGH else 2 * step, PERIOD)
     # Order 2 is what is left of order 3 across a kink.
     return fine, float(np.abs(fine - coarse).max()) / (24.0 if step < ROUGH else 3.0)
 
 
-def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: float) -> Outcome:
+def outcome(
+    case: Case,
+    commands: Floats,
+    exact: Floats,
+    stepper: str,
+    step: float,
+    integrate: Integrate | None = None,
+) -> Outcome:
     """Run one stepper at one step, and judge it.
 
     Parameters
@@ -249,12 +263,17 @@ def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: flo
     stepper : str
     step : float
         Physics step, s.
+    integrate : callable, optional
+        Returns what `replayed` does for a stepper, its step and the control period, s. Callers that judge
+        several steppers can keep the results: the finer run is the same for each, and that of the shortest
+        step is the reference's.
     """
+    integrate = integrate or partial(replayed, case, commands)
     period = period_of(step)
     every = round(period / PERIOD)
     try:
         with strict():
-            found = replayed(case, commands, stepper, step, period)
+            found = integrate(stepper, step, period)
     except DivergenceError as wrong:
         return Outcome(float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s")
     except (FloatingPointError, RuntimeWarning) as wrong:
@@ -266,5 +285,5 @@ def outcome(case: Case, commands: Floats, exact: Floats, stepper: str, step: flo
         return Outcome(error)
     judge = reference_settings(scene(case, stepper, step, period).simulation)
     with strict():
-        finer = replayed(case, commands, judge.stepper, judge.physics_step, period)
+        finer = integrate(judge.stepper, judge.physics_step, period)
     return Outcome(error, SHARE * float(np.abs(found - finer).max()))

@@ -94,7 +94,7 @@ def test_noisy_runs_whose_sets_are_far_apart_come_to_what_they_come_to_alone(met
 
 
 def test_the_papers_session_with_noise_is_that_session() -> None:
-    scenes = noisy("ridge_mound_valley", "simulation.duration=11")
+    scenes = noisy("ridge_mound_valley", "simulation.duration=6")
     for found, one in zip(together(scenes), scenes, strict=True):
         assert_as_alone(found, one)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import combinations
 from typing import Any
 
@@ -29,6 +30,25 @@ def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> N
         Of what is shown, in the same unit on all axes.
     limits : three pairs of float
     """
+    with _alone(axes):
+        _fit(axes, size, limits)
+
+
+@contextmanager
+def _alone(axes: Any) -> Iterator[None]:
+    """Leave out all other axes of the figure within the block: what is drawn again and again takes time."""
+    others = [other for other in axes.figure.axes if other is not axes and other.get_visible()]
+    for other in others:
+        other.set_visible(False)
+    try:
+        yield
+    finally:
+        for other in others:
+            other.set_visible(True)
+
+
+def _fit(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> None:
+    """Fit a relief, see `fit_relief`."""
     zoom = 0.84
     sides = (axes.xaxis, axes.yaxis, axes.zaxis)
     for turn in range(ROUNDS):

@@ -36,6 +36,7 @@ def _catalog(language: str) -> dict[str, dict[str, str]]:
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
+@cache
 def translate(text: str, language: str) -> str | None:
     """Return the translation of a label or a tooltip, or None where the catalog has none.
 
@@ -119,12 +120,10 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
 
 def register() -> None:
     """Register the catalogs; Blender names a language alone, or with a country."""
-    texts = collect_strings()
-    catalogs = {
-        name: make_entries(texts, language)
-        for language in LANGUAGES
-        for name in {language, f"{language}_{language.upper()}"}
-    }
+    texts, catalogs = collect_strings(), {}
+    for language in LANGUAGES:
+        entries = make_entries(texts, language)
+        catalogs |= dict.fromkeys((language, f"{language}_{language.upper()}"), entries)
     bpy.app.translations.register(__package__, catalogs)
 
 
