@@ -120,7 +120,8 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
 
 def register() -> None:
     """Register the catalogs; Blender names a language alone, or with a country."""
-    texts, catalogs = collect_strings(), {}
+    texts = collect_strings()
+    catalogs: dict[str, dict[tuple[str, str], str]] = {}
     for language in LANGUAGES:
         entries = make_entries(texts, language)
         catalogs |= dict.fromkeys((language, f"{language}_{language.upper()}"), entries)
