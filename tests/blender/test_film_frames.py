@@ -11,7 +11,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.commands.job_films import find_frames, make_frames
 from digiclay.commands.render import ARRAYS, stage_moving
-from digiclay.commands.run_state import is_done, list_lacking
+from digiclay.commands.run_state import is_done
 from digiclay.compat import scratch, strips
 from digiclay.core.base.run_folder import lock_name
 from digiclay.core.session.finished_run import read_run
@@ -24,13 +24,9 @@ scenes = ["tap"]
 errors = false
 settings.short.simulation.duration = 0.4
 [film]
-width = 160
-height = 100
-rate = 10
-[turntable]
 width = 64
 height = 40
-frames = 3
+rate = 10
 """
 COUNT = 5
 JOB, RUN = Path("two/jobs/tap-short"), Path("two/runs/tap-short")
@@ -63,50 +59,44 @@ def count_frames(film: Path) -> int:
 def test_frames_drawn_in_ranges_are_those_of_the_whole_film_and_make_it(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = find_frames(RUN, "film")
-    for some in ("3-4", "1+2"):
-        assert main(["job", str(JOB), "--only", "film", "--frames", some, "--quiet"]) == 0
-    assert list_missing(folder, range(COUNT)) == [0]
-    assert not is_done(JOB, RUN)
-    whole = here / "whole"
+    folder, whole = find_frames(RUN, "film"), here / "whole"
     whole.mkdir()
+    assert main(["job", str(JOB), "--only", "film", "--frames", "2-3", "--quiet"]) == 0
+    assert list_missing(folder, range(COUNT)) == [0, 1, 4]
     outputs, found = read_outputs(JOB / "job.toml"), read_run(RUN, *ARRAYS)
     with stage_moving(found.scene, found.history, outputs.film) as shots:
         assert shots.count == COUNT
         assert draw_frames(shots, range(COUNT), whole, here / "film.mp4")
-    for frame in range(1, COUNT):
+    for frame in (2, 3):
         np.testing.assert_array_equal(pixels(folder, frame), pixels(whole, frame))
         assert (pixels(whole, frame) != pixels(whole, frame - 1)).any()
-    # Whoever makes the film draws what is missing, and does not draw the others again.
-    name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
+    # Another range draws no frame that is there, and again one that a copy cut off.
     kept = name_frame(folder, 3).stat().st_mtime_ns
-    assert main(["job", str(JOB), "--only", "film", "--frames", "3", "--quiet"]) == 0
+    name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
+    assert main(["job", str(JOB), "--only", "film", "--frames", "1+3", "--quiet"]) == 0
+    assert list_missing(folder, range(COUNT)) == [0, 4]
     assert name_frame(folder, 3).stat().st_mtime_ns == kept
-    assert main(["job", str(JOB), "--only", "film", "--quiet"]) == 0
-    assert count_frames(RUN / "film.mp4") == COUNT
-    assert (folder.exists(), list_lacking(RUN, outputs)) == (False, ["turntable"])
-    # The job as a whole makes what is left, and leaves the film as it is.
-    made = (RUN / "film.mp4").stat().st_mtime_ns
+    np.testing.assert_array_equal(pixels(folder, 2), pixels(whole, 2))
+    # A stop keeps what is drawn, and a second process on the same frames is refused.
+    asked = iter([False, True])
+    with pytest.raises(KeyboardInterrupt):
+        make_frames(JOB, RUN, outputs, "film", "0-4", lambda: next(asked), lambda step, share: None)
+    assert list_missing(folder, range(COUNT)) == [4]
+    with lock_name(folder / "3-4"):
+        assert main(["job", str(JOB), "--only", "film", "--frames", "3-4", "--quiet"]) == 2
+    assert "3-4 is being written by another digiclay" in capsys.readouterr().err
+    assert main(["job", str(JOB), "--only", "film", "--frames", "0-5", "--quiet"]) == 2
+    assert capsys.readouterr().err == "--frames must be within 0-4, first frame first (got 0-5).\n"
+    # The job as a whole keeps its run, draws what is missing, and makes the film.
+    assert not is_done(JOB, RUN)
+    before = (RUN / "history.npz").stat().st_mtime_ns
     assert main(["job", str(JOB), "--quiet"]) == 0
-    assert count_frames(RUN / "turntable.mp4") == 3
-    assert is_done(JOB, RUN)
+    assert (count_frames(RUN / "film.mp4"), folder.exists(), is_done(JOB, RUN)) == (COUNT, False, True)
+    assert (RUN / "history.npz").stat().st_mtime_ns == before
     timing = json.loads((RUN / "timing.json").read_text(encoding="utf-8"))
-    assert timing["files"]["turntable.mp4"] == (RUN / "turntable.mp4").stat().st_size
-    capsys.readouterr()
+    assert timing["files"]["film.mp4"] == (RUN / "film.mp4").stat().st_size
+    made = (RUN / "film.mp4").stat().st_mtime_ns
     for part in (["--only", "film"], ["--only", "film", "--frames", "0-3"], []):
         assert main(["job", str(JOB), *part]) == 0
         assert " already" in capsys.readouterr().out
     assert (RUN / "film.mp4").stat().st_mtime_ns == made
-
-
-def test_a_stop_keeps_the_frames_that_are_drawn(capsys: pytest.CaptureFixture[str]) -> None:
-    outputs, asked = read_outputs(JOB / "job.toml"), iter([False, True])
-    with pytest.raises(KeyboardInterrupt):
-        make_frames(JOB, RUN, outputs, "turntable", "0-2", lambda: next(asked), lambda step, share: None)
-    folder = find_frames(RUN, "turntable")
-    assert [path.name for path in folder.iterdir()] == ["000000.png"]
-    with lock_name(folder / "0-2"):
-        assert main(["job", str(JOB), "--only", "turntable", "--frames", "0-2", "--quiet"]) == 2
-    assert "0-2 is being written by another digiclay" in capsys.readouterr().err
-    assert main(["job", str(JOB), "--only", "turntable", "--frames", "0-3", "--quiet"]) == 2
-    assert capsys.readouterr().err == "--frames must be within 0-2, first frame first (got 0-3).\n"

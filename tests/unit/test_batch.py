@@ -10,11 +10,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from digiclay.cli import main
 from digiclay.commands.batch import JobProcess
-from digiclay.commands.batch_folder import open_batch
+from digiclay.commands.batch_folder import Folder, open_batch
 from digiclay.core.base.errors import OutputError
 from digiclay.core.studies.job_table import read_jobs
 
@@ -68,8 +69,18 @@ def started(*arguments: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     jobs(TWO)
+    pages: list[str] = []
+    write = Folder.write_index
+
+    def read(*given: Any) -> Path:
+        pages.append((path := write(*given)).read_text(encoding="utf-8"))
+        return path
+
+    monkeypatch.setattr(Folder, "write_index", read)
     assert main(["batch", "two.toml", "--jobs", "2"]) == 0
     assert runs() == ["tap-quick", "tap-slow"]
     files = {path.name for path in Path("two/runs/tap-slow").iterdir()}
@@ -78,7 +89,11 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys: pytest
     out, err = capsys.readouterr()
     assert err == ""
     assert "2 of 2 jobs done; 2 of them now, in" in out
-    page = Path("two/index.html").read_text(encoding="utf-8")
+    # It is written when the first job has ended, and in the end.
+    during, page = pages[0], pages[-1]
+    assert "1 of 2 jobs ended so far." in during
+    assert during.count("not done yet") == during.count('http-equiv="refresh"')
+    assert 'http-equiv="refresh"' not in page
     assert 'href="runs/tap-slow/surface.stl"' in page
     assert page.count("data:image/png;base64,") == 2
 

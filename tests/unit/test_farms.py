@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,8 +27,6 @@ from openjd.model import (
     decode_job_template,
     preprocess_job_parameters,
 )
-
-from tests.timeouts import TIMEOUT
 
 JOBS = """
 scenes = ["tap"]
@@ -233,16 +230,6 @@ def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here: Path) -> None
     # Lists that another series of this folder had would be submitted with the others.
     assert submit("cuecmd", JOBS) == 0
     assert sorted(path.name for path in Path("out/cuecmd").iterdir()) == ["1-runs.txt", "2-page.txt"]
-
-
-def test_the_commands_of_the_lists_do_the_series() -> None:
-    """As cuecmd executes them: each line in a shell."""
-    assert submit("cuecmd", re.sub("b = .*", "", JOBS)) == 0
-    for path in sorted(Path("out/cuecmd").iterdir()):
-        for line in path.read_text(encoding="utf-8").splitlines():
-            subprocess.run(line, shell=True, check=True, timeout=TIMEOUT, capture_output=True, cwd="/")
-    assert sorted(path.name for path in Path("out/runs").iterdir()) == ["tap-a"]
-    assert "1 of 1 jobs done." in Path("out/index.html").read_text(encoding="utf-8")
 
 
 def test_a_line_for_windows_protects_what_its_shell_would_read() -> None:

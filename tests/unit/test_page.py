@@ -1,20 +1,15 @@
-"""The page of a series is written from its folder alone, and while the jobs run."""
+"""The page of a series is written from its folder alone, by each job and by a command."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from digiclay.cli import main
+from digiclay.core.base.run_folder import lock_name
 
-from tests.timeouts import TIMEOUT, wait_until
-
-ADDON = Path(__file__).parents[2] / "addon"
 JOBS = """
 scenes = ["tap"]
 errors = false
@@ -65,6 +60,13 @@ def test_jobs_that_are_started_alone_write_the_page_of_their_series(
     assert AGAIN not in page()
 
 
+def test_a_job_that_another_process_does_has_not_failed() -> None:
+    with lock_name(Path("two/runs/tap-quick")):
+        assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 2
+    assert main(["page", "two", "--quiet"]) == 0
+    assert "0 of 3 jobs done, 1 failed." in page()
+
+
 def test_a_failure_is_forgotten_when_the_job_is_described_anew() -> None:
     assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
     Path("two.toml").write_text(JOBS.replace("1e6", "0.1"), encoding="utf-8")
@@ -89,22 +91,3 @@ def test_what_is_no_series_has_no_page(capsys: pytest.CaptureFixture[str]) -> No
         capsys.readouterr().err
         == "alone is no folder of a job series: it has no batch.json of 'digiclay batch'.\n"
     )
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_batch_writes_its_page_while_jobs_run() -> None:
-    hours = "{ simulation.duration = 1e4, recorder.every = 1000 }"
-    Path("two.toml").write_text(JOBS.replace("{ simulation.duration = 1e6 }", hours), encoding="utf-8")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "digiclay", "batch", "two.toml", "--jobs", "1", "--quiet"],
-        env={**os.environ, "PYTHONPATH": str(ADDON)}, start_new_session=True,
-    )  # fmt: skip
-    try:
-        wait_until(lambda: Path("two/index.html").exists())
-        assert process.poll() is None
-        assert "2 of 3 jobs ended so far, 1 failed." in page()
-        assert AGAIN in page()
-    finally:
-        os.killpg(process.pid, signal.SIGINT)
-        process.wait(TIMEOUT)
-    assert "1 of 3 jobs done" in page()

@@ -19,10 +19,15 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @pytest.fixture(scope="module")
-def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
-    """Blender with settings of its own and the zip installed; a function that gives it a command."""
+def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Return an environment in which Blender has settings of its own."""
+    return os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path_factory.mktemp("settings"))}
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]) -> Command:
+    """Blender with the zip installed; a function that gives it a command."""
     folder = tmp_path_factory.mktemp("installed")
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "settings")}
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         given = [BLENDER, "--command", *words]
@@ -94,3 +99,32 @@ def test_a_batch_starts_blender_once_more_for_each_job(command: Command, tmp_pat
     assert "2 of 2 jobs done" in done.stdout
     for run in (tmp_path / "out" / "runs").iterdir():
         assert {"film.mp4", "surface.stl", "metrics.json"} <= {file.name for file in run.iterdir()}
+
+
+def test_a_series_for_a_farm_is_run_by_blender(
+    command: Command, environment: dict[str, str], tmp_path: Path
+) -> None:
+    said = """
+        scenes = ["tap"]
+        errors = false
+        settings.a.simulation.duration = 0.1
+        [film]
+        width = 64
+        height = 40
+        rate = 20
+    """
+    (tmp_path / "two.toml").write_text(said, encoding="utf-8")
+    out = tmp_path / "a färm"
+    words = ("batch", str(tmp_path / "two.toml"), "--out", str(out), "--submit", "openjd")
+    done = command("digiclay", *words, "--program", str(BLENDER))
+    assert done.returncode == 0, done.stdout + done.stderr
+    # As the line that was printed says.
+    assert f"-p Program={BLENDER}" in done.stdout
+    run = ["run", str(out / "openjd.json"), "-p", f"Program={BLENDER}"]
+    done = subprocess.run(
+        [sys.executable, "-m", "openjd", *run],
+        env=environment, capture_output=True, text=True, timeout=TIMEOUT,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (out / "runs" / "tap-a" / "film.mp4").read_bytes()[4:8] == b"ftyp"
+    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.base.errors import DigiclayError, OutputError, one_line
+from ..core.base.errors import BusyError, DigiclayError, OutputError, one_line
 from ..core.base.run_folder import claim_folder
 from ..core.base.whole_files import format_json, write_whole
 from ..core.scene.scene_source import load
@@ -74,7 +74,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
             with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
                 said = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
         except DigiclayError as error:
-            note_failure(arguments.job, one_line(error))
+            if not isinstance(error, BusyError):  # another process may still do it
+                note_failure(arguments.job, one_line(error))
             refresh_page(arguments.job)
             raise
         refresh_page(arguments.job)

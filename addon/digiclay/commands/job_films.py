@@ -24,7 +24,7 @@ from ..core.studies.job_table import JOB, SCENE
 from .job_steps import Tell
 from .refusals import refuse_without_blender
 from .render import ARRAYS, stage_moving
-from .run_state import RunState, judge_run, list_lacking, note_film
+from .run_state import PATIENCE, RunState, judge_run, list_lacking, note_film
 
 __all__ = ["find_frames", "make_film", "make_frames"]
 
@@ -106,7 +106,7 @@ def make_film(
     from ..pictures.film_file import encode_film
 
     began = time.perf_counter()
-    with claim_files([out]):
+    with claim_files([out], PATIENCE):
         found = read_run(run, *ARRAYS)
         frames = range(looks.count(found.history["time"]))
         folder = _make_folder(find_frames(run, kind))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 __all__ = [
-    "DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError", "StateError",
-    "one_line",
+    "BusyError", "DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError",
+    "StateError", "one_line",
 ]  # fmt: skip
 
 #: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
@@ -53,6 +53,10 @@ class SceneError(DigiclayError):
 
 class OutputError(DigiclayError):
     """Result that cannot be written, or run folder that cannot be read."""
+
+
+class BusyError(OutputError):
+    """File or folder in use by another process."""
 
 
 class StateError(DigiclayError):

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import OutputError
+from .errors import BusyError
 from .processes import find_host, may_have_made
 
 __all__ = ["hold_lock", "hold_record"]
@@ -50,7 +50,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
 
     Raises
     ------
-    OutputError
+    BusyError
         When another process holds it.
     OSError
         When the file cannot be made.
@@ -62,7 +62,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
             yield
         return
     if taken is None:
-        raise OutputError(refusal)
+        raise BusyError(refusal)
     try:
         yield
     finally:
@@ -150,7 +150,7 @@ def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[Non
         owner = _read_owner(path)
         if owner is not None and owner[0] != find_host():
             refusal += f" It was begun on {owner[0]}; if nothing runs there, remove {path}."
-        raise OutputError(refusal)
+        raise BusyError(refusal)
     try:
         yield
     finally:

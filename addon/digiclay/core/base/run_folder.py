@@ -182,10 +182,16 @@ def _remove_if_empty(target: Path) -> Iterator[None]:
 
 
 @contextmanager
-def claim_files(files: Sequence[Path]) -> Iterator[None]:
+def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
     """Claim files in folders that are there already, such as a run's: nobody else writes them meanwhile.
 
     What killed processes have left unfinished of them is taken away.
+
+    Parameters
+    ----------
+    files : sequence of Path
+    patience : float, optional
+        Seconds to wait for somebody else who looks at the same folder.
 
     Raises
     ------
@@ -196,7 +202,7 @@ def claim_files(files: Sequence[Path]) -> Iterator[None]:
         try:
             for folder in dict.fromkeys(file.parent for file in files):
                 if folder.exists() and os.access(folder.resolve().parent, os.W_OK):
-                    with lock_name(folder):
+                    with lock_name(folder, patience):
                         pass
                 until_the_end.enter_context(_remove_if_empty(folder.resolve() / "file"))
             for file in files:

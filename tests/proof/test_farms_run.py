@@ -1,4 +1,4 @@
-"""A job template with a film is checked and run by openjd, the program of Open Job Description."""
+"""Farms' files are executed: a template with a film by openjd, lists of commands by a shell."""
 
 from __future__ import annotations
 
@@ -72,3 +72,17 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> Non
     assert re.findall(r"Running step '(.*)'", said) == ["tap-short: run"]
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "0 of 1 jobs done, 1 failed." in page
+
+
+def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path: Path) -> None:
+    """As a frame of cuecmd does."""
+    jobs, out = tmp_path / "two.toml", tmp_path / "schöne 'Tasten' $HOME; #"
+    jobs.write_text(
+        'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.05\n', encoding="utf-8"
+    )
+    assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0
+    for path in sorted((out / "cuecmd").iterdir()):
+        for line in path.read_text(encoding="utf-8").splitlines():
+            subprocess.run(line, shell=True, check=True, timeout=TIMEOUT, capture_output=True, cwd="/")
+    assert [path.name for path in (out / "runs").iterdir()] == ["tap-a"]
+    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
