@@ -100,6 +100,12 @@ def test_a_smooth_stroke_takes_down_a_spike_without_a_touch_and_waits_for_its_pi
     assert np.abs(heights(go_on(done, 10)) - heights(done)).max() < 10e-6
 
 
+def test_the_finger_travels_close_above_the_pins() -> None:
+    session = go_on(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0)), 12)
+    assert session.strokes
+    assert 0.0 < session.pose[2] - heights(session).max() < SPIKE
+
+
 def test_a_weaker_stroke_smooths_less() -> None:
     left = [
         height_at(finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), share))[0], 0.0, 0.0)

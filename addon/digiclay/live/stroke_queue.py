@@ -126,6 +126,7 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     if stroke.brush is Brush.SMOOTH:
         radius = find_radius(finger, system.grid.layout)
         arrived = stroke.phase == LEAVING and not bool((running.state.mode() == Mode.BLISTER).any())
+        height = np.maximum(height, running.state.row(system.rows.target))
         return sweep(stroke, height, radius, pose, count, period, now, arrived=arrived)
     tracking = find_tracking(running.scene, system) if stroke.height is None else stroke.tracking
     return *follow(stroke, system.grid, height, finger, pose, count, period, now, tracking), None

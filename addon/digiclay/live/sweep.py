@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from .stroke import ABOVE, DRAGGING, LEAVING, Stroke
-from .stroke_travel import CLEARANCE, DRAG, cross, drag, finish_image, run_clock
+from .stroke_travel import CLEARANCE, DRAG, LIFT, cross, drag, finish_image, run_clock
 
 __all__ = ["find_radius", "sweep"]
 
@@ -49,7 +49,7 @@ def sweep(
     stroke : Stroke
         Not done yet.
     height : ndarray (n,)
-        Heights of the pins now, m.
+        How high the pins are now, or are commanded to, m: the finger stays above.
     radius : float
         Of the disc that is smoothed, m.
     pose : ndarray (7,)
@@ -85,6 +85,7 @@ def sweep(
         else:
             if stroke.phase != LEAVING:
                 stroke, x, y = drag(replace(stroke, phase=DRAGGING), x, y, DRAG * period)
+                z = max(safe, z - LIFT * period)
                 strength = stroke.samples[stroke.reached].share
             orders.append((x, y, radius, strength))
             stroke = _end(stroke, arrived=arrived)
