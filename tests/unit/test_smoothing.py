@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
+from digiclay.core.control.exchange import make_exchange
+from digiclay.core.control.master_memory import Master, Phase
 from digiclay.core.control.methods import METHODS
-from digiclay.core.control.smoothing import find_fault
+from digiclay.core.control.smoothing import find_fault, order_periods
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
+from digiclay.core.model.control_interface import Controller, Measurement
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -30,11 +33,29 @@ STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
 
 
 @cache
-def bed(arrangement: str = "aligned", method: str = "virtual_master", size: int = 13) -> System:
+def bed(
+    arrangement: str = "aligned", method: str = "virtual_master", size: int = 13, period: float = 5e-3
+) -> System:
     """Return a small bed."""
     layout = {"rows": size, "columns": size, "arrangement": arrangement}
     control: object = "absent" if method == "absent" else {"method": method}
-    return assemble(resolve({"layout": layout, "control": control}))
+    simulation = {"control_period": period}
+    return assemble(resolve({"layout": layout, "control": control, "simulation": simulation}))
+
+
+def order(system: System, x: float, y: float, radius: float) -> Controller:
+    """Return the controller of a period in which a disc is smoothed, m."""
+    row = np.array([[x, y, radius, 1.0]])
+    (control,) = order_periods(system.controller, system.grid, system.cell, system.period, row)
+    assert control is not None
+    return control
+
+
+def measure(system: System, cells: NDArray[np.intp]) -> Measurement:
+    """Return the measurement of some cells at rest."""
+    height, none = np.full(cells.size, 40e-3), np.zeros(cells.size)
+    basis, own = system.grid.compute_basis(cells), np.empty((0, cells.size))
+    return Measurement(basis, height, none, height, np.zeros(cells.size, np.int8), own, cells)
 
 
 def smooth(system: System, state: State, orders: Floats) -> list[Floats]:
@@ -105,6 +126,81 @@ def test_strokes_over_edge_and_corners_stay_finite_and_keep_the_volume(arrangeme
         *_, state = simulate_path(system, state, stay_away(len(orders)), orders)
     assert abs((state.row(0) - first).sum()) <= BAND * first.size
     assert measure_roughness(system.grid, state.row(0)) < measure_roughness(system.grid, first)
+
+
+def test_pins_are_in_the_mode_blister_until_they_have_arrived_and_then_hold_or_rest() -> None:
+    system = bed(method="absent")
+    rest = system.cell.actuator.rest_height
+    state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
+    *_, state = simulate_path(system, state, stay_away(20), make_orders(20, 0.0, 0.0, 0.0, RADIUS, 0))
+    inside = np.hypot(system.grid.x, system.grid.y) < RADIUS - 1e-9
+    np.testing.assert_array_equal(state.mode() == Mode.BLISTER, inside)
+    *_, state = simulate_path(system, state, stay_away(60), make_orders(0, 0.0, 0.0, 0.0, RADIUS))
+    formed = np.abs(state.row(system.rows.target) - rest) > BAND
+    np.testing.assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
+
+
+def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
+    system, ends = bed(size=21), []
+    path = stay_away(80)
+    path[:, 0, :3] = np.column_stack([np.full(81, -15e-3), np.zeros(81), np.linspace(42e-3, 36e-3, 81)])
+    for radius in (0.0, 7e-3):
+        relief = np.zeros(system.grid.count)
+        relief[system.grid.at(np.array([18e-3]), np.array([18e-3]))] = 5e-3
+        orders = np.tile([18e-3, 18e-3, radius, 1.0], (80, 1))
+        *_, state = simulate_path(system, heighten(system, relief), path, orders)
+        ends.append(state.row(0))
+    near = np.hypot(system.grid.x - 18e-3, system.grid.y - 18e-3) < 7e-3
+    assert ends[0].min() < 38e-3
+    # Sums over other cells round in another way.
+    np.testing.assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
+    assert (ends[0] - ends[1])[near].max() > 2e-3
+
+
+@pytest.mark.parametrize(
+    ("place", "radius", "held"),
+    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
+)
+def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(
+    place: tuple[float, float], radius: float, held: int | None
+) -> None:
+    system = bed()
+    control, method = order(system, *place, radius), system.controller
+    assert method is not None
+    memory = Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
+    touched = measure(system, np.empty(0, np.intp))
+    discs = [
+        method.locate(memory, touched)[1],
+        order(bed(method="absent"), *place, radius).locate(None, touched)[1],
+    ]
+    x, y, whole = control.locate(memory, touched)[1]  # type: ignore[misc]
+    for disc in discs:
+        assert disc is not None
+        assert np.hypot(disc[0] - x, disc[1] - y) + disc[2] <= whole * (1.0 + 1e-12)
+    (a, b, one), (c, d, other) = discs  # type: ignore[misc]
+    least = (np.hypot(a - c, b - d) + one + other) / 2.0
+    assert whole == pytest.approx(least if held is None else (one, other)[held])
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_the_neighbors_of_all_pins_in_the_disc_take_part(arrangement: str) -> None:
+    system = bed(arrangement, "absent")
+    reach = order(system, 1e-3, 2e-3, RADIUS).locate(None, measure(system, np.empty(0, np.intp)))[1]
+    assert reach is not None
+    there = set(system.grid.disc(*reach).tolist())
+    smoothed = system.grid.disc(1e-3, 2e-3, RADIUS)
+    for one, others, _ in make_exchange(system.grid, 1e-5, 5e-3).find_pairs(np.arange(system.grid.count)):
+        for start, goal in ((one, others), (others, one)):
+            assert set(goal[np.isin(start, smoothed)].tolist()) <= there
+
+
+def test_pins_are_smoothed_without_swinging_at_a_slow_control_period_too() -> None:
+    system = bed(method="absent", period=20e-3)
+    state = heighten(system, make_spike_and_ridge(system.grid))
+    spike = int(state.row(0).argmax())
+    heights = np.array(smooth(system, state, make_orders(40, 0.0, 0.0, 0.0, RADIUS, 40)))
+    assert heights[-1, spike] < 45e-3
+    assert np.diff(heights[:, spike]).max() <= BAND
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
@@ -181,6 +277,11 @@ def test_an_order_that_is_none_is_found(order: tuple[float, ...]) -> None:
     assert find_fault(orders, 3) == ""
     orders[1] = order
     assert find_fault(orders, 3).startswith("row 1 is [")
+
+
+def test_the_least_and_the_greatest_order_are_sound() -> None:
+    orders = np.array([[0.0, 0.0, 1e-6, 0.0], [1e3, -1e3, 1e3, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    assert find_fault(orders, 3) == ""
 
 
 @pytest.mark.parametrize("shape", [(0, 4), (2, 4), (3, 5), (12,)])

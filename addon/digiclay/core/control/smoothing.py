@@ -101,11 +101,15 @@ class SmoothingControl:
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Smooth, and drive the pins there; the method commands all others. See `Controller`."""
-        orders = Commands(seen.target, seen.mode, np.zeros(seen.height.size))
+        moved = seen.mode == Mode.BLISTER
         if self.method:
             memory, orders = self.method.command(memory, seen)
+        else:
+            still = np.where(moved, np.int8(Mode.HOLD), seen.mode)
+            orders = Commands(seen.target, still, np.zeros(seen.height.size))
         weight = self._weigh(seen)
-        own = (weight > 0.0) | (seen.mode == Mode.BLISTER)
+        # What the method moves itself, as part of its blister, is not on its way from a disc.
+        own = (weight > 0.0) | (moved & (orders.mode <= Mode.HOLD))
         target = self._smooth(seen, weight)
         error, band = target - seen.height, self.drive.dead_band
         formed = np.abs(target - self.actuator.rest_height) > band
