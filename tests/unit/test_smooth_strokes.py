@@ -90,11 +90,17 @@ def finish(session: Running) -> tuple[Running, list[float]]:
     return session, felt
 
 
-def test_a_smooth_stroke_takes_down_a_spike_without_a_touch_and_waits_for_its_pins() -> None:
-    before = spiked((0.0, 0.0))
-    done, felt = finish(queue_smooth(before, (-9.0, 0.0), (9.0, 0.0)))
+def test_a_smooth_stroke_takes_down_a_spike_without_a_touch() -> None:
+    done, felt = finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0)))
     assert height_at(done, 0.0, 0.0) < 0.4 * SPIKE
     assert max(felt) == 0.0
+
+
+def test_a_short_stroke_waits_for_its_pins() -> None:
+    session, number = queue_stroke(spiked((0.0, 0.0)), 0.0, 0.0, 4e-3, brush=Brush.SMOOTH)
+    session = change_stroke(session, number, lambda one: replace(draw(one, 0.1, 0.0, 0.0, 4e-3), held=False))
+    done, _ = finish(session)
+    assert height_at(done, 0.0, 0.0) < SPIKE - 2e-3
     assert not (done.state.mode() == Mode.BLISTER).any()
     # All have arrived: nothing moves on.
     assert np.abs(heights(go_on(done, 10)) - heights(done)).max() < 10e-6
