@@ -57,6 +57,11 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said: dict[str, str
     [
         (["run", "my.toml", "--render"], "bpy", "digiclay[blender]"),
         (["run", "my.toml", "--plots"], "matplotlib", "pip install digiclay[plots]"),
+        (
+            ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--out", "o", "--scheduler", "tcp://a:1"],
+            "distributed",
+            "pip install digiclay[cluster]",
+        ),
     ],
 )
 def test_a_missing_library_is_told_before_any_work(

@@ -11,6 +11,7 @@ import logging
 import pickle
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
@@ -19,14 +20,12 @@ from typing import Any
 
 from ..core.base.errors import DigiclayError, one_line
 from .cluster_task import UnfitWorkerError, Versions, call_on_worker, describe_versions
-from .refusals import refuse_without
 from .stop import allow_interrupt
-from .worker import in_blender
 
 __all__ = ["Cluster", "open_cluster"]
 
-#: Seconds to reach the scheduler, and to hear from its workers.
-PATIENCE = 10.0
+#: Seconds to reach the scheduler, and between two looks whether somebody asked to stop.
+PATIENCE, PAUSE = 10.0, 0.1
 #: Seconds between two looks at how many workers there are, and without any before that is told.
 LOOK, ALONE = 1.0, 10.0
 
@@ -44,6 +43,7 @@ class Cluster(Executor):
     def __init__(self, client: Any, address: str) -> None:
         self._client, self._address, self._versions = client, address, describe_versions()
         self._remote: set[Any] = set()  # Dask releases a task whose future nobody holds
+        self._suspects: deque[tuple[Future[Any], bytes]] = deque()
         self._workers, self._looked, self._manned = 0, 0.0, time.monotonic()
 
     def submit(self, task: Callable[..., Any], /, *arguments: Any, **known: Any) -> Future[Any]:
@@ -57,26 +57,44 @@ class Cluster(Executor):
             Handed on to it.
         """
         future: Future[Any] = Future()
-        try:
-            packed = pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL)
-            remote = self._client.submit(call_on_worker, packed, self._versions, pure=False)
-            self._remote.add(remote)
-            remote.add_done_callback(partial(self._hand_back, future))
-        except Exception:  # Dask's client is closed when it has given up
-            future.set_exception(self._lost())
+        self._send(future, pickle.dumps((task, arguments, known), pickle.HIGHEST_PROTOCOL))
         return future
 
-    def _hand_back(self, future: Future[Any], remote: Any) -> None:
-        """Take the outcome of a task over, unless nobody waits for it."""
-        self._remote.discard(remote)
-        if not future.set_running_or_notify_cancel():
-            return
+    def _send(self, future: Future[Any], packed: bytes, *, alone: bool = False) -> None:
+        """Send a task to the scheduler; `alone` after workers died that had it."""
         try:
-            outcome = remote.result()
-        except BaseException as error:  # Dask's cancellation is no Exception
-            future.set_exception(self._explain(error))
-        else:
+            remote = self._client.submit(call_on_worker, packed, self._versions, pure=False)
+            self._remote.add(remote)
+            remote.add_done_callback(partial(self._hand_back, future, packed, alone))
+        except Exception:  # Dask's client is closed when it has given up
+            future.set_exception(self._lost())
+
+    def _hand_back(self, future: Future[Any], packed: bytes, alone: bool, remote: Any) -> None:
+        """Take the outcome of a task over, unless nobody waits for it; Dask calls this from one thread.
+
+        Dask blames the death of a worker on all tasks that it had, also on those that it had not begun. So
+        each gets a second chance, one after the other: who kills once more is to blame.
+        """
+        from distributed import KilledWorker
+
+        self._remote.discard(remote)
+        if alone:
+            self._suspects.popleft()
+        try:
+            outcome, error = remote.result(), None
+        except BaseException as raised:  # Dask's cancellation is no Exception
+            outcome, error = None, raised
+        suspect = isinstance(error, KilledWorker) and not alone
+        if suspect:
+            self._suspects.append((future, packed))
+        if self._suspects and (alone or (suspect and len(self._suspects) == 1)):
+            self._send(*self._suspects[0], alone=True)
+        if suspect or not future.set_running_or_notify_cancel():
+            return
+        if error is None:
             future.set_result(outcome)
+        else:
+            future.set_exception(self._explain(error))
 
     def _explain(self, error: BaseException) -> BaseException:
         """Return the error of a task as this program has it."""
@@ -126,7 +144,7 @@ class Cluster(Executor):
             _tell(f"{self._address} has no workers yet: start some with 'dask worker {self._address}'.")
         while not self._workers and not stop():
             draw(said)
-            time.sleep(0.1)
+            time.sleep(PAUSE)
             said = self.describe()
 
     def refuse_other_versions(self) -> None:
@@ -193,11 +211,8 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
     Raises
     ------
     DigiclayError
-        In one line: without Dask, without a scheduler there, with other versions.
+        In one line: without a scheduler there, or with other versions.
     """
-    if in_blender():
-        raise DigiclayError("--scheduler needs Dask, which is not in Blender: use 'digiclay' outside of it.")
-    refuse_without("distributed", "--scheduler", "pip install digiclay[cluster]")
     importlib.import_module("distributed")
     if stop():
         raise KeyboardInterrupt
@@ -211,7 +226,7 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
                 yield cluster
         finally:
             with suppress(Exception):
-                client.close(timeout=PATIENCE)
+                client.close(timeout=PATIENCE if client.status == "running" else PAUSE)
 
 
 def _connect(address: str) -> Any:
@@ -244,10 +259,9 @@ async def _try_address(address: str) -> None:
 @contextmanager
 def _be_quiet() -> Iterator[None]:
     """Keep Dask's log off the terminal: what matters is told in lines of this program."""
-    log = logging.getLogger("distributed")
-    former = log.level
-    log.setLevel(logging.CRITICAL + 1)
+    former = logging.root.manager.disable
+    logging.disable()
     try:
         yield
     finally:
-        log.setLevel(former)
+        logging.disable(former)

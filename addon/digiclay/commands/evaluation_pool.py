@@ -9,10 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
+from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record, evaluate_bundle
 from ..core.studies.series import finish
 from .evaluator import Evaluator, evaluate_elsewhere
+from .refusals import refuse_without
 from .worker import Processes, count_cores, in_blender
 
 __all__ = ["Pool", "add_pool", "open_pool", "read_count"]
@@ -70,8 +72,19 @@ def add_pool(parser: argparse.ArgumentParser) -> None:
         "--workers", metavar="N", type=read_count, help="number of processes; default: one a core"
     )
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask cluster instead, such as tcp://127.0.0.1:8786"
+        "--scheduler",
+        metavar="ADDRESS",
+        type=_read_address,
+        help="a Dask cluster instead, such as tcp://127.0.0.1:8786",
     )
+
+
+def _read_address(text: str) -> str:
+    """Return the address of a scheduler; refuse it without Dask, before any work."""
+    if in_blender():
+        raise DigiclayError("--scheduler is not for the extension: run 'digiclay' outside of Blender.")
+    refuse_without("distributed", "--scheduler", "pip install digiclay[cluster]")
+    return text
 
 
 def read_count(text: str) -> int:

@@ -1,0 +1,144 @@
+"""Sweeps on a Dask cluster whose processes die: a worker, the scheduler, and workers of another version."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands.cluster import open_cluster
+from digiclay.core.base.whole_files import read_json
+from digiclay.core.studies.series import finish
+
+from tests.package_copy import copy_package
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+from tests.timeouts import TIMEOUT, wait_until
+
+ADDON = Path(__file__).parents[2] / "addon"
+#: Twelve batches of four, some tenths of a second each.
+AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=20:31:12"]
+SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
+SWEEP += ["--set", "simulation.duration=2"]
+Start = Callable[..., Any]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def start(here: Path) -> Iterator[Start]:
+    """Start processes of Python that end with the test."""
+    running: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str, addon: Path = ADDON, **settings: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-m", *arguments], stderr=subprocess.PIPE, text=True,
+            env={**os.environ, "PYTHONPATH": str(addon), **settings},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield start
+    for process in reversed(running):
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: str) -> tuple[Any, str]:
+    """Start a scheduler; return its process and its address."""
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    arguments = ["--host", "127.0.0.1", "--port", port, "--no-dashboard", "--scheduler-file", str(file)]
+    process = start("distributed.cli.dask_scheduler", *arguments, **settings)
+    wait_until(lambda: read_json(file) is not None)
+    return process, read_json(file)["address"]
+
+
+def start_worker(start: Start, address: str, *arguments: str, **settings: Any) -> Any:
+    """Start a worker of one thread."""
+    return start(
+        "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard", *arguments, **settings
+    )
+
+
+def points(folder: Path) -> list[Path]:
+    """Return the files of the points of a sweep that are done."""
+    return list(folder.glob("points/*.json"))
+
+
+def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here: Path, start: Start) -> None:
+    assert main([*SWEEP, "--workers", "2", "--out", "own"]) == 0
+    scheduler, address = start_scheduler(start, here)
+    workers = [start_worker(start, address, "--no-nanny") for _ in range(2)]
+    command = ["digiclay", *SWEEP, "--scheduler", address, "--out", "far"]
+
+    sweep = start(*command)
+    wait_until(lambda: points(here / "far"))
+    workers[0].send_signal(signal.SIGKILL)
+    done = len(points(here / "far"))
+    wait_until(lambda: len(points(here / "far")) > done)  # the other one goes on
+    assert sweep.poll() is None
+    scheduler.send_signal(signal.SIGKILL)
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    rule = "What is done is kept, and the same command goes on from there."
+    lines = [line for line in said.splitlines() if "no workers yet" not in line]
+    assert (sweep.returncode, lines) == (2, [f"The scheduler {address} is gone. {rule}"])
+    kept = {path: path.stat().st_mtime_ns for path in points(here / "far")}
+    assert 8 <= len(kept) < 48
+    workers[1].communicate(timeout=TIMEOUT)  # a worker ends with its scheduler
+
+    _, again = start_scheduler(start, here, address.rpartition(":")[2])
+    assert again == address
+    start_worker(start, address)
+    sweep = start(*command)
+    sweep.communicate(timeout=TIMEOUT)
+    assert sweep.returncode == 0
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert (here / "far/sweep.csv").read_bytes() == (here / "own/sweep.csv").read_bytes()
+
+
+def test_a_piece_that_no_worker_survives_fails_alone(here: Path, start: Start) -> None:
+    _, address = start_scheduler(start, here, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="1")
+    start_worker(start, address)  # its nanny starts it again
+    done: dict[str, Any] = {}
+    with open_cluster(address, lambda: False, lambda note: None) as cluster:
+        pieces = ["1 + 1", "__import__('os')._exit(1)", "2 + 2"]
+        finish(cluster, eval, pieces, done.__setitem__, done.__setitem__, stopped=lambda: False)
+    assert [done[piece] for piece in pieces[::2]] == [2, 4]
+    assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
+
+
+def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Path, start: Start) -> None:
+    other = copy_package(here / "other") / "addon"
+    front = other / "digiclay" / "__init__.py"
+    text = front.read_text(encoding="utf-8")
+    front.write_text(text.replace('__version__ = "', '__version__ = "9.'), encoding="utf-8")
+    _, address = start_scheduler(start, here)
+    first = start_worker(start, address, "--no-nanny")
+    command = ["digiclay", *SWEEP, "--scheduler", address, "--out", "far"]
+    sweep = start(*command)
+    wait_until(lambda: points(here / "far"))
+    start_worker(start, address, "--no-nanny", addon=other)
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    assert sweep.returncode == 2
+    line = said.splitlines()[-1]
+    assert line.startswith("Worker tcp://127.0.0.1:")
+    assert " has digiclay 9." in line
+    assert "; here it is digiclay 0" in line
+    assert first.poll() is None
+
+    sweep = start(*command)
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    assert sweep.returncode == 2
+    assert " has digiclay 9." in said
+    assert said.endswith("Install the same there.\n")

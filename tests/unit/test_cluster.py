@@ -1,0 +1,199 @@
+"""Sweeps on a Dask cluster: the table, stops, addresses. Its processes that die are in tests/proof."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from digiclay.cli import main
+from digiclay.commands.cluster import open_cluster
+from digiclay.commands.cluster_task import Versions, describe_versions, evaluate_on_worker
+from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.scene.scene_source import Setting, find
+from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.series import finish
+from distributed import Client, LocalCluster
+
+from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
+from tests.timeouts import TIMEOUT, wait_until
+
+ROOT = Path(__file__).parents[2]
+#: Two batches, and no pictures of three axes.
+AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=3,4"]
+SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
+Found = dict[int, Any]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with one scene, my.toml."""
+    return folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
+
+
+def cluster_here(workers: int) -> LocalCluster:
+    """Return a scheduler with workers, on threads of this process."""
+    return LocalCluster(
+        n_workers=workers, threads_per_worker=2, processes=False, protocol="tcp://", host="127.0.0.1",
+        dashboard_address=":0",
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """The address of a scheduler with one worker."""
+    with cluster_here(1) as cluster:
+        yield cluster.scheduler_address
+
+
+def hours(count: int) -> list[Point]:
+    """Return points that would take hours."""
+    long = [Setting("simulation.duration", "1e5"), Setting("recorder.every", "1000")]
+    return make_points(find("slow_press"), long, [read_axis(f"layout.rows=20:{19 + count}:{count}")])
+
+
+def silent(note: str) -> None:
+    """Draw nothing."""
+
+
+def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, address: str) -> None:
+    assert main([*SWEEP, "--workers", "1", "--out", "own"]) == 0
+    assert main([*SWEEP, "--scheduler", address, "--out", "far"]) == 0
+    assert (here / "far/sweep.csv").read_bytes() == (here / "own/sweep.csv").read_bytes()
+    assert len(list((here / "far/points").iterdir())) == 8
+
+
+def test_after_a_stop_no_task_is_left_in_the_cluster(address: str) -> None:
+    with Client(address, set_as_default=False) as client:
+
+        def look(dask_worker: Any) -> tuple[int, int]:
+            return len(dask_worker.active_threads), len(dask_worker.state.tasks)
+
+        running: list[int] = []
+
+        def stop() -> bool:
+            if not running and [busy for busy, _ in client.run(look).values()] == [2]:
+                running.append(2)
+            return bool(running)
+
+        with open_cluster(address, lambda: False, silent) as cluster:
+            finish(cluster, evaluate_hours, hours(4), lambda *_: None, lambda *_: None, stopped=stop)
+        wait_until(lambda: list(client.run(look).values()) == [(0, 0)])
+
+
+def evaluate_hours(point: Point) -> Any:
+    """Evaluate one point on a worker."""
+    return evaluate_on_worker([point], errors=False)
+
+
+def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    notes: list[str] = []
+    with (
+        cluster_here(0) as empty,
+        open_cluster(empty.scheduler_address, lambda: len(notes) > 1, notes.append),
+    ):
+        pass
+    assert notes == [", no workers: waiting"] * 2
+    address = empty.scheduler_address
+    assert capsys.readouterr().err == (
+        f"{address} has no workers yet: start some with 'dask worker {address}'.\n"
+    )
+
+
+def test_errors_of_tasks_are_told_of_each_piece_and_the_others_go_on(address: str) -> None:
+    done: Found = {}
+    with open_cluster(address, lambda: False, silent) as cluster:
+        finish(cluster, invert, [0, 1, 2], done.__setitem__, done.__setitem__, stopped=lambda: False)
+    assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
+
+
+def invert(number: int) -> float:
+    """Return the reciprocal."""
+    return 1 / number
+
+
+def test_a_scheduler_that_is_gone_ends_a_series_in_one_line() -> None:
+    with cluster_here(1) as other:
+        address = other.scheduler_address
+        with open_cluster(address, lambda: False, silent) as cluster:
+            other.close()
+            gone = f"^The scheduler {address} is gone. What is done is kept, and the same command goes on"
+            with pytest.raises(OutputError, match=gone):
+                finish(cluster, invert, [1], print, print, stopped=lambda: False)
+
+
+def test_versions_that_differ_are_named_with_who_has_them() -> None:
+    from digiclay.commands.cluster import _refuse_others
+
+    here = describe_versions()
+    _refuse_others({"a": here, "b": here}, here)
+    older = Versions("0.0.9", here.numpy, here.python)
+    with pytest.raises(
+        DigiclayError, match=r"^b has digiclay 0\.0\.9, numpy .* \(and 1 more like it\); here it"
+    ):
+        _refuse_others({"a": here, "b": older, "c": older}, here)
+    lacking = ModuleNotFoundError("No module named 'digiclay'", name="digiclay")
+    with pytest.raises(DigiclayError, match=r"^The scheduler x lacks digiclay; here it is digiclay "):
+        _refuse_others({"The scheduler x": lacking}, here)
+
+
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("foo", "missing port number"),
+        ("", "missing port number"),
+        ("http://127.0.0.1:8786", "unknown address scheme 'http'"),
+        ("tls://127.0.0.1:8786", "TLS expects a `ssl_context`"),
+    ],
+)
+def test_a_bad_address_is_refused_in_one_line(
+    address: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*SWEEP, "--scheduler", address, "--out", "out"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        f"--scheduler must be an address such as tcp://127.0.0.1:8786 (got {address!r}: {why}"
+    )
+    assert said.count("\n") == 1
+
+
+def test_processes_of_this_machine_and_a_cluster_exclude_each_other(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main([*SWEEP, "--scheduler", "tcp://127.0.0.1:1", "--workers", "2", "--out", "out"]) == 2
+    assert "--workers: not allowed with argument --scheduler" in capsys.readouterr().err
+
+
+def test_the_example_for_slurm_makes_the_script_of_a_job() -> None:
+    said = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"    (from dask_jobqueue(?:.*\n)+?)(?=\n\S)", said)
+    lines = [line.removeprefix("    ") for line in example.splitlines()]
+    made = lines.index(next(line for line in lines if line.startswith("cluster.scale")))
+    script = "\n".join([*lines[:made], "print(cluster.job_script())", "cluster.close()"])
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=TIMEOUT,
+        env={**os.environ, "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("#!/")
+    assert re.search(r"^#SBATCH --cpus-per-task=\d+$", done.stdout, re.MULTILINE)
+    assert "distributed.cli.dask_worker tcp://" in done.stdout or "dask worker tcp://" in done.stdout
+
+
+def test_nothing_imports_dask_unless_a_scheduler_is_named() -> None:
+    script = (
+        "import sys; from digiclay.commands.parser import parser; parser();"
+        "print({name.split('.')[0] for name in sys.modules} & {'dask', 'distributed', 'tornado'})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=TIMEOUT,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "addon")},
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("set()\n", "")
