@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from .errors import ParameterError
 from .quantity import Parameters, find_nearest_name, list_quantities, parse
 
-__all__ = ["read_part", "refuse_unknown", "shorten", "show_value"]
+__all__ = ["ReadParts", "read_part", "refuse_unknown", "shorten", "show_value"]
 
 Table = Mapping[str, Any]
 Part = TypeVar("Part", bound=Parameters)
@@ -60,6 +60,42 @@ def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Pa
         said = own.get(error.field)
         value = show_value(said) if isinstance(said, str) else shorten(error.value)
         raise ParameterError(section, error.field, rule, value, error.hint) from None
+
+
+class ReadParts:
+    """Parts that were read so far: what many tables have in common is read once.
+
+    Parts are frozen, so that those who get the same one do not disturb each other.
+    """
+
+    def __init__(self) -> None:
+        self._parts: dict[tuple[Any, ...], Any] = {}
+
+    def read(self, section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
+        """Build a part from its section, or return the one that was built of the same.
+
+        Parameters
+        ----------
+        section, kind, defaults, own
+            As `read_part` has them.
+        """
+        key = section, kind, repr(defaults), repr(own)
+        part: Part = self.keep(key, read_part, section, kind, defaults, own)
+        return part
+
+    def keep(self, key: tuple[Any, ...], make: Callable[..., Any], *given: Any) -> Any:
+        """Return what was made for a key, or make it.
+
+        Parameters
+        ----------
+        key : tuple
+        make : callable
+        *given
+            Its arguments.
+        """
+        if key not in self._parts:
+            self._parts[key] = make(*given)
+        return self._parts[key]
 
 
 def _measured(section: str, key: str, value: Any, unit: str) -> Any:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
 from ..engine.system import System
 from ..model.interfaces import Stepper
-from ..scene.assembly import assemble
+from ..model.layout import Grid, make_grid
+from ..scene.assembly import Motion, count_rows, make_motion
 from ..scene.schema import Scene
 from ..steppers.bernoulli_plan import BernoulliPlan
 from .advance import Batch
@@ -17,7 +18,7 @@ from .movement import BatchStepper
 from .padding import OwnSelection, PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["describe_structure", "make_batch"]
+__all__ = ["Findings", "describe_structure", "make_batch"]
 
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
@@ -26,26 +27,64 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 
-def describe_structure(scene: Scene) -> Any:
+#: How many kinds of parts, motions of cells and beds are kept: a bed can have a million cells.
+KINDS, MOTIONS, BEDS = 4096, 1024, 2
+
+
+class Findings:
+    """Results of functions of parts, kept for scenes with equal parts."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, dict[Any, Any]] = {KINDS: {}, MOTIONS: {}, BEDS: {}}
+
+    def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
+        """Return what was made for an equal key, or make it; the first one goes when there are too many.
+
+        Parameters
+        ----------
+        most : int
+            `KINDS`, `MOTIONS` or `BEDS`.
+        key : hashable
+        make : callable
+        *given
+            Its arguments.
+        """
+        known = self._known[most]
+        if key not in known:
+            if len(known) >= most:
+                del known[next(iter(known))]
+            known[key] = make(*given)
+        return known[key]
+
+
+def describe_structure(scene: Scene, known: Findings | None = None) -> Any:
     """Return what scenes must have in common to stand in one batch.
 
     With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
     The other steppers know no runs, so for them all cells must be alike.
+
+    Parameters
+    ----------
+    scene : Scene
+    known : Findings, optional
+        Of scenes before, with which this one has parts in common.
 
     Raises
     ------
     ParameterError
         When the scene's parts do not go together.
     """
+    known = known or Findings()
     physics = tuple(scene.section(name) for name in PHYSICS)
     fingertips = tuple(finger.fingertip for finger in scene.fingers)
     sensors = scene.sensors and replace(scene.sensors, seed=0)
     rounds = sensors and bool(sensors.force_step or sensors.height_step)
+    parts = fingertips, scene.control, scene.blister, sensors
     common = (
         scene.layout,
         scene.method if scene.control else None,
         scene.shape is None,
-        *(classify(part) for part in (fingertips, scene.control, scene.blister, sensors)),
+        *(known.find(KINDS, part, classify, part) for part in parts),
         rounds,
         sensors and sensors.noisy,
         scene.recorder,
@@ -53,20 +92,23 @@ def describe_structure(scene: Scene) -> Any:
     )
     if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
-    system = assemble(scene)
-    steps = tuple(
-        (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(system)
+    steps = scene.simulation.control_period, scene.simulation.steps, scene.simulation.stepper
+    motion: Motion = known.find(MOTIONS, (physics, fingertips, steps), make_motion, scene)
+    bed: Grid = known.find(BEDS, scene.layout, make_grid, scene.layout)
+    nodes = tuple(
+        (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in _plans(motion)
     )
-    return (*common, classify(physics), system.rows, steps, system.instants.size)
+    kind = known.find(KINDS, physics, classify, physics)
+    return (*common, kind, count_rows(scene, bed, motion), nodes, motion.instants.size)
 
 
-def _plans(system: System) -> tuple[BernoulliPlan, ...]:
+def _plans(motion: Motion) -> tuple[BernoulliPlan, ...]:
     """Return the plans of closed-form steps, the coarse one first; none with another stepper."""
-    match system.stepper.name:
+    match motion.stepper.name:
         case "bernoulli":
-            return (system.plan,)
+            return (motion.plan,)
         case "richardson":
-            return system.plan.coarse, system.plan.fine
+            return motion.plan.coarse, motion.plan.fine
     return ()
 
 

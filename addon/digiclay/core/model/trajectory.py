@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +137,11 @@ class Path:
         return cls(waypoints=tuple(points))
 
     def trajectory(self) -> Trajectory:
-        """Return the path as something that has poses."""
+        """Return the path as something that has poses, made once: many scenes may have the same path."""
+        return self._trajectory
+
+    @cached_property
+    def _trajectory(self) -> Trajectory:
         times, positions, turns = (
             np.array([getattr(point, name) for point in self.waypoints], dtype=np.float64)
             for name in ("time", "position", "orientation")

@@ -5,7 +5,11 @@ Modules of parts that a scene may leave out are imported where the part is put i
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..control.methods import METHODS
 from ..engine.active_set import Selection
@@ -22,11 +26,36 @@ from ..model.touch import Touch
 from ..model.valve import Orifice
 from .schema import STEPPERS, Finger, Scene, import_part
 
-__all__ = ["assemble"]
+__all__ = ["Motion", "assemble", "count_rows", "make_motion"]
+
+Floats = NDArray[np.float64]
 
 
-def assemble(scene: Scene) -> System:
-    """Build the system of a scene."""
+@dataclass(frozen=True)
+class Motion:
+    """Part of a system that depends neither on the bed, the control nor the sensors: how a cell moves.
+
+    Attributes
+    ----------
+    cell : Cell
+    line : Queue
+        Commands on their way.
+    stepper : Stepper
+    plan : object
+        The stepper's.
+    instants : ndarray
+        See `engine.system.make_segments`.
+    """
+
+    cell: Cell
+    line: Queue
+    stepper: Stepper
+    plan: Any
+    instants: Floats
+
+
+def make_motion(scene: Scene) -> Motion:
+    """Build a scene's cells and the plan of their steps."""
     stepper = _make_stepper(scene)
     period = scene.simulation.control_period
     cell = Cell(scene.actuator, _make_flow(scene), scene.supply, _make_lag(scene), _make_touch(scene))
@@ -34,21 +63,54 @@ def assemble(scene: Scene) -> System:
     # An opening that lags has a kink where the next command comes through; one that does not, a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
     steps, instants = make_segments(stepper, cut, period, scene.simulation.steps)
+    return Motion(cell, line, stepper, stepper.plan(cell, line, steps), instants)
+
+
+def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
+    """Return how many rows the state of a scene's system has.
+
+    Parameters
+    ----------
+    scene : Scene
+    bed : Grid
+    motion : Motion
+        Both its own.
+    """
+    return _count_rows(motion, *_make_control(scene, bed, motion))
+
+
+def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller | None, Sensors | None]:
+    """Build the control method and the sensors."""
+    return (
+        _make_controller(scene, bed, motion.cell),
+        _make_sensors(scene, motion.cell, motion.line),
+    )
+
+
+def _count_rows(motion: Motion, controller: Controller | None, sensors: Sensors | None) -> Rows:
+    """Return the rows of each part's memory."""
+    own = controller.rows if controller else 0, sensors.rows if sensors else 0
+    return Rows(motion.cell.rows, motion.line.length, *own)
+
+
+def assemble(scene: Scene) -> System:
+    """Build the system of a scene."""
+    motion, period = make_motion(scene), scene.simulation.control_period
     bed = make_grid(scene.layout)
-    controller, sensors = _make_controller(scene, bed, cell), _make_sensors(scene, cell, line)
-    rows = Rows(cell.rows, line.length, controller.rows if controller else 0, sensors.rows if sensors else 0)
-    fastest = find_speeds(cell).rise
+    controller, sensors = _make_control(scene, bed, motion)
+    rows = _count_rows(motion, controller, sensors)
+    fastest = find_speeds(motion.cell).rise
     return System(
         grid=bed,
-        cell=cell,
+        cell=motion.cell,
         sensors=sensors,
         controller=controller,
-        stepper=stepper,
+        stepper=motion.stepper,
         period=period,
-        plan=stepper.plan(cell, line, steps),
+        plan=motion.plan,
         fastest=fastest,
-        selection=Selection(bed, rows, cell, period, fastest),
-        instants=instants,
+        selection=Selection(bed, rows, motion.cell, period, fastest),
+        instants=motion.instants,
         rows=rows,
         by_set=_depends_on_set(scene),
     )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.errors import ParameterError, SceneError
+from ..base.part_table import ReadParts
 from ..base.sample_file import find_file, list_files
 from ..base.toml_text import LARGEST, parse_tables
 from .schema import Scene
@@ -73,7 +75,9 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     return make_scene(path, read_table(path), settings)
 
 
-def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = ()) -> Scene:
+def make_scene(
+    path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), known: ReadParts | None = None
+) -> Scene:
     """Make a scene of its file's content, overridden by settings.
 
     Parameters
@@ -83,6 +87,8 @@ def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting]
     table : mapping
         What `read_table` gives of it; it stays as it is.
     settings : sequence of Setting, optional
+    known : ReadParts, optional
+        Parts of scenes of the same file, which are not read again.
 
     Raises
     ------
@@ -91,7 +97,7 @@ def make_scene(path: Path, table: Mapping[str, Any], settings: Sequence[Setting]
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent))
-        return resolve(_override(merged, settings), path.stem)
+        return resolve(_override(merged, settings), path.stem, known)
     except ParameterError as error:
         if settings:
             make_scene(path, table)  # a file that is wrong by itself is told of first
@@ -146,6 +152,7 @@ def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str
     return whole
 
 
+@lru_cache(maxsize=1024)
 def _read_value(text: str) -> Any:
     """Read the value of a setting: TOML, or else a bare text."""
     try:

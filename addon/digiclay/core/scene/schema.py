@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import ParameterError
@@ -96,6 +97,7 @@ MOST_STEPS = 1000
 MOST_CUT = {"adaptive": 10, "richardson": 500}
 
 
+@lru_cache
 def import_part(module: str, name: str) -> Any:
     """Import a class of the core by name, now that a scene needs it.
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.part_table import read_part, refuse_unknown, shorten, show_value
+from ..base.part_table import ReadParts, read_part, refuse_unknown, shorten, show_value
 from ..base.quantity import Parameters, list_quantities
 from ..base.toml_text import format_value
 from ..control.methods import METHODS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
-__all__ = ["ABSENT", "FINGERS", "PRESETS", "format_scene", "merge_one_finger", "resolve"]
+__all__ = ["ABSENT", "FINGERS", "PRESETS", "format_scene", "merge_one_finger", "resolve", "write_part"]
 
 Table = Mapping[str, Any]
+Writer = Callable[..., Iterable[str]]
 
 #: What stands for a part that is left out.
 ABSENT = "absent"
@@ -36,7 +37,7 @@ TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 HEXAGONAL_SHARE = 0.29
 
 
-def resolve(table: Table, name: str = "") -> Scene:
+def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Scene:
     """Make a scene of the tables of a scene file; whatever they leave open gets its default.
 
     Parameters
@@ -45,12 +46,15 @@ def resolve(table: Table, name: str = "") -> Scene:
         As `tomllib.loads` gives it.
     name : str, optional
         The scene's name, where the table has none.
+    known : ReadParts, optional
+        Parts of similar tables, which are not read again.
 
     Raises
     ------
     ParameterError
         Its owner is the section.
     """
+    known = known or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
     texts: dict[str, Any] = {
         key: _check_text(key, table.get(key, default))
@@ -79,11 +83,11 @@ def resolve(table: Table, name: str = "") -> Scene:
         usual = defaults.get(section, {})
         if section == "blister":
             usual |= METHODS[method].blister or {}
-        parts[section] = read_part(section, import_parameters(section, method), usual, own)
+        parts[section] = known.read(section, import_parameters(section, method), usual, own)
     if parts["layout"].arrangement == "hexagonal":
         defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
     rest_height = parts["actuator"].rest_height
-    fingers = tuple(_read_finger(owner, own, defaults, rest_height) for owner, own in tables)
+    fingers = tuple(_read_finger(owner, own, defaults, rest_height, known) for owner, own in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
 
 
@@ -121,7 +125,9 @@ def merge_one_finger(table: Table) -> dict[str, Any]:
     return {**{key: value for key, value in table.items() if key != FINGERS}, **given[0]}
 
 
-def _read_finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float) -> Finger:
+def _read_finger(
+    owner: str, table: Table, defaults: dict[str, dict[str, Any]], rest_height: float, known: ReadParts
+) -> Finger:
     """Make a finger of its sections; `owner` stands before their names in messages."""
     parts: dict[str, Any] = {}
     for section in FINGER_PARTS:
@@ -129,19 +135,20 @@ def _read_finger(owner: str, table: Table, defaults: dict[str, dict[str, Any]], 
         if own is None or (needed and parts[needed] is None):
             parts[section] = None
             continue
-        parts[section] = read_part(
+        parts[section] = known.read(
             owner + section, import_parameters(section, ""), defaults.get(section, {}), own
         )
-    return Finger(
-        **parts, trajectory=_read_path(owner + "trajectory", table.get("trajectory", {}), rest_height)
-    )
+    owner, own = f"{owner}trajectory", table.get("trajectory", {})
+    path = known.keep((owner, repr(own), rest_height), _read_path, owner, own, rest_height)
+    return Finger(**parts, trajectory=path)
 
 
 def _check_text(key: str, value: Any) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
         raise ParameterError(key, "", "must be a text", show_value(value))
-    if not all(letter.isprintable() or (letter in "\n\t" and key == "description") for letter in value):
+    one_line = value.replace("\n", "").replace("\t", "") if key == "description" else value
+    if not one_line.isprintable():
         raise ParameterError(key, "", "must be printable", show_value(value))
     return value
 
@@ -205,12 +212,19 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
     return read_part(owner, Waypoint, {}, row)
 
 
-def format_scene(scene: Scene) -> str:
-    """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units."""
-    return "\n".join(_write_lines(scene)) + "\n"
+def format_scene(scene: Scene, write: Writer | None = None) -> str:
+    """Write a scene as a scene file that resolves to an equal one: every parameter, in SI units.
+
+    Parameters
+    ----------
+    scene : Scene
+    write : callable, optional
+        Another `write_part`.
+    """
+    return "\n".join(_write_lines(scene, write or write_part)) + "\n"
 
 
-def _write_lines(scene: Scene) -> Iterator[str]:
+def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
     """Return the lines of a scene file; one finger is written in the form of versions without more."""
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
@@ -223,22 +237,33 @@ def _write_lines(scene: Scene) -> Iterator[str]:
         yield f"{FINGERS} = []"
     for name in sections:
         method = scene.method if name == "control" else ""
-        yield from _write_part(name, scene.section(name), method)
+        yield from write(name, scene.section(name), method)
     for finger in scene.fingers:
         if alone:
-            yield from _write_path("trajectory", finger.trajectory)
+            yield from write("trajectory", finger.trajectory)
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
         yield from (f'{name} = "{ABSENT}"' for name in parts if name in OPTIONAL and parts[name] is None)
         for name, part in parts.items():
-            yield from _write_part(f"{FINGERS}.{name}", part)
-        yield from _write_path(f"{FINGERS}.trajectory", finger.trajectory)
+            yield from write(f"{FINGERS}.{name}", part)
+        yield from write(f"{FINGERS}.trajectory", finger.trajectory)
 
 
-def _write_part(section: str, part: Parameters | None, method: str = "") -> Iterator[str]:
-    """Return the lines of a section; none for an omitted part."""
+def write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
+    """Return the lines of a section; none for an omitted part.
+
+    Parameters
+    ----------
+    section : str
+    part : Parameters, Path or None
+    method : str, optional
+        The control method, in the control's section.
+    """
     if part is None:
+        return
+    if isinstance(part, Path):
+        yield from _write_path(section, part)
         return
     yield f"\n[{section}]"
     if method:

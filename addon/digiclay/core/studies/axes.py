@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SceneError
+from ..base.part_table import ReadParts
 from ..base.quantity import list_quantities
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
@@ -209,11 +210,11 @@ def place_points(
     progress : callable, optional
         Told how many points are made, and of how many.
     """
-    table, points = read_table(path), []
+    table, known, points = read_table(path), ReadParts(), []
     for index, words in enumerate(rows, first):
         varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
         try:
-            points.append(Point(index, words, make_scene(path, table, [*settings, *varied])))
+            points.append(Point(index, words, make_scene(path, table, [*settings, *varied], known)))
         except SceneError as error:
             points.append(Point(index, words, None, str(error)))
         if progress:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.errors import DigiclayError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
-from ..batch.packing import describe_structure
+from ..batch.packing import Findings, describe_structure
 from ..batch.run_together import measure_together
 from ..metrics.summary import METRICS
 from ..scene.schema import Scene
@@ -114,6 +114,7 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
         Whether errors are to be estimated: those that judge the points must then be of one structure too.
     """
     alike: dict[object, list[Point]] = {}
+    known = Findings()
     alone: list[Point] = []
     why: Counter[str] = Counter()
     for point in points:
@@ -121,11 +122,11 @@ def make_bundles(points: Sequence[Point], *, errors: bool = False) -> Bundles:
             alone.append(point)
             continue
         try:
-            judge = describe_structure(make_reference(point.scene)) if errors else None
+            judge = describe_structure(make_reference(point.scene), known) if errors else None
         except ParameterError:  # it is told when the point is run
             alone.append(point)
             continue
-        alike.setdefault((describe_structure(point.scene), judge), []).append(point)
+        alike.setdefault((describe_structure(point.scene, known), judge), []).append(point)
     batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import OutputError
 from ..base.whole_files import format_json, read_json, write_whole
-from ..scene.toml_table import format_scene
+from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
@@ -127,11 +127,20 @@ def find_unfinished(
     return [bundle for bundle in bundles if any(point.index not in records for point in bundle)]
 
 
-def hash_points(points: Iterable[Point]) -> str:
+def hash_points(points: Sequence[Point]) -> str:
     """Return a number that identifies the scenes of points, without the comments of their files."""
     scenes = hashlib.sha256()
+    written: dict[tuple[Any, ...], list[str]] = {}
+
+    def write(section: str, part: Any, method: str = "") -> list[str]:
+        # Points have most parts in common, and all of them are there until the end: a part is its address.
+        key = section, method, id(part)
+        if key not in written:
+            written[key] = [NOTE.sub("", line) for line in write_part(section, part, method)]
+        return written[key]
+
     for point in points:
-        scenes.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
+        scenes.update((format_scene(point.scene, write) if point.scene else point.error).encode())
     return scenes.hexdigest()
 
 

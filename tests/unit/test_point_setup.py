@@ -1,0 +1,70 @@
+"""Set-up of thousands of points: what they have in common is done once, and changes nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import time
+
+from digiclay.core.batch.packing import Findings, describe_structure
+from digiclay.core.scene.assembly import assemble, count_rows, make_motion
+from digiclay.core.scene.scene_source import Setting, find, list_samples, load
+from digiclay.core.scene.toml_table import format_scene
+from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.sweep_plan import NOTE, hash_points
+
+#: What other sections depend on: the method has its blister, the contact of a hexagonal bed its share.
+AXES = [
+    "control.method=virtual_master,cell_states",
+    "layout.arrangement=aligned,hexagonal",
+    "valve.stroke=20 um,30 um",
+    "delay.dead_time=5 ms,10 ms",
+]
+SHORT = [Setting("simulation.duration", "0.1")]
+
+
+def make_points_of(axes: list[str]) -> list[Point]:
+    """Return the points of a sweep of a sample."""
+    return make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in axes])
+
+
+def test_a_point_is_the_scene_with_its_values() -> None:
+    keys = [axis.partition("=")[0] for axis in AXES]
+    rows = itertools.product(*(axis.partition("=")[2].split(",") for axis in AXES))
+    made = make_points_of(AXES)
+    for point, words in zip(made, rows, strict=True):
+        varied = [Setting(key, word) for key, word in zip(keys, words, strict=True)]
+        assert point.scene == load(find("slow_press"), [*SHORT, *varied])
+
+
+def test_the_number_of_points_is_that_of_their_scene_files() -> None:
+    scenes = [load(find(name), SHORT) for name in list_samples()]
+    made = [*make_points_of(AXES[:2]), *(Point(0, (), scene) for scene in scenes), Point(1, (), None, "no")]
+    plain = hashlib.sha256()
+    for point in made:
+        plain.update((NOTE.sub("", format_scene(point.scene)) if point.scene else point.error).encode())
+    assert hash_points(made) == plain.hexdigest()
+
+
+def test_points_stand_in_the_same_batches_whatever_is_known_of_others() -> None:
+    known = Findings()
+    for point in make_points_of(AXES):
+        assert point.scene is not None
+        assert describe_structure(point.scene, known) == describe_structure(point.scene)
+        assert count_rows(point.scene, assemble(point.scene).grid, make_motion(point.scene)) == (
+            assemble(point.scene).rows
+        )
+
+
+def test_a_thousand_points_take_a_part_of_the_time_of_a_thousand_scenes() -> None:
+    axes = ["control.force_gain=1:5:20", "control.dead_band=1e-5:5e-5:10"]
+    make_points_of(axes[1:])  # imports
+    started = time.process_time()
+    made = make_points_of(axes)
+    together = time.process_time() - started
+    started = time.process_time()
+    for point in made[:50]:
+        values = [Setting("control.force_gain", point.words[0]), Setting("control.dead_band", point.words[1])]
+        load(find("slow_press"), [*SHORT, *values])
+    alone = (time.process_time() - started) * len(made) / 50
+    assert together < alone / 2  # a seventh here
