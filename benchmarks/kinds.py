@@ -9,6 +9,7 @@ from digiclay.commands.parser import Parser
 
 from . import (
     bed_size,
+    cluster_cost,
     made,
     mesh_export,
     precision,
@@ -30,6 +31,7 @@ examples:
   python -m benchmarks terms tap      cost and effect of each part of the model
   python -m benchmarks scale          a control period from 625 pins to a million
   python -m benchmarks stack          sessions a second, alone and in a batch
+  python -m benchmarks cluster        overhead of a Dask cluster, one worker against two
   python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
   python -m benchmarks ticks          how the time of a tick is distributed
@@ -49,6 +51,7 @@ def parser() -> argparse.ArgumentParser:
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
     for kind in (
         session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
+        cluster_cost,
     ):  # fmt: skip
         kind.add(kinds)
     return top
