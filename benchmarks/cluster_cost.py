@@ -17,13 +17,16 @@ from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import evaluate_bundle, make_bundles
 from digiclay.core.studies.series import finish
+from digiclay.core.studies.sweep_plan import hash_points
 
 from .report import add_kind, kept, made_with, progress, table
 
 __all__ = ["Cost", "add"]
 
-#: Empty tasks, and bundles of 32 points: as many as are measured, and with --quick.
+#: Empty tasks, and bundles of 32 points, as many as are measured; each of these in full, and with --quick.
 TASKS, BUNDLES = (2000, 200), (12, 2)
+#: Points of a sweep that is only set up: those of two axes.
+SETUP = (100, 100), (20, 20)
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
     points = make_points(find("slow_press"), settings, axes)
     bundles = make_bundles(points).batches
     costs = []
-    with progress(arguments, "cluster", 3) as bar:
+    with progress(arguments, "cluster", 4) as bar:
+        costs.append(_measure_setup(*SETUP[arguments.quick]))
+        bar("set-up")
         costs.append(_measure_here(bundles))
         bar("here")
         for workers in (1, 2):
@@ -80,6 +85,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
     head = [field.name for field in fields(Cost)]
     kept(arguments.out, "cluster", text, head, [[getattr(one, name) for name in head] for one in costs])
     return 0
+
+
+def _measure_setup(gains: int, bands: int) -> Cost:
+    """Make the points of a sweep, their bundles and the number that identifies them."""
+    axes = [read_axis(f"control.force_gain=1:8:{gains}"), read_axis(f"control.dead_band=1e-5:1e-4:{bands}")]
+    started, spent = time.perf_counter(), time.process_time()
+    points = make_points(find("slow_press"), [], axes)
+    make_bundles(points)
+    hash_points(points)
+    wall, spent = time.perf_counter() - started, time.process_time() - spent
+    return Cost("set-up", 0, len(points), wall / len(points), spent / len(points), 0.0)
 
 
 def _measure_here(bundles: Sequence[Sequence[Point]]) -> Cost:
