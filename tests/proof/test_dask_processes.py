@@ -1,4 +1,4 @@
-"""Sweeps on a Dask cluster whose processes die: a worker, the scheduler, and workers of another version."""
+"""Sweeps whose processes die: those of this machine, a cluster's worker, its scheduler; other versions."""
 
 from __future__ import annotations
 
@@ -74,6 +74,25 @@ def start_worker(start: Start, address: str, *arguments: str, **settings: Any) -
 def points(folder: Path) -> list[Path]:
     """Return the files of the points of a sweep that are done."""
     return list(folder.glob("points/*.json"))
+
+
+def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here: Path) -> None:
+    resource = pytest.importorskip("resource", reason="Windows does not limit processor time")
+    axes = ["layout.rows=3,4", "simulation.duration=0.1,1e5", "control.dead_band=1e-5"]
+    varied = [word for axis in axes for word in ("--vary", axis)]
+    # The system kills a process that has run for so many seconds: a point of hours, each time it is begun.
+    done = subprocess.run(
+        [sys.executable, "-m", "digiclay", "sweep", "my.toml", *varied, "--workers", "2", "--out", "o"],
+        capture_output=True, text=True, check=False, timeout=TIMEOUT,
+        env={**os.environ, "PYTHONPATH": str(ADDON)},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (5, 5)),
+    )  # fmt: skip
+    rule = "A worker died twice of this (signal 9), perhaps for lack of memory"
+    failed = sorted(line for line in done.stderr.splitlines() if rule in line)
+    assert [line.partition(": A")[0] for line in failed] == ["failed: point 1", "failed: point 3"]
+    assert (done.returncode, len(done.stderr.splitlines())) == (0, 2)
+    assert "4 points, 2 of them failed: see the column error" in done.stdout
+    assert sorted(path.stem for path in points(here / "o")) == ["000000", "000002"]
 
 
 def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here: Path, start: Start) -> None:

@@ -42,6 +42,12 @@ class Line:
         self._stream.flush()
         self._shown = True
 
+    def tell(self, said: str) -> None:
+        """Write a line that stays, above the one that is redrawn."""
+        self._stream.write(f"\r\033[K{said}\n" if self._shown else f"{said}\n")
+        self._stream.flush()
+        self._shown = False
+
     def format_left(self, share: float) -> str:
         """Write how long the rest takes when a share from 0 to 1 was done in the time since the beginning."""
         if share <= 0.0:

@@ -137,13 +137,18 @@ def _finish(
     def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
         folder.keep_bundle(bundle, found, keys, records)
 
+    bar = Counted(sys.stderr, "sweep", "points", len(records))
+
     def fail(bundle: Sequence[Point], why: str) -> None:
         # Told, but not kept: the same command tries them again.
         for point in bundle:
             records.setdefault(point.index, {"error": why})
+        which = (
+            f"point {bundle[0].index}" if len(bundle) == 1 else f"{len(bundle)} points from {bundle[0].index}"
+        )
+        bar.tell(f"failed: {which}: {why}")
 
     if todo:
-        bar = Counted(sys.stderr, "sweep", "points", len(records))
 
         def draw(note: str) -> None:
             if not arguments.quiet:
