@@ -19,7 +19,7 @@ LIFT, CROSS = 0.4, 1.0
 #: the master is left behind, and its depth grows from 4 to 11 mm along 60 mm.
 DRAG = 0.1
 #: Fastest drag of a finger that presses, in its half widths a second: on the bed "design", half as wide, 6 mm
-#: deep, it leaves a valley uneven by 0.8 mm at 100 mm/s, by 0.05 mm at 60 mm/s.
+#: deep, it leaves a valley uneven by 0.7 mm at 100 mm/s, by 0.05 mm at 60 mm/s.
 SPAN = 30.0
 #: How far above the highest pin the finger passes over the bed, m.
 CLEARANCE = 4e-3

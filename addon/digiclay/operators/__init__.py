@@ -15,6 +15,7 @@ from . import (
     make_mesh,
     open_scene,
     pick_pins,
+    play_strokes,
     presets,
     press_adjust,
     press_finger,
@@ -86,6 +87,7 @@ CLASSES: tuple[type, ...] = (
     take_replay.ReplayTake,
     take_actions.ExportTake,
     take_actions.RemoveTake,
+    play_strokes.PlayStrokes,
     bake_session.Bake,
     bake_session.FreeBake,
 )

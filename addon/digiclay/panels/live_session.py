@@ -94,7 +94,7 @@ class Takes(Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the recording, the list of takes, and the bake."""
+        """Draw the recording, the list of takes, strokes from a file, and the bake."""
         layout, bed = self.layout, bed_of(context)
         session = running.find(bed)
         if session is not None and session.recording is not None:
@@ -110,6 +110,7 @@ class Takes(Panel, bpy.types.Panel):
             baking.source, baking.take = "TAKE", entry.number
             row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
             row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
+        layout.operator("digiclay.play_strokes", icon="CURVE_PATH")
         layout.separator()
         if bake.is_baked(bed):
             layout.operator("digiclay.bake_free", icon="TRASH")
