@@ -39,21 +39,21 @@ def add(**chosen: Any) -> Any:
     return bpy.context.object
 
 
-def test_a_bed_added_without_choices_is_that_of_an_empty_scene_file() -> None:
+def test_a_bed_added_without_choices_is_the_papers_but_for_the_ground_of_the_blister() -> None:
     bed = add()
-    assert properties.scene_of(bed) == resolve({}, bed.name)
+    assert properties.scene_of(bed) == resolve({"control": {"ground": "cell"}}, bed.name)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_method_chosen_is_the_bed_s(method: str) -> None:
-    bed = add(method=method)
-    assert properties.scene_of(bed) == resolve({"control": {"method": method}}, bed.name)
+    bed, ground = add(method=method), {"ground": "cell"} if method == "virtual_master" else {}
+    assert properties.scene_of(bed) == resolve({"control": {"method": method, **ground}}, bed.name)
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_preset_chosen_is_the_bed_s(name: str) -> None:
     bed = add(preset=name)
-    assert properties.scene_of(bed) == resolve({"preset": name}, bed.name)
+    assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
 
 
 def test_a_preset_of_the_user_s_own_is_offered_and_taken(preset: str) -> None:

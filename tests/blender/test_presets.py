@@ -51,9 +51,9 @@ def test_applying_a_preset_sets_everything_but_the_layout(bed: Any) -> None:
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_applying_one_of_the_core_s_presets_does_what_a_scene_file_would(name: str, bed: Any) -> None:
+def test_applying_one_of_the_core_s_presets_changes_what_a_scene_file_would(name: str, bed: Any) -> None:
     assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
-    assert properties.scene_of(bed) == resolve({"preset": name}, bed.name)
+    assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
 
 
 def test_a_preset_saved_under_the_same_name_replaces_the_former(bed: Any) -> None:

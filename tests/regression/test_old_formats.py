@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from digiclay.core.base.quantity import Parameters, list_quantities
 from digiclay.core.engine.simulation import periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
@@ -32,12 +33,12 @@ TAKES = sorted(SAMPLES.glob("takes/*.take"))
 
 
 def values(scene: Scene) -> dict[str, Any]:
-    """Return a scene's values as the tables of a TOML file that spells out all of them."""
+    """Return a scene's values as the tables of a TOML file that spells out all that older versions know."""
     table: dict[str, Any] = {name: getattr(scene, name) for name in ("name", "description", "preset")}
     for section in SECTIONS:
         part = scene.section(section)
         if part is not None:
-            table[section] = {name: listed(value) for name, value in vars(part).items()}
+            table[section] = {name: listed(value) for name, value in vars(part).items() if known(part, name)}
         elif section not in ("contact", "blister"):
             table[section] = ABSENT
     if scene.control is not None:
@@ -46,6 +47,12 @@ def values(scene: Scene) -> dict[str, Any]:
     points = [{name: listed(value) for name, value in vars(point).items()} for point in path.waypoints]
     table["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
     return table
+
+
+def known(part: Parameters, name: str) -> bool:
+    """Tell whether an older version knows a parameter; a later one counts where it is not the default."""
+    default = type(part).__dataclass_fields__[name].default
+    return not list_quantities(part)[name].later or getattr(part, name) != default
 
 
 def listed(value: Any) -> Any:

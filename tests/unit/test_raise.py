@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import digiclay
@@ -19,19 +18,18 @@ from digiclay.core.session import live_periods
 from digiclay.core.session.run_scene import run
 from digiclay.live import gestures, sculpting
 from digiclay.live.running import Running
-from digiclay.live.stroke import DEEPEST, Brush, draw, start
-from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.live.stroke import DEEPEST, Brush, start
 from digiclay.live.tracking import find_tracking
 from digiclay.settings.beds import BEDS
 from digiclay.settings.devices import make_scene
 from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
+from tests.strokes import Places, begin_bed, finish, form, queue, relief
 
 Floats = NDArray[np.float64]
-Places = list[tuple[float, float]]
-#: Half the length of a stroke, mm; it is drawn within half a second.
-HALF, DURATION = 30.0, 0.5
+#: Half the length of a stroke, mm.
+HALF = 30.0
 ALONG: Places = [(-HALF, 0.0), (HALF, 0.0)]
 
 
@@ -48,47 +46,10 @@ def begin(**tables: object) -> Running:
     return sculpting.advance(session, above, 0.0, 100)
 
 
-def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
-    """Queue a quick stroke from place to place, mm."""
-    (x, y), (to_x, to_y) = (np.array(place) * 1e-3 for place in ends)
-    session, number = queue_stroke(session, x, y, depth * 1e-3, brush=brush, share=share)
-    for part in np.arange(1, 31) / 30:
-        at = x + part * (to_x - x), y + part * (to_y - y)
-        session = change_stroke(
-            session, number,
-            lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),
-        )  # fmt: skip
-    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
-
-
-def finish(session: Running, most: float = 60.0) -> Running:
-    """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
-    now = session.clock.seen or 0.0
-    for count in range(round(most / TICK)):
-        if not session.strokes:
-            break
-        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
-    assert not session.strokes
-    now = session.clock.seen or 0.0
-    for count in range(15):
-        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
-    return session
-
-
-def form(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
-    """Queue a stroke and finish it."""
-    return finish(queue(session, ends, brush, depth, share))
-
-
-def rise(session: Running) -> Floats:
-    """Return the heights above rest, shape (25, 25), mm; rows along y."""
-    return 1e3 * (heights(session) - session.system.cell.actuator.rest_height).reshape(25, 25)
-
-
 def along(session: Running, y: float = 0.0) -> Floats:
     """Return the heights of the pins that a stroke along x at y, mm, has passed, above rest, mm."""
     row = 12 + round(y / 3.0)
-    return rise(session)[row, 12 - round(HALF / 3.0) : 13 + round(HALF / 3.0)]
+    return relief(session)[row, 12 - round(HALF / 3.0) : 13 + round(HALF / 3.0)]
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +67,7 @@ def test_a_line_of_60_mm_is_raised_by_15_mm_in_one_stroke(ridge: Running) -> Non
 def test_the_ridge_has_the_section_of_the_blister(ridge: Running) -> None:
     blister = ridge.scene.blister
     assert blister is not None
-    across = rise(ridge)[:, 12]
+    across = relief(ridge)[:, 12]
     # 3 mm apart: the finger's path makes the flat top no wider than a pin's pitch.
     wanted = 15.0 * blister.evaluate_profile(np.abs(np.arange(-12, 13)) * 3e-3).clip(0.0)
     np.testing.assert_allclose(across, wanted, rtol=0, atol=1.0)
@@ -118,7 +79,7 @@ def test_the_ridge_is_the_paper_sessions_to_half_a_millimeter() -> None:
     history = run(resolve(tomllib.loads(path.read_text(encoding="utf-8")))).history
     wanted = 1e3 * history["height"][-1].reshape(25, 25)[:12, 12] - 40.0
     session = form(begin(), [(-HALF, -21.0), (HALF, -21.0)], Brush.RAISE, 15.4)
-    np.testing.assert_allclose(rise(session)[:12, 12], wanted, rtol=0, atol=0.5)
+    np.testing.assert_allclose(relief(session)[:12, 12], wanted, rtol=0, atol=0.5)
 
 
 def test_a_raise_presses_no_harder_than_a_press(ridge: Running) -> None:
@@ -130,27 +91,11 @@ def test_other_devices_raise_as_high(preset: str) -> None:
     np.testing.assert_allclose(along(form(begin(preset=preset), ALONG, Brush.RAISE)), 15.0, rtol=0, atol=1.5)
 
 
-def begin_finer(name: str, rows: int, columns: int) -> Running:
-    """Return a session on a part of the bed *design* or *fine*, with finger, blister and forces to match."""
-    scene = make_scene("paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share)
-    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
-    session, _ = sculpting.begin_session(7, "Bed", scene, above)
-    return sculpting.advance(session, above, 0.0, 100)
-
-
-def relief(session: Running) -> Floats:
-    """Return the heights above rest, (rows, columns), mm."""
-    layout = session.scene.layout
-    return 1e3 * (heights(session) - session.system.cell.actuator.rest_height).reshape(
-        layout.rows, layout.columns
-    )
-
-
 @pytest.mark.parametrize(("name", "height"), [("design", 5.0), ("design", 15.0), ("fine", 15.0)])
 def test_a_finer_bed_with_quicker_pins_raises_as_high_and_leaves_no_pin_standing(
     name: str, height: float
 ) -> None:
-    session = form(begin_finer(name, 25, 60), [(-15.0, 0.0), (15.0, 0.0)], Brush.RAISE, height)
+    session = form(begin_bed(name, 25, 60), [(-15.0, 0.0), (15.0, 0.0)], Brush.RAISE, height)
     formed, half = relief(session), round(15e-3 / BEDS[name].pitch)
     np.testing.assert_allclose(formed[12, 30 - half : 30 + half], height, rtol=0, atol=1.0)
     # The finger's sink is known to some tenths of a millimeter; the blister's flat top is no higher.
@@ -160,7 +105,7 @@ def test_a_finer_bed_with_quicker_pins_raises_as_high_and_leaves_no_pin_standing
 
 @pytest.mark.parametrize("name", ["design", "fine"])
 def test_no_pin_of_a_finer_bed_carries_more_than_its_reservoir_lifts_while_it_is_shaped(name: str) -> None:
-    session = begin_finer(name, 25, 25)
+    session = begin_bed(name, 25, 25)
     tracking = find_tracking(session.scene, session.system)
     assert tracking is not None
     assert tracking.lift > 0.01
@@ -197,7 +142,7 @@ def test_ridges_drawn_in_quick_succession_both_form() -> None:
 
 def test_a_ridge_along_the_edge_of_the_bed_is_raised_too() -> None:
     formed = form(begin(), [(-36.0, 36.0), (36.0, 36.0)], Brush.RAISE)
-    np.testing.assert_allclose(rise(formed)[-1], 15.0, rtol=0, atol=1.0)
+    np.testing.assert_allclose(relief(formed)[-1], 15.0, rtol=0, atol=1.0)
 
 
 def test_at_the_end_of_the_stroke_pins_are_raised_as_far_as_they_go() -> None:
@@ -227,7 +172,7 @@ def test_a_raise_taken_back_in_its_middle_leaves_the_bed_as_before() -> None:
     for _ in range(90):
         now += TICK
         session = sculpting.advance(session, session.pose, now, 100)
-    assert rise(session).max() > 5.0
+    assert relief(session).max() > 5.0
     np.testing.assert_array_equal(heights(gestures.withdraw_stroke(session)), before)
 
 
@@ -240,7 +185,7 @@ def test_a_method_without_a_blister_is_told_from_those_that_raise(method: str) -
 def test_a_queued_raise_ends_at_once_when_the_method_has_lost_its_blister_meanwhile() -> None:
     session = queue(begin(control={"method": "elastic"}), ALONG, Brush.RAISE)
     done = finish(session, 1.0)
-    assert (done.finished_strokes, np.abs(rise(done)).max()) == (1, 0.0)
+    assert (done.finished_strokes, np.abs(relief(done)).max()) == (1, 0.0)
 
 
 def test_ctrl_inverts_lower_and_raise_and_leaves_level_as_it_is() -> None:

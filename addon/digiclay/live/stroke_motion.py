@@ -7,7 +7,8 @@ makes the finger late, and loses nothing of the path. Depth counts from the surf
 finger began: pins that give way do not draw the finger after them. No Blender in here.
 
 A brush that raises presses until the blister starts, and rises to its height there, no faster than the
-pins can follow; then it goes along at that height, at a speed at which the pins ahead rise in time.
+pins can follow. Every brush then goes along at its height, up and down over what is formed, at a speed at
+which the pins ahead come to that height in time.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ SPEED_UP = 1.0
 #: Fastest drag of a blister, in its radii a second: the control finds the finger so much later. The pins of
 #: small beds rise quickly enough to overtake it.
 RADII = 2.0
+#: Likewise of a finger that presses a valley, and pushes the pins out of its way; `DRAG` on the paper's bed.
+PUSHED = 20.0 / 3.0
 #: How long pins look for a finger that leaves, s, and how many times as fast as they it is.
 SEARCH, OUTRUN = 0.1, 5.0
 #: How far the finger may be off its height while it goes on along the path, m.
@@ -97,12 +100,10 @@ def follow(
 
 def _begin(stroke: Stroke, height: Floats, tracking: Tracking | None) -> Stroke:
     """Return the stroke at its beginning; one whose brush needs a blister only leaves a device without."""
-    stroke = replace(stroke, height=height.copy(), phase=ABOVE)
-    if stroke.brush is Brush.LOWER:
-        return stroke
-    if tracking is None:
+    stroke = replace(stroke, height=height.copy(), phase=ABOVE, tracking=tracking)
+    if tracking is None and stroke.brush is not Brush.LOWER:
         return replace(stroke, phase=LEAVING, mirrors=stroke.mirrors[:1])
-    return replace(stroke, tracking=tracking)
+    return stroke
 
 
 def _step(
@@ -143,7 +144,7 @@ def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: floa
         stroke, x, y = drag(stroke, x, y, min(DRAG, SPAN * radius) * period)
     surface = find_ground_height(grid, height, x, y, radius)
     # Pins bottom out on the bed's floor.
-    if stroke.tracking is None:
+    if stroke.tracking is None or stroke.brush is Brush.LOWER:
         lowest, after = _find_lowest(stroke, grid, x, y, radius), DRAGGING
     else:
         lowest, after = max(0.0, surface - stroke.tracking.press), RISING
@@ -179,7 +180,7 @@ def _find_lowest(stroke: Stroke, grid: Grid, x: float, y: float, radius: float) 
     height, sample = stroke.height, stroke.samples[stroke.reached]
     assert height is not None
     surface = find_ground_height(grid, height, x, y, radius)
-    if stroke.tracking is None:
+    if stroke.tracking is None or stroke.brush is Brush.LOWER:
         return max(0.0, surface - sample.depth)
     if stroke.brush is Brush.RAISE:
         top = surface + sample.depth
@@ -197,7 +198,8 @@ def _limit_drag(stroke: Stroke, grid: Grid, place: Place) -> float:
     tracking = stroke.tracking
     near = stroke.height[grid.disc(x, y, tracking.radius)]
     change = float(np.abs(near - z - tracking.sink).max(initial=NEAR))
-    return min(DRAG, RADII * tracking.radius, tracking.speed / (tracking.slope * change))
+    radii = PUSHED if stroke.brush is Brush.LOWER else RADII
+    return min(DRAG, radii * tracking.radius, tracking.speed / (tracking.slope * change))
 
 
 def _climb(z: float, climb: float, aim: float, fastest: float, period: float) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..core.base.quantity import list_quantities
+from ..core.control.master import VirtualMaster
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.scene_source import load
@@ -26,6 +27,9 @@ BORE = 2 / 3
 def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> Scene:
     """Return the scene of a preset, with another plan of the bed, another method and another size of finger.
 
+    In Method I the blister rises from each cell's own height: the paper's strokes do not cross, those of a
+    sculptor do.
+
     Parameters
     ----------
     preset : str
@@ -43,7 +47,10 @@ def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> 
     """
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
-        return change_layout(_scale_finger(resolve({"preset": preset, **control}), share), layout)
+        scene = resolve({"preset": preset, **control})
+        if isinstance(scene.control, VirtualMaster):
+            scene = replace(scene, control=replace(scene.control, ground="cell"))
+        return change_layout(_scale_finger(scene, share), layout)
     scene = load(path(preset))
     if scene.method != method:
         plain = resolve(control)

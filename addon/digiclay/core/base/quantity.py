@@ -48,7 +48,8 @@ class Quantity:
 
     Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
     ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
-    the key of a reference in docs/nomenclature.md; several are set apart by commas.
+    the key of a reference in docs/nomenclature.md; several are set apart by commas. A `later` one is
+    unknown to older versions: it is written only where it is not the default, so that these read the rest.
     """
 
     doc: str
@@ -60,6 +61,7 @@ class Quantity:
     below: float | None = None
     at_most: float | None = None
     choices: tuple[str, ...] = ()
+    later: bool = False
 
     def show(self, value: object) -> str:
         """Write `value` the way messages do, with the unit."""

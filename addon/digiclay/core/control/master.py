@@ -60,6 +60,12 @@ class VirtualMaster(Tracking):
     loss_time: float = quantity(
         50e-3, "time without force until a loss", unit="s", symbol="t_l", at_least=0.0
     )
+    ground: str = quantity(
+        "edge",
+        "surface from which the blister rises: the mean height at its edge, or each cell's own",
+        choices=("edge", "cell"),
+        later=True,
+    )
 
     @property
     def set_point(self) -> SetPoint:
@@ -196,10 +202,6 @@ class MasterControl(BatchControl):
     def is_active(self, master: Master) -> bool:
         """Tell whether a master follows a finger."""
         return master.phase is not Phase.IDLE
-
-    def is_sunk(self, master: Master) -> bool:
-        """Tell whether a master is below the surface around it."""
-        return master.height < master.edge
 
     def get_place(self, master: Master) -> tuple[float, float]:
         """Return where a master is, m."""

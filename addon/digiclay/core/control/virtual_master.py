@@ -23,6 +23,7 @@ from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo, check_floor, suppress_noise
+from .ground import GROUNDS, EdgeGround, OwnGround
 from .master import Master, MasterControl, Phase, VirtualMaster
 from .master_cell import make_master_cell
 from .runs import decide_by_any, decide_by_run, gather_by_run, sum_weighted
@@ -50,13 +51,20 @@ class VirtualMasterControl(MasterControl):
         Force the high reservoir can lift, N.
     floor : float
         Force from which on the reading of a cell is no noise, N.
+    ground : EdgeGround or OwnGround
+        Surface from which the blister rises.
     """
 
     lift: float
     floor: float = 0.0
+    ground: EdgeGround | OwnGround = GROUNDS["edge"]
 
     name = "virtual_master"
-    rows = 0
+
+    @property
+    def rows(self) -> int:
+        """State rows a cell needs."""
+        return self.ground.rows
 
     @property
     def batch_class(self) -> type[VirtualMasterControl]:
@@ -134,7 +142,8 @@ class VirtualMasterControl(MasterControl):
         level = sum_weighted(seen.height, facing).tolist()
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind, beyond = self.get_heights(memory)
-        profile = self.blister.interpolate(distance, edge, top)
+        ground = self.ground.find(seen, edge)
+        profile = self.blister.interpolate(distance, ground, top)
         frozen = ahead < behind * distance
         frozen &= distance > flat_radius
         frozen |= seen.mode == froze
@@ -142,9 +151,7 @@ class VirtualMasterControl(MasterControl):
         frozen &= seen.force < release
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
-            kept = seen.target > profile
-            if self.is_sunk(memory):
-                kept ^= top < edge
+            kept = self.ground.find_kept(seen.target, profile, ground, top)
             kept |= beyond
             kept &= frozen
             np.putmask(profile, kept, seen.target)
@@ -197,7 +204,6 @@ class VirtualMasterBatch(VirtualMasterControl):
 
     is_active = decide_by_any(MasterControl.is_active)
     is_new = decide_by_any(MasterControl.is_new)
-    is_sunk = decide_by_any(MasterControl.is_sunk)
 
 
 def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl:
@@ -213,4 +219,5 @@ def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)
     model = make_master_cell(device.cell, device.period)
     parts = parameters, device.blister, device.cell.actuator, model
-    return VirtualMasterControl(*parts, device.period, device.lift, device.force_floor)
+    ground = GROUNDS[parameters.ground]
+    return VirtualMasterControl(*parts, device.period, device.lift, device.force_floor, ground)

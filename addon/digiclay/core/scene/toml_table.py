@@ -268,9 +268,11 @@ def write_part(section: str, part: Parameters | Path | None, method: str = "") -
     yield f"\n[{section}]"
     if method:
         yield f"method = {format_value(method)}"
-    for key, known in list_quantities(part).items():
-        note = f"{known.unit}: {known.doc}" if known.unit else known.doc
-        yield f"{key} = {format_value(getattr(part, key))}  # {note}"
+    for field in dataclasses.fields(part):
+        known, value = field.metadata["quantity"], getattr(part, field.name)
+        if not known.later or value != field.default:
+            note = f"{known.unit}: {known.doc}" if known.unit else known.doc
+            yield f"{field.name} = {format_value(value)}  # {note}"
 
 
 def _write_path(section: str, path: Path) -> Iterator[str]:

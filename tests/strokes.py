@@ -1,0 +1,101 @@
+"""Press strokes of every brush in sessions without Blender, and the shape that they leave."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout
+from digiclay.live import sculpting
+from digiclay.live.running import Running
+from digiclay.live.stroke import Brush, draw
+from digiclay.live.stroke_queue import change_stroke, queue_stroke
+from digiclay.settings.beds import BEDS
+from digiclay.settings.devices import make_scene
+from numpy.typing import NDArray
+
+from tests.hand import TICK, heights
+
+__all__ = ["Places", "begin_bed", "finish", "form", "measure_spikes", "queue", "relief"]
+
+Floats = NDArray[np.float64]
+Places = list[tuple[float, float]]
+#: Within how long a stroke is drawn, s: the finger is late, and goes as fast as it may.
+DURATION = 0.5
+
+
+def begin_bed(name: str, rows: int, columns: int) -> Running:
+    """Return a session on a part of a bed that Add offers.
+
+    Parameters
+    ----------
+    name : str
+        Of `BEDS`.
+    rows, columns : int
+    """
+    scene = make_scene("paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share)
+    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
+    session, _ = sculpting.begin_session(7, "Bed", scene, above)
+    return sculpting.advance(session, above, 0.0, 100)
+
+
+def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+    """Queue a quick stroke from place to place, mm."""
+    (x, y), (to_x, to_y) = (np.array(place) * 1e-3 for place in ends)
+    session, number = queue_stroke(session, x, y, depth * 1e-3, brush=brush, share=share)
+    for part in np.arange(1, 31) / 30:
+        at = x + part * (to_x - x), y + part * (to_y - y)
+        session = change_stroke(
+            session, number,
+            lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),
+        )  # fmt: skip
+    return change_stroke(session, number, lambda stroke: replace(stroke, held=False))
+
+
+def finish(session: Running, most: float = 60.0) -> Running:
+    """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
+    now = session.clock.seen or 0.0
+    for count in range(round(most / TICK)):
+        if not session.strokes:
+            break
+        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    assert not session.strokes
+    now = session.clock.seen or 0.0
+    for count in range(15):
+        session = sculpting.advance(session, session.pose, now + (count + 1) * TICK, 100)
+    return session
+
+
+def form(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+    """Queue a stroke and finish it."""
+    return finish(queue(session, ends, brush, depth, share))
+
+
+def relief(session: Running) -> Floats:
+    """Return the heights above rest, (rows, columns), mm; rows along y."""
+    layout = session.scene.layout
+    risen = 1e3 * (heights(session) - session.system.cell.actuator.rest_height)
+    return risen.reshape(layout.rows, layout.columns)
+
+
+def measure_spikes(formed: Floats) -> float:
+    """Return how far the worst pin is above or below all pins around it, mm.
+
+    Parameters
+    ----------
+    formed : ndarray (rows, columns)
+        Heights, mm. Around a pin are its eight neighbors, and likewise the sixteen around these: spikes of
+        two or three pins side by side count, too.
+    """
+    worst = 0.0
+    rows, columns = formed.shape
+    for reach in (1, 2):
+        padded = np.pad(formed, reach, mode="edge")
+        steps = range(-reach, reach + 1)
+        around = np.array([
+            padded[reach + i : reach + i + rows, reach + j : reach + j + columns]
+            for i in steps for j in steps if max(abs(i), abs(j)) == reach
+        ])  # fmt: skip
+        worst = max(worst, float((formed - around.max(0)).max()), float((around.min(0) - formed).max()))
+    return worst

@@ -1,0 +1,105 @@
+"""Blister that rises from each cell's own height: what is formed already is not cut."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.blister import Blister
+from digiclay.core.control.ground import GROUNDS
+from digiclay.core.control.virtual_master import Master, VirtualMaster
+from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.scene.toml_table import format_scene, resolve
+from numpy.typing import NDArray
+
+from tests.assemble import make_system, master
+
+Floats = NDArray[np.float64]
+BED = make_grid(Layout(15, 15))
+EAST = (1.0, 0.0)
+#: A ridge along y that the blister is above, of 4 mm.
+RIDGE = np.where(np.abs(BED.x) < 4e-3, 44e-3, 40e-3)
+
+
+def seen(target: Floats, mode: Mode, own: Floats | None = None) -> Measurement:
+    """Return a measurement of a whole bed at its commanded heights that nobody touches."""
+    cells, modes = np.arange(BED.count), np.full(BED.count, mode, np.int8)
+    rows = np.zeros((1, BED.count)) if own is None else own[None].copy()
+    free = np.zeros(BED.count)
+    return Measurement(BED.compute_basis(cells), target.copy(), free, target.copy(), modes, rows, cells)
+
+
+def command(memory: Master, measured: Measurement, ground: str = "cell") -> Commands:
+    """Return what Method I commands."""
+    control = VirtualMaster(ground=ground)
+    orders: Commands = make_system(Layout(15, 15), control=control).controller.command(memory, measured)[1]
+    return orders
+
+
+def at(x: float, y: float) -> int:
+    """Return the cell at a place in mm."""
+    return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
+
+
+def test_cells_at_the_rim_stay_where_they_are_formed() -> None:
+    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD)).target
+    assert target[at(0, 15)] == pytest.approx(44e-3, abs=1e-9)
+    assert target[at(15, 0)] == pytest.approx(40e-3, abs=1e-9)
+
+
+def test_the_papers_ground_cuts_a_ridge_at_the_rim() -> None:
+    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target
+    assert target[at(0, 15)] < 42e-3
+
+
+def test_between_rim_and_flat_top_each_cell_goes_its_share_of_the_way_to_the_top() -> None:
+    target = command(master(height=50e-3), seen(RIDGE, Mode.HOLD)).target
+    share = Blister().evaluate_profile(np.array([12e-3]))[0]
+    assert target[at(0, 12)] == pytest.approx(44e-3 + share * 6e-3, abs=1e-9)
+    assert target[at(12, 0)] == pytest.approx(40e-3 + share * 10e-3, abs=1e-9)
+
+
+def test_a_blister_that_stays_rises_from_where_its_cells_were_when_it_came() -> None:
+    risen = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e-3))
+    share = Blister().evaluate_profile(np.array([12e-3]))[0]
+    target = command(master(height=50e-3), risen).target
+    assert target[at(12, 0)] == pytest.approx(40e-3 + share * 10e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("mode", [Mode.REST, Mode.HOLD, Mode.EDGE])
+def test_a_cell_that_was_outside_takes_its_commanded_height_for_its_ground(mode: Mode) -> None:
+    measured = seen(RIDGE, mode, own=np.full(BED.count, 90e-3))
+    command(master(height=50e-3), measured)
+    np.testing.assert_array_equal(measured.own[0], RIDGE)
+
+
+@pytest.mark.parametrize(
+    ("target", "ground", "top", "kept"),
+    [
+        (44e-3, 40e-3, 46e-3, True),  # raised farther than the blister raises it there
+        (41e-3, 40e-3, 46e-3, False),  # a higher blister takes it along
+        (48e-3, 44e-3, 42e-3, True),  # raised on a ridge beside which the blister sinks
+        (38e-3, 40e-3, 46e-3, False),  # a dent under a blister that rises
+        (38e-3, 40e-3, 39e-3, True),  # a valley behind a blister in a flatter one
+        (39.9e-3, 40e-3, 30e-3, False),  # a deeper blister takes it along
+    ],
+)
+def test_what_is_left_behind_a_blister_that_travels(
+    target: float, ground: float, top: float, kept: bool
+) -> None:
+    behind = seen(np.full(BED.count, target), Mode.FROZEN, own=np.full(BED.count, ground))
+    found = command(master(*EAST, height=top), behind).target[at(-12, 0)]
+    assert (found == target) == kept
+
+
+def test_a_scene_with_the_papers_ground_is_written_as_older_versions_read_it() -> None:
+    assert "ground" not in format_scene(resolve({}))
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_a_scene_is_read_with_the_ground_it_was_written_with(ground: str) -> None:
+    scene = resolve({"control": {"ground": ground}})
+    assert resolve(tomllib.loads(format_scene(scene))) == scene
