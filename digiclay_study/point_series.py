@@ -139,13 +139,21 @@ class Evaluation:
 
 @contextmanager
 def open_evaluation(
-    arguments: argparse.Namespace, subject: Subject, folder: Folder, pieces: int, total: int, stop: Stop
+    arguments: argparse.Namespace,
+    name: str,
+    subject: Subject,
+    folder: Folder,
+    pieces: int,
+    total: int,
+    stop: Stop,
 ) -> Iterator[Evaluation]:
     """Open the pool of the options, with a progress line of all points.
 
     Parameters
     ----------
     arguments : argparse.Namespace
+    name : str
+        Kind of the series, at the beginning of the line.
     subject : Subject
     folder : Folder
     pieces : int
@@ -155,7 +163,7 @@ def open_evaluation(
     stop : Stop
     """
     records = select_done(folder.read_records(), errors=subject.errors)
-    bar = Counted(sys.stderr, folder.path.name, "points", len(records))
+    bar = Counted(sys.stderr, name, "points", len(records))
 
     def draw(note: str) -> None:
         if not arguments.quiet:

@@ -111,7 +111,9 @@ def _evaluate(
 ) -> dict[int, Record]:
     """Run the unchanged scene and the points that are not in the folder yet; return the records of all."""
     every = (*bundles.batches, *bundles.alone)
-    with open_evaluation(arguments, subject, folder, len(every), len(points) + 1, stop) as evaluation:
+    with open_evaluation(
+        arguments, "study", subject, folder, len(every), len(points) + 1, stop
+    ) as evaluation:
         unchanged = evaluation.evaluate_unchanged()
         if unchanged is None:
             return evaluation.records

@@ -113,7 +113,7 @@ def _evolve(
     """
     size, done = arguments.population, list[Point]()
     generations = propose_generations(len(subject.ranges), size, arguments.seed)
-    with open_evaluation(arguments, subject, folder, -(-size // 4), total, stop) as evaluation:
+    with open_evaluation(arguments, "tune", subject, folder, -(-size // 4), total, stop) as evaluation:
         unchanged = evaluation.evaluate_unchanged()
         if unchanged is None:
             return done, evaluation.records

@@ -67,7 +67,7 @@ def test_the_zip_has_the_package_and_nothing_that_was_left_lying_about(archive: 
     assert archive.stat().st_size < 5e6
 
 
-def test_no_benchmark_and_no_module_of_the_paper_is_in_the_zip(archive: Path) -> None:
+def test_no_benchmark_and_no_module_of_the_paper_or_the_studies_is_in_the_zip(archive: Path) -> None:
     files = [path for folder in BESIDE for path in (TOOL.parents[1] / folder).glob("*.py")]
     contents = {path.read_bytes() for path in files}
     assert len(contents) > 30
@@ -120,7 +120,12 @@ def test_a_users_presets_stand_in_the_extensions_own_folder(seen: dict[str, Any]
 
 @pytest.mark.parametrize(
     ("command", "said"),
-    [("paper", "run 'pip install digiclay[plots]' first."), ("benchmark", "'python -m benchmarks --help'")],
+    [
+        ("paper", "run 'pip install digiclay[plots]' first."),
+        ("study", "run 'pip install digiclay[study]' first."),
+        ("tune", "run 'pip install digiclay[study]' first."),
+        ("benchmark", "'python -m benchmarks --help'"),
+    ],
 )
 def test_the_installed_command_says_in_a_line_what_is_not_part_of_it(
     command: str, said: str, seen: dict[str, Any]

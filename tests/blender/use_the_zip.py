@@ -57,7 +57,7 @@ def main() -> None:
     seen["export"] = command(["export", str(run), "--out", str(FOLDER), "--format", "stl"])
     still = ["--out", str(FOLDER / "still.png"), "--size", "160x100", "--engine", "workbench"]
     seen["render"] = command(["render", str(run), *still])
-    for outside in ("paper", "benchmark"):
+    for outside in ("paper", "study", "tune", "benchmark"):
         with redirect_stderr(StringIO()) as told:
             seen[outside] = [command([outside]), told.getvalue()]
     addon_utils.disable(EXTENSION, default_set=True)

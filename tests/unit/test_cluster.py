@@ -68,6 +68,23 @@ def test_a_sweep_on_a_cluster_comes_to_the_table_of_this_machine(here: Path, add
     assert len(list((here / "far/points").iterdir())) == 8
 
 
+@pytest.mark.parametrize(
+    ("command", "size"),
+    [("study", ("--samples", "4")), ("tune", ("--population", "4", "--generations", "2"))],
+)
+def test_a_study_and_a_tuning_on_a_cluster_come_to_the_tables_of_this_machine(
+    command: str, size: tuple[str, ...], here: Path, address: str
+) -> None:
+    varied = ["--vary", "control.force_gain=1:2", "--vary", "control.position_gain=100:900"]
+    words = [command, "my.toml", *varied, *size, "--metric", "rfd,highest", "--quiet"]
+    assert main([*words, "--workers", "1", "--out", "own"]) == 0
+    assert main([*words, "--scheduler", address, "--out", "far"]) == 0
+    tables = [sorted(path.name for path in (here / where).glob("*.csv")) for where in ("own", "far")]
+    assert len(tables[0]) == 2
+    assert tables[0] == tables[1]
+    assert all((here / "own" / name).read_bytes() == (here / "far" / name).read_bytes() for name in tables[0])
+
+
 def test_after_a_stop_no_task_is_left_in_the_cluster(address: str) -> None:
     with Client(address, set_as_default=False) as client:
 
