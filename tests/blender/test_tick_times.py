@@ -6,11 +6,12 @@ import csv
 from pathlib import Path
 
 import pytest
+from digiclay.core.session import live_periods
 from digiclay.live import bed_state, running, sculpting
 
 from benchmarks import ticks
 from benchmarks.__main__ import main
-from benchmarks.tick_times import DEPTH, PARTS, measure
+from benchmarks.tick_times import DEPTH, PARTS, RATE, measure
 
 
 def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
@@ -28,17 +29,21 @@ def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
 
 
 def test_the_finger_presses_while_ticks_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    lowest = []
+    lowest, periods = [], []
     advance = sculpting.advance
 
     def watched(*arguments: object) -> running.Running:
         session = advance(*arguments)  # type: ignore[arg-type]
         lowest.append(float(session.state.row(0).min()))
+        periods.append(session.state.period)
         return session
 
     monkeypatch.setattr(sculpting, "advance", watched)
+    monkeypatch.setattr(live_periods, "SHARE", 0.0)  # a machine too slow for more than one period a tick
     measure(11, 11, 3e-3, 2e-3, ticks=6)
+    assert live_periods.SHARE == 0.0
     assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
+    assert periods[-1] - periods[-7] == 6 / RATE / 5e-3
 
 
 def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
