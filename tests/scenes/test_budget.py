@@ -23,7 +23,7 @@ from tests.assemble import record, sample
 
 NAMES = sorted(path.stem for path in SAMPLES.glob("*.toml"))
 #: What is checked of each session, s: the first touches, and what follows from them.
-CUT = 0.9
+CUT = 0.7
 BUDGET = 20e-6
 
 
