@@ -69,7 +69,9 @@ class Range:
 
     def convert(self, word: str) -> float | str:
         """Return a value of the range in SI; a choice as it is."""
-        return word if self.words else float(word.partition(" ")[0]) * self.factor
+        if self.words or self.whole:
+            return int(word) if self.whole else word
+        return float(word.partition(" ")[0]) * self.factor
 
     def __str__(self) -> str:
         if self.words:

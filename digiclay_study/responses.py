@@ -92,8 +92,8 @@ def make_response(name: str, records: Sequence[Record], excess: Floats) -> Respo
     replaced = absent | lost
     if replaced.all():
         first = next((record["error"] for record in records if "error" in record), "")
-        why = f": {first}" if first else " without losing the fingertip."
-        raise OutputError(f"No run has the metric {name}{why}")
+        why = f"; the first error: {first}" if first else "."
+        raise OutputError(f"No run that keeps the fingertip has the metric {name}{why}")
     values[replaced] = values[~replaced].max()
     return Response(name, values, int(absent.sum()), int(lost.sum()))
 

@@ -78,7 +78,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     total = arguments.population * arguments.generations + 1
     refuse_too_many("--population times --generations", total)
     plan = {"metrics": list(subject.names), "population": arguments.population, "seed": arguments.seed}
-    with open_folder(arguments.out, "tune", subject, plan) as folder:
+    with open_folder(arguments.out, "tuning", subject, plan) as folder:
         with Stop() as stop:
             points, records = _evolve(arguments, subject, folder, total, stop)
             if len(points) + 1 < total:
@@ -191,8 +191,8 @@ def _write(
     )
     lost = int(np.count_nonzero(~trials.sound[1:]))
     return [
-        f"{len(points)} runs, {lost} of them failed or lost the fingertip; {len(front)} are on the front",
-        f"unchanged scene: {own}; {np.count_nonzero(worse)} of the front are better in both",
+        f"{len(points)} runs, {lost} of them failed or lost the fingertip; on the front: {len(front)}",
+        f"unchanged scene: {own}; better in both: {np.count_nonzero(worse)} of the front",
         f"chosen ({choice}): {said}; {values or 'the unchanged scene'}",
     ]
 

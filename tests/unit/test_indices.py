@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.commands.evaluation_pool import Pool
-from digiclay.core.base.errors import OutputError
+from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import Record
@@ -84,6 +84,28 @@ def test_first_and_total_indices_need_no_second_order(tmp_path: Path) -> None:
     assert np.isnan(found.second).all()
 
 
+def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path) -> None:
+    def die(bundle: Sequence[Point]) -> list[Record | None]:
+        if bundle[0].index == 1:
+            raise DigiclayError("A worker died twice of this.")
+        return evaluate_ishigami(bundle)
+
+    points = [Point(index, ("0.5", "0.5", "0.5"), None) for index in range(1, 5)]
+    bundles = [points[:2], points[2:]]
+    subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
+    with open_folder(tmp_path / "out", "study", subject, {}) as folder, ThreadPoolExecutor(1) as thread:
+        failed = Evaluation(subject, folder, Pool(thread, die, lambda: False), {}).evaluate(
+            bundles, subject.keys
+        )
+        assert failed == {index: {"error": "A worker died twice of this."} for index in (1, 2)}
+        again = Evaluation(
+            subject, folder, Pool(thread, evaluate_ishigami, lambda: False), folder.read_records()
+        )
+        assert set(again.records) == {3, 4}
+        assert again.evaluate(bundles, subject.keys) == {}
+        assert set(folder.read_records()) == {1, 2, 3, 4}
+
+
 def test_a_design_has_a_block_of_points_a_sample() -> None:
     assert sample_shares(8, 3, 1, second=False).shape == (count_points(8, 3, second=False), 3) == (40, 3)
     assert sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
@@ -134,5 +156,7 @@ def test_the_loss_itself_keeps_its_value() -> None:
 
 def test_an_output_that_no_run_has_is_told_with_the_first_error() -> None:
     runs = [record(None), {"error": "There is not enough memory."}]
-    with pytest.raises(OutputError, match=r"No run has the metric rfd: There is not enough memory\."):
+    with pytest.raises(
+        OutputError, match=r"has the metric rfd; the first error: There is not enough memory\."
+    ):
         make_response("rfd", runs, find_excess_losses(runs, record(0.1)))

@@ -72,6 +72,11 @@ def test_every_whole_number_of_a_range_has_an_equal_share() -> None:
     ]  # fmt: skip
 
 
+def test_a_whole_number_stays_one_in_si() -> None:
+    (rows,) = fit("layout.rows=11:15")
+    assert repr(rows.convert("12")) == "12"
+
+
 def test_values_in_units_are_converted_to_si() -> None:
     (stroke,) = fit("valve.stroke=20 um:40 um")
     assert (stroke.convert("30 um"), stroke.si) == (pytest.approx(30e-6, rel=1e-15), "m")

@@ -163,7 +163,7 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
 ) -> None:
     shutil.copytree(whole, here / "out")
     assert main([*STUDY[:-1], "highest,relief", "--second", "--out", "out"]) == 0
-    assert "No run has the metric ridge_error without losing the fingertip." in capsys.readouterr().out
+    assert "No run that keeps the fingertip has the metric ridge_error." in capsys.readouterr().out
     assert {row["output"] for row in rows(here / "out" / "indices.csv")} == {"highest"}
 
 

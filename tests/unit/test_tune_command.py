@@ -72,13 +72,14 @@ def values(path: Path) -> Any:
 def files(folder: Path) -> dict[str, bytes]:
     """Return the content of tables and scene."""
     return {
-        name: (folder / name).read_bytes() for name in ("points.csv", "front.csv", "chosen.toml", "tune.json")
+        name: (folder / name).read_bytes()
+        for name in ("points.csv", "front.csv", "chosen.toml", "tuning.json")
     }
 
 
 def test_a_tuning_leaves_tables_a_plot_and_a_scene(whole: Path) -> None:
     left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
-    assert left == {"chosen.toml", "front.csv", "front.png", "points", "points.csv", "tune.json"}
+    assert left == {"chosen.toml", "front.csv", "front.png", "points", "points.csv", "tuning.json"}
     assert len(rows(whole / "points.csv")) == len(list((whole / "points").iterdir())) == ALL
     assert (whole / "front.png").read_bytes()[:4] == b"\x89PNG"
 
