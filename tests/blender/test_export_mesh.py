@@ -156,19 +156,6 @@ def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
     assert (open_edges(made) == 0) == (kind != "surface")
 
 
-def test_a_curved_skin_is_shaded_smooth_and_walls_and_pins_are_flat(bed):
-    for kind, skin, some in (
-        ("solid", "smooth", True),
-        ("solid", "bilinear", False),
-        ("pins", "smooth", False),
-    ):
-        bpy.context.view_layer.objects.active = bed
-        bpy.ops.mesh.digital_clay_make(kind=kind, skin=skin)
-        polygons = bpy.context.object.data.polygons
-        assert any(one.use_smooth for one in polygons) == some
-        assert not any(one.use_smooth for one in polygons if abs(one.normal.z) < 1e-3)
-
-
 def test_the_mesh_keeps_force_and_mode_of_the_pins(bed):
     bpy.ops.mesh.digital_clay_make(kind="surface")
     attributes = bpy.context.object.data.attributes

@@ -5,15 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..bridge import SCALE
 from ..compat import bpy
-from ..core.surface.body import NO_PIN, Body
+from ..core.surface.body import Body
 
 __all__ = ["make_object"]
 
-#: Edges sharper than this stay sharp when a curved skin is shaded smooth, rad.
+Flags = NDArray[np.bool_]
+
+#: Edges of walls and base sharper than this stay sharp when a user shades them smooth, too, rad.
 SHARP = 0.7
+#: Least part of its normal by which a face that faces up does so: walls are vertical but for rounding.
+UPWARDS = 1e-6
 
 
 def make_object(body: Body, name: str, *, smooth: bool) -> Any:
@@ -26,7 +31,7 @@ def make_object(body: Body, name: str, *, smooth: bool) -> Any:
     name : str
         Of the object and its mesh.
     smooth : bool
-        Shade it smooth, but for its sharp edges.
+        Shade its skin smooth. Walls and base stay flat, and the rim between them and the skin is sharp.
     """
     made = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
     for number, group in enumerate(body.groups, 1):
@@ -49,9 +54,37 @@ def _mesh(body: Body, name: str, *, smooth: bool) -> Any:
     for value, kind, of in (("force", "FLOAT", np.float32), ("mode", "INT", np.int32)):
         mesh.attributes.new(value, kind, "POINT")
         mesh.attributes[value].data.foreach_set("value", body.values[value].astype(of))
+    skin = _find_skin(body) & smooth
     if smooth:
-        mesh.set_sharp_from_angle(angle=SHARP)  # this makes all faces smooth
-    # Walls and base stay flat, so that the skin's shading does not run down them.
-    curved = (body.values["mode"][body.faces] != NO_PIN).all(axis=1) & smooth
-    mesh.polygons.foreach_set("use_smooth", curved)
+        _mark_rim(mesh, skin)
+    mesh.polygons.foreach_set("use_smooth", skin)
     return mesh
+
+
+def _find_skin(body: Body) -> Flags:
+    """Return which faces belong to the skin: it is a height everywhere, so that all of it faces up."""
+    first, second, third = (body.vertices[body.faces[:, corner]] for corner in range(3))
+    normal = np.cross(second - first, third - first)
+    upwards: Flags = normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1)
+    return upwards
+
+
+def _mark_rim(mesh: Any, skin: Flags) -> None:
+    """Mark the edges around flat faces as sharp, and none within the skin, however steep it is.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Of triangles.
+    skin : ndarray of bool (f,)
+        Which of them are shaded smooth.
+    """
+    mesh.set_sharp_from_angle(angle=SHARP)
+    edge = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("edge_index", edge)
+    beside_skin, beside_flat = (
+        np.bincount(edge, np.repeat(faces, 3), len(mesh.edges)) > 0 for faces in (skin, ~skin)
+    )
+    sharp = np.empty(len(mesh.edges), bool)
+    mesh.edges.foreach_get("use_edge_sharp", sharp)
+    mesh.edges.foreach_set("use_edge_sharp", np.where(beside_skin, beside_flat, sharp))

@@ -52,7 +52,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         formed = formed_bed.read_formed(bed)
         made = make_bodies(formed, self.model(bed), self.finding())
         width = float(np.ptp(formed.position[:, 0])) * bridge.SCALE
-        smooth = self.skin != "bilinear" and self.kind != "pins"
+        smooth = self.kind != "pins"
         where = _beside(context, bed, width) if self.beside else bed.matrix_world.copy()
         things = []
         for body in made:
