@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test lint mutants test-matrix test-window test-proof clean
+.PHONY: help demo extension test lint mutants test-matrix test-window test-proof guide-pictures clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -57,6 +57,12 @@ test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 -- tests/window
+
+guide-pictures: ## follow the first page of the guide in a window, and retake its pictures
+	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py
+	@.venv/bin/python tools/guide_pictures.py .reports/guide
 
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids
 	@tools/proof .reports

@@ -1,4 +1,4 @@
-"""Follows the first page of the guide by real events: adds a bed, takes hold of the ball, starts, draws."""
+"""Follows the first page of the guide by real events, step by step, and takes its pictures."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from hand_strokes import drag, finish, focus_window, hand, note, on_the_screen, 
 #: Places in the sidebar, pixels from its upper right corner at a resolution scale of 1: the tab, and in it
 #: the first button.
 TAB, START = (-10, 178), (-130, 45)
+
+#: Half the length of the line, mm.
+HALF = 24.0
 
 
 def in_the_sidebar(blender: Any, place: tuple[int, int]) -> tuple[int, int]:
@@ -38,43 +41,102 @@ def done(blender: Any, *words: str) -> Iterator[float | None]:
     yield 1.0
 
 
+def add(blender: Any) -> Iterator[float | None]:
+    """Add a bed from the menu, by typing its name."""
+    letters = ("space" if letter == " " else letter for letter in "digital clay")
+    typed = " ".join(f"key {letter} sleep 0.05" for letter in letters)
+    yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
+    blender.SEEN["added"] = len(blender.beds())
+    blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
+
+
+def open_tab(blender: Any) -> Iterator[float | None]:
+    """Open the sidebar at its tab."""
+    yield from done(blender, "key n")
+    yield from done(blender, to(in_the_sidebar(blender, TAB)), "click 1")
+    bar = next(region for region in blender.view()[0].regions if region.type == "UI")
+    blender.SEEN["tab"] = bar.active_panel_category
+
+
+def start(blender: Any) -> Iterator[float | None]:
+    """Press the panel's first button."""
+    yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
+    blender.SEEN["started"] = len(blender.part("live.running").list_sessions())
+    blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
+
+
+def draw(blender: Any) -> Iterator[float | None]:
+    """Draw a line over the middle with Ctrl held; look at the finger on its way."""
+    first, last = on_the_screen(blender, -HALF, 0.0), on_the_screen(blender, HALF, 0.0)
+    words = to(first), "keydown ctrl mousedown 1", drag(first, last, 2.0, 60), "mouseup 1 keyup ctrl"
+    process = hand(*words)
+    yield from blender.until(lambda: along(blender) > 0.0)
+    blender.shot("guide_ridge")
+    yield from finish(blender, process)
+    note(blender, "drawn")
+
+
+def stop(blender: Any) -> Iterator[float | None]:
+    """End the session."""
+    yield from done(blender, "key Escape")
+    blender.SEEN["left"] = len(blender.part("live.running").list_sessions())
+
+
+#: Steps of the guide's first page: the first sentence of each, and what a hand does.
+STEPS = (
+    ("Press **Shift A** over the 3D view, type `digital clay` and press Enter.", add),
+    ("Press **N** and select the tab *Digital Clay*.", open_tab),
+    ("Press **Start Sculpting** in the panel *Session*.", start),
+    ("Hold **Ctrl** and drag across the pins.", draw),
+    ("Press **Esc**.", stop),
+)
+
+
+def waiting() -> float:
+    """Return how long Blender has waited for the processor, s; 0 where that is not counted."""
+    counts = Path("/proc/self/schedstat")
+    return 1e-9 * int(counts.read_text().split()[1]) if counts.is_file() else 0.0
+
+
+def along(blender: Any) -> float:
+    """Return where the finger is along its line, mm; before the line where it begins."""
+    (session,) = blender.part("live.running").list_sessions()
+    dragging = blender.part("live.stroke").DRAGGING
+    on_the_way = session.strokes and session.strokes[0].phase == dragging
+    return 1e3 * float(session.pose[0]) if on_the_way else -HALF
+
+
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what the page says."""
-    area, _ = blender.view()
+    """Do what the page says; then take hold of the ball."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     yield from focus_window()
-    typed = " ".join(f"key {letter} sleep 0.05" for letter in "digital")
-    began = time.perf_counter()
-    yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
-    blender.shot("first_added")
-    blender.SEEN["added"] = len(blender.beds())
-    blender.SEEN["distance"] = area.spaces.active.region_3d.view_distance
-    yield from done(blender, "key n")
-    yield from done(blender, to(in_the_sidebar(blender, TAB)), "click 1")
-    blender.shot("first_tab")
-    bar = next(region for region in area.regions if region.type == "UI")
-    blender.SEEN["tab"] = bar.active_panel_category
-    yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
-    blender.shot("first_started")
-    blender.SEEN["started"] = len(blender.part("live.running").list_sessions())
-    blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
-    start, end = on_the_screen(blender, -27.0, 0.0), on_the_screen(blender, 27.0, 0.0)
-    process = hand(to(start), "mousedown 1", drag(start, end, 2.0, 60), "mouseup 1")
-    yield from finish(blender, process)
-    blender.SEEN["took"] = time.perf_counter() - began
-    note(blender, "drawn")
-    blender.shot("first_drawn")
-    yield from done(blender, "key Escape")
+    began, waited = time.perf_counter(), waiting()
+    for words, step in STEPS:
+        yield from step(blender)
+        if step is draw:
+            blender.SEEN["took"] = time.perf_counter() - began
+            blender.SEEN["waited"] = waiting() - waited
+            yield from point(blender)
+        blender.SEEN.setdefault("steps", []).append(words)
+    yield from ball(blender)
+
+
+def point(blender: Any) -> Iterator[float | None]:
+    """Point at the pins with the sidebar closed: a picture of the guide."""
+    yield from done(blender, "key n", "sleep 0.5", to(on_the_screen(blender, -16.0, -22.0)))
+    blender.shot("guide_press")
+
+
+def ball(blender: Any) -> Iterator[float | None]:
+    """Click on the ball with a selecting tool, and move it with G."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     tip = blender.fingertip()
     before = list(tip.matrix_world.translation)
-    ball = tip["digiclay_ellipsoid"].matrix_world.translation
-    x, y = blender.pixel(ball)
+    x, y = blender.pixel(tip["digiclay_ellipsoid"].matrix_world.translation)
     at = x, blender.window().height - 1 - y
     yield from done(blender, to(at), "click 1")
     blender.SEEN["taken hold of"] = bpy.context.view_layer.objects.active == blender.fingertip()
     yield from done(blender, "key g", "sleep 0.3", to((at[0] + 60, at[1])), "sleep 0.3 click 1")
     after = list(blender.fingertip().matrix_world.translation)
     blender.SEEN["moved"] = [b - a for a, b in zip(before, after, strict=True)]
-    blender.shot("first_ball")

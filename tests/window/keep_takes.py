@@ -68,7 +68,7 @@ def to_height(blender: Any, height: float, steps: int) -> Iterator[float | None]
 
 
 def ridge(blender: Any) -> Iterator[float | None]:
-    """Press, lift slowly, and draw a ridge along: the picture of the guide."""
+    """Press, lift slowly, and draw a ridge along."""
     yield from blender.grab((-16, 0, 0), "X", steps=2)
     yield from to_height(blender, 35.0, steps=4)
     note(blender, "pressed")
@@ -77,7 +77,7 @@ def ridge(blender: Any) -> Iterator[float | None]:
     yield from blender.grab((30, 0, 0), "X", steps=10)
     yield from blender.settle()
     note(blender, "ridge")
-    blender.shot("guide_ridge")
+    blender.shot("takes_ridge")
     yield from to_height(blender, 75.0, steps=1)
     note(blender, "ridge left")
 

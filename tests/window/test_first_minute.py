@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,14 +13,19 @@ from digiclay.settings.beds import BEDS, FIRST
 from tests.window.blender_window import played
 
 REST = 40.0
-#: Half the length of the stroke, mm.
-HALF = 27.0
+GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Play the script once; return what stood in the scene after each of its steps."""
-    return played("first_minute.py", tmp_path_factory.mktemp("first"), size=(1100, 700), by_hand=True)
+    return played("first_minute.py", tmp_path_factory.mktemp("first"), size=(1100, 720), by_hand=True)
+
+
+def test_the_script_takes_the_steps_of_the_page(seen: dict[str, Any]) -> None:
+    page = GUIDE.read_text(encoding="utf-8").partition("## First ridge")[2].partition("##")[0]
+    steps = re.findall(r"^\d\. (.*?\.)(?=\s)", page, re.MULTILINE | re.DOTALL)
+    assert [" ".join(step.split()) for step in steps] == seen["steps"]
 
 
 def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
@@ -36,12 +43,23 @@ def test_start_sculpting_takes_the_press_tool_in_hand(seen: dict[str, Any]) -> N
     assert (seen["started"], seen["tool"]) == (1, "digiclay.press_tool")
 
 
-def test_the_first_form_is_drawn_within_a_minute(seen: dict[str, Any]) -> None:
+def test_a_ridge_stands_within_a_minute(seen: dict[str, Any]) -> None:
     bed = BEDS[FIRST]
-    along = np.abs(np.arange(bed.columns) - (bed.columns - 1) / 2) * bed.pitch < HALF * 1e-3
-    row = REST - np.array(seen["drawn"]["bed"])[bed.rows // 2, along]
-    assert (row > 1.0).mean() > 0.9
-    assert seen["took"] < 60.0
+    height = np.array(seen["drawn"]["bed"]) - REST
+    x, y = (1e3 * bed.pitch * (np.arange(count) - (count - 1) / 2) for count in (bed.columns, bed.rows))
+    # The ends of the line, drawn from -24 to 24 mm, are round.
+    assert (height[np.abs(y).argmin(), np.abs(x) < 20.0] > 12.0).mean() > 0.9
+    section = height[:, np.abs(x) < 10.0].mean(axis=1)
+    assert abs(y[section.argmax()]) <= 3.0
+    assert 13.0 < section.max() < 18.0
+    # No blister is wider than the paper's, of 15 mm.
+    assert np.abs(section[np.abs(y) > 20.0]).max() < 1.0
+    # What other programs took of the processor is not the guide's.
+    assert seen["took"] - seen["waited"] < 60.0
+
+
+def test_esc_ends_the_session(seen: dict[str, Any]) -> None:
+    assert seen["left"] == 0
 
 
 def test_a_click_on_the_ball_takes_hold_of_the_fingertip_and_g_moves_it(seen: dict[str, Any]) -> None:

@@ -90,7 +90,7 @@ def test_freeing_the_bake_brings_back_the_beds_own_state(seen: dict[str, Any]) -
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
     # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
     assert set(seen["colors"]) == {
-        "guide_ridge", *(f"takes_{name}" for name in ("recording", "replaying", "baking", "played"))
+        *(f"takes_{name}" for name in ("ridge", "recording", "replaying", "baking", "played"))
     }  # fmt: skip
     assert min(seen["colors"].values()) > 1000
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..overlay import views
+from ..ui_text import localize
 from . import loop, recovery, running, selection, tick
 from .running import Running
 from .stroke_queue import drop_strokes
@@ -95,7 +96,7 @@ def end(how: str, *sessions: Running) -> None:
     """
     recovery.clear_recovery()
     sessions = sessions or running.list_sessions()
-    words = [f"The session of {', '.join(session.name for session in sessions)} {how}"]
+    words = [localize("The session of {} {}", ", ".join(session.name for session in sessions), localize(how))]
     words += filter(None, [tick.stop(session.uid) for session in sessions])
     selection.select_active(frozenset(session.uid for session in sessions))
     if sessions:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..compat import bpy
 from ..recorded import takes
+from ..ui_text import localize
 from . import running
 from .waiting import find_bed
 
@@ -69,5 +70,5 @@ def save_copy() -> str:
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(file_path()), copy=True, check_existing=False)
     except RuntimeError as error:
-        return f"It could not be left for recovery: {str(error).removeprefix('Error: ').strip()}"
-    return f"It can be had back with File > Recover > Auto Save: {file_path().name}"
+        return localize("It could not be left for recovery: {}", str(error).removeprefix("Error: ").strip())
+    return localize("It can be had back with File > Recover > Auto Save: {}", file_path().name)

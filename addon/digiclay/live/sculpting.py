@@ -25,6 +25,7 @@ from ..core.session.live_periods import (
     simulate_path,
     update_cost,
 )
+from ..ui_text import localize
 from .running import Gesture, Recording, Running
 from .stroke_queue import take_path
 
@@ -95,9 +96,9 @@ def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
     refused = ""
     for read, said in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
-            return read(system, kept), said
+            return read(system, kept), said and localize(said)
         except StateError as error:
-            refused = f"The bed begins at rest. {error}"
+            refused = localize("The bed begins at rest. {}", error)
     return begin(system), refused
 
 

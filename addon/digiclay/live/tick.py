@@ -17,6 +17,7 @@ from ..device.instant import find_ellipsoid
 from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..settings import properties
+from ..ui_text import localize
 from . import bed_state, gestures, running, sculpting
 from .running import Floats, Running
 from .stroke_queue import drop_strokes
@@ -50,7 +51,9 @@ def start(context: Any, bed: Any) -> list[Note]:
     settings, scene, notes = properties.read_stored_settings(bed), properties.scene_of(bed), []
     if bed.data.users > 1:
         bed.data = bed.data.copy()
-        notes.append(Note("INFO", f"{bed.name} got pins of its own: it shared them with another bed"))
+        notes.append(
+            Note("INFO", localize("{} got pins of its own: it shared them with another bed", bed.name))
+        )
     got = unit.give_fingertip(bed, scene)
     if got:
         notes.append(Note("INFO", got))
@@ -141,7 +144,9 @@ def tick(context: Any, now: float) -> list[Note]:
         bed = find_bed(session.uid, session.name)
         if bed is None:
             running.drop(session.uid)
-            notes.append(Note("WARNING", f"The session of {session.name} ended: its bed was deleted"))
+            notes.append(
+                Note("WARNING", localize("The session of {} ended: its bed was deleted", session.name))
+            )
             continue
         notes += _advance_session(context, bed, session, now, most)
     return notes
@@ -162,9 +167,13 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         running.put(replace(waiting, tick=waiting.tick + 1))
         bed_state.write(bed, running.find(bed) or waiting, session)
         told = why == before.blocking_reason
-        return notes if told else [*notes, Note("WARNING", f"The session of {bed.name} waits: {why}")]
+        return (
+            notes
+            if told
+            else [*notes, Note("WARNING", localize("The session of {} waits: {}", bed.name, why))]
+        )
     if before.blocking_reason:
-        notes.append(Note("INFO", f"The session of {bed.name} goes on"))
+        notes.append(Note("INFO", localize("The session of {} goes on", bed.name)))
     session = replace(session, blocking_reason="", name=bed.name)
     seen = _visible_rows(session)
     try:
@@ -174,7 +183,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     except DivergenceError as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
-        notes.append(Note("ERROR", f"The session of {bed.name} is paused: {error}"))
+        notes.append(Note("ERROR", localize("The session of {} is paused: {}", bed.name, error)))
     running.put(later)
     moved = bool(session.strokes) and _move_finger(bed, later)
     bed_state.write(bed, later, before)
@@ -225,7 +234,9 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
             recorded = session.recording is not None
             session = sculpting.restore(session, bed_state.read_snapshot(bed), pose, tick_read)
             if recorded and session.recording is None:
-                said = "The recording ended: undo went back to before it, or redo to what it did not lead to"
+                said = localize(
+                    "The recording ended: undo went back to before it, or redo to what it did not lead to"
+                )
     except DigiclayError as error:
         return str(error), session, said
     return "", session, said

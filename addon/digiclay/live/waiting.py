@@ -10,6 +10,7 @@ from .. import bridge
 from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..device import view
+from ..ui_text import localize
 from . import running
 from .running import Running
 
@@ -51,30 +52,32 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
         How many the session simulates; as many as there are when left out.
     """
     if bpy.app.is_job_running("RENDER"):
-        return "a render is under way"
+        return localize("a render is under way")
     if not _is_shown(context, bed):
-        return "no window shows its scene, or its collection is left out: show it to go on"
+        return localize("no window shows its scene, or its collection is left out: show it to go on")
     # A mesh can also be edited through another object that shares it.
     if bed.mode != "OBJECT" or (bed.type == "MESH" and bed.data.is_editmode):
-        return "the bed is being edited: go back to Object Mode to go on"
+        return localize("the bed is being edited: go back to Object Mode to go on")
     if bed.type != "MESH" or not bridge.ATTRIBUTES.keys() <= set(bed.data.attributes.keys()):
-        return "the bed's mesh is no longer that of its pins: undo that to go on"
+        return localize("the bed's mesh is no longer that of its pins: undo that to go on")
     if pins is not None and len(bed.data.vertices) != pins:
-        return f"the bed has {len(bed.data.vertices)} pins now instead of {pins}: undo that to go on"
+        return localize(
+            "the bed has {} pins now instead of {}: undo that to go on", len(bed.data.vertices), pins
+        )
     tip = view.fingertip_of(bed)
     if tip is None:
-        return (
+        return localize(
             "its fingertip is deleted: undo that, or stop the session and start it again to get another one"
         )
     if not _is_shown(context, tip):
-        return "its fingertip stands in no scene shown: link it to a collection to go on"
+        return localize("its fingertip stands in no scene shown: link it to a collection to go on")
     try:
         bridge.uniform(bed)
     except DigiclayError as error:
         return str(error)
     matrix = np.array(tip.matrix_world)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
-        return "its fingertip is scaled to nothing: clear its scale to go on"
+        return localize("its fingertip is scaled to nothing: clear its scale to go on")
     return ""
 
 

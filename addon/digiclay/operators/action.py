@@ -4,6 +4,7 @@
 from typing import Any
 
 from ..core.base.errors import DigiclayError
+from ..ui_text import localize
 
 __all__ = ["Action", "FileAction", "Polled"]
 
@@ -24,7 +25,7 @@ class Polled:
         """Return whether the operator can run; Blender shows the message where it cannot."""
         message = cls.poll_message(context)
         if message:
-            cls.poll_message_set(message)
+            cls.poll_message_set(localize(message))
         return not message
 
 

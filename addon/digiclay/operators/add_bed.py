@@ -18,6 +18,7 @@ from ..settings.declared import title
 from ..settings.devices import make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import SHOWN, to_si
+from ..ui_text import localize
 from .action import Action
 from .poll_messages import baked, edited, no_bed, session_runs
 
@@ -171,7 +172,9 @@ class Rebuild(Action, bpy.types.Operator):
     def perform(self, context: Any) -> None:
         """Make it anew."""
         scene = rebuild.rebuild(bed_of(context))
-        self.report({"INFO"}, f"The bed has {scene.layout.rows} x {scene.layout.columns} pins now")
+        self.report(
+            {"INFO"}, localize("The bed has {} x {} pins now", scene.layout.rows, scene.layout.columns)
+        )
 
 
 def add(context: Any, scene: Scene) -> Any:

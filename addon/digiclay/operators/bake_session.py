@@ -14,6 +14,7 @@ from ..device.instant import find_ellipsoid
 from ..device.view import bed_of
 from ..recorded import bake, takes
 from ..settings import properties
+from ..ui_text import localize
 from .action import Action
 from .long_work import LongWork
 from .poll_messages import no_bed, session_runs
@@ -85,7 +86,9 @@ class Bake(ChosenTake, LongWork, bpy.types.Operator):
         finger = find_ellipsoid(take.scene)
         bake.apply(bed, moments, self.first, finger, keyframe_finger=own)
         count = len(moments.height)
-        self.report({"INFO"}, f"Baked {count} frames, {self.first} to {self.first + count - 1}")
+        self.report(
+            {"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, self.first + count - 1)
+        )
 
 
 class FreeBake(Action, bpy.types.Operator):

@@ -8,6 +8,7 @@ from ..core.mesh_io.export_model import make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..device.view import bed_of
 from ..exchange import formed_bed
+from ..ui_text import localize
 from .mesh_options import SurfaceOptions, chosen_bed, sentence
 
 __all__ = ["ExportMenu", "ExportMesh", "entry"]
@@ -100,8 +101,8 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
             files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
         for path, some in files:
             write(some, path, self.unit, self.file_format)
-        told = f"{len(files)} files beside {target}" if len(files) > 1 else str(files[0][0])
-        self.report({"INFO"}, f"Written: {told}")
+        told = localize("{} files beside {}", len(files), target) if len(files) > 1 else str(files[0][0])
+        self.report({"INFO"}, localize("Written: {}", told))
 
     def _file(self) -> Path:
         """Return the file with the ending of its format, in place of that of another format."""

@@ -7,6 +7,7 @@ from collections.abc import Generator
 from typing import Any
 
 from ..core.base.errors import DigiclayError
+from ..ui_text import localize
 from . import status
 from .action import Action
 
@@ -47,7 +48,7 @@ class LongWork(Action):
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
             self._end(context)
-            self.report({"INFO"}, f"{self.bl_label}: stopped, nothing was changed")
+            self.report({"INFO"}, localize("{}: stopped, nothing was changed", localize(self.bl_label)))
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
@@ -64,7 +65,7 @@ class LongWork(Action):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         context.window_manager.progress_update(100.0 * share)
-        said = f"{self.bl_label}: {100.0 * share:.0f} %     Esc: stop"
+        said = localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
         status.show(context, said)
         return {"RUNNING_MODAL"}
 

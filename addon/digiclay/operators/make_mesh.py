@@ -9,6 +9,7 @@ from .. import bridge
 from ..compat import bpy
 from ..core.mesh_io.export_model import make_bodies
 from ..exchange import body_mesh, formed_bed
+from ..ui_text import localize
 from .add_bed import select_only
 from .mesh_options import SurfaceOptions, chosen_bed
 from .poll_messages import edited, no_surface
@@ -65,8 +66,8 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         select_only(context, things[0])
         for new in things[1:]:
             new.select_set(True)
-        groups = f" with vertex groups {', '.join(made[0].groups)}" if made[0].groups else ""
-        self.report({"INFO"}, f"Made {', '.join(new.name for new in things)}{groups}")
+        groups = localize(" with vertex groups {}", ", ".join(made[0].groups)) if made[0].groups else ""
+        self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), groups))
 
 
 def _beside(context: Any, bed: Any, width: float) -> Any:

@@ -17,6 +17,7 @@ from ..device.instant import find_ellipsoid, pick_pose
 from ..exchange import shape_show
 from ..recorded import takes
 from ..settings.declared import title
+from ..ui_text import localize
 from .action import Action, FileAction
 from .add_bed import add, place_at_cursor
 from .poll_messages import edited
@@ -59,9 +60,9 @@ class AddSceneAction(Action):
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
             takes.add(bed, taken, scene.name)
-            words += f" Its session is the take {scene.name!r}."
+            words += localize(" Its session is the take {!r}.", scene.name)
         elif self.take:
-            words += " Its session is too long to be simulated here: use 'digiclay run'."
+            words += localize(" Its session is too long to be simulated here: use 'digiclay run'.")
         self.report({"INFO"}, words)
 
 

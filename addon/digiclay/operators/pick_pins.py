@@ -7,6 +7,7 @@ from ..core.base.errors import DigiclayError
 from ..device import display
 from ..device.view import bed_of
 from ..press import aim
+from ..ui_text import localize
 from . import status
 from .action import Action, Polled
 from .poll_messages import no_bed
@@ -33,13 +34,13 @@ class PickPins(Polled, bpy.types.Operator):
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for clicks."""
         self.changed = False
-        status.show(context, KEYS)
+        status.show(context, localize(KEYS))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Pick or drop the pin under a click; what is no click goes on to the view."""
-        status.show(context, KEYS)
+        status.show(context, localize(KEYS))
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
             status.clear()
             return {"FINISHED"} if self.changed else {"CANCELLED"}

@@ -7,6 +7,7 @@ from ..compat import bpy
 from ..device.view import bed_of
 from ..live import running, tick
 from ..live.recorded_strokes import play_strokes, read_strokes
+from ..ui_text import localize
 from .action import FileAction
 from .poll_messages import baked, edited, linked, no_bed, session_runs
 
@@ -43,4 +44,4 @@ class PlayStrokes(FileAction, bpy.types.Operator):
             tick.place_finger(context, bed, session)
         finally:
             tick.stop(bed.session_uid)
-        self.report({"INFO"}, f"{recorded.name}: {len(recorded.strokes)} strokes")
+        self.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))

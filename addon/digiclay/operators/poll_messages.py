@@ -13,6 +13,7 @@ from ..live import running
 from ..live.waiting import active_session, blocking_reason
 from ..recorded import takes
 from ..recorded.bake import is_baked
+from ..ui_text import localize
 
 __all__ = [
     "baked", "edited", "linked", "no_bed", "no_session", "no_skin", "no_surface", "no_take", "session_runs",
@@ -109,4 +110,4 @@ def session_waits(context: Any) -> str:
         return no_session(context)
     bed, session = active
     why = blocking_reason(context, bed, session.system.grid.count)
-    return f"The session waits: {why}" if why else ""
+    return localize("The session waits: {}", why) if why else ""

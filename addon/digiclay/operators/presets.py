@@ -10,6 +10,7 @@ from ..device.view import bed_of
 from ..settings import own_presets, properties
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
+from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_bed
 
@@ -82,7 +83,7 @@ class SavePreset(Action, bpy.types.Operator):
         bed = bed_of(context)
         file = own_presets.save(self.name, replace(properties.read_scene(bed), name=self.name.strip()))
         bed.digiclay.own_preset = file.stem
-        self.report({"INFO"}, f"Saved as {file}")
+        self.report({"INFO"}, localize("Saved as {}", file))
 
 
 class RemovePreset(Action, bpy.types.Operator):
@@ -105,7 +106,7 @@ class RemovePreset(Action, bpy.types.Operator):
         """Remove it; the bed keeps its parameters."""
         settings = bed_of(context).digiclay
         own_presets.remove(settings.own_preset)
-        self.report({"INFO"}, f"Removed the preset {settings.own_preset}")
+        self.report({"INFO"}, localize("Removed the preset {}", settings.own_preset))
         settings.own_preset = ""
 
 

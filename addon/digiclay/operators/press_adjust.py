@@ -10,6 +10,7 @@ from ..core.surface.pointing import find_contact_outline
 from ..live.stroke import DEEPEST, SHALLOWEST, Brush
 from ..press import aim, brush
 from ..settings import finger_size
+from ..ui_text import localize
 from .action import Action
 from .radial import AdjustMixin, no_bed
 
@@ -45,7 +46,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
 
     def say(self, value: float) -> str:
         """Return the width in mm."""
-        return f"Size {1e3 * value:.2f} mm"
+        return localize("Size {:.2f} mm", 1e3 * value)
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return the widest section of the finger, and what of it touches."""
@@ -110,7 +111,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
 
     def say(self, value: float) -> str:
         """Return the strength in per cent."""
-        return f"Strength {100.0 * value:.0f} %"
+        return localize("Strength {:.0f} %", 100.0 * value)
 
     def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
         """Return what of the finger touches at the whole depth, and at the share of it."""

@@ -6,6 +6,7 @@ from ..compat import bpy
 from ..press import brush
 from ..press.fingers import FINGERS
 from ..settings import finger_size
+from ..ui_text import localize
 from .action import Action
 from .radial import no_bed
 
@@ -38,7 +39,7 @@ class TakeFinger(Action, bpy.types.Operator):
         kind = FINGERS[chosen.kind]
         axes = (kind.finger.length, kind.finger.width, kind.finger.height)
         measures = " × ".join(f"{2e3 * axis:g}" for axis in axes)
-        return f"{measures} mm: {kind.source}. The blister follows, the contact law stays"
+        return localize("{} mm: {}. The blister follows, the contact law stays", measures, kind.source)
 
     @classmethod
     def poll_message(cls, context: Any) -> str:

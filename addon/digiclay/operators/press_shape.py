@@ -12,6 +12,7 @@ from ..live.stroke import SYMMETRIES, Brush
 from ..live.stroke_path import lay_line, lay_path, lay_ring
 from ..live.stroke_queue import change_stroke, last_place, queue_stroke
 from ..press import aim, brush, marks
+from ..ui_text import localize
 from . import status
 from .action import Polled
 from .press_stroke import open_session
@@ -88,7 +89,7 @@ class PressShape(Polled, bpy.types.Operator):
     def _tell(self, context: Any) -> None:
         """Show the length or the radius, and draw the path."""
         length = float(np.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]))
-        self.words = KEYS[self.shape].format(1e3 * length)
+        self.words = localize(KEYS[self.shape], 1e3 * length)
         status.show(context, self.words)
         self.region.tag_redraw()
 

@@ -16,6 +16,7 @@ from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..live.tracking import find_tracking
 from ..press import aim, brush, pen
 from ..settings.declared import title
+from ..ui_text import localize
 from . import status
 from .action import Polled
 from .press_settings import PressSettings
@@ -86,7 +87,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         stroke = session and find_stroke(session, self.number)
         if stroke is None:
             if bed is None or session is None:
-                self.report({"WARNING"}, "The press stroke ended: its session or bed was removed")
+                self.report({"WARNING"}, localize("The press stroke ended: its session or bed was removed"))
             return self._end({"CANCELLED", "PASS_THROUGH"})
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             tick.withdraw_strokes(context, self.uid)
@@ -180,7 +181,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
     def _tell(self, context: Any) -> None:
         """Show brush, depth or height, and keys in the status bar."""
         said = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
-        status.show(context, (KEYS if self.kind.has_amount else KEYS_PLAIN).format(said))
+        status.show(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, said))
 
     def _end(self, result: set[str]) -> set[str]:
         """Give back the status bar."""
@@ -205,12 +206,15 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
     if kind.needs_blister and find_tracking(session.scene, session.system) is None:
-        operator.report({"ERROR"}, NO_BLISTER.format(brush.LABELS[kind], title(session.scene.method)))
+        names = brush.LABELS[kind], title(session.scene.method)
+        operator.report({"ERROR"}, localize(NO_BLISTER, *map(localize, names)))
         return None
     if kind is Brush.SMOOTH and session.scene.control and METHODS[session.scene.method].recovers:
-        operator.report({"WARNING"}, RECOVERS.format(title(session.scene.method)))
+        operator.report({"WARNING"}, localize(RECOVERS, localize(title(session.scene.method))))
     if session.paused:
-        operator.report({"WARNING"}, "The session is paused: the fingertip follows after it resumes")
+        operator.report(
+            {"WARNING"}, localize("The session is paused: the fingertip follows after it resumes")
+        )
     selection.deselect(bed)
     return session
 

@@ -13,6 +13,7 @@ from ..core.model.fingertip import Fingertip
 from ..device import view
 from ..live.stroke import DEEPEST
 from ..press import aim, brush, marks
+from ..ui_text import localize
 from . import status
 from .action import Polled
 
@@ -170,7 +171,7 @@ class AdjustMixin(Polled):
         value = self._shown()
         typed = f"   [{self.text}]" if self.text else ""
         self.words = self.say(value) + typed
-        status.show(context, KEYS.format(self.words))
+        status.show(context, localize(KEYS, self.words))
         for area in context.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()

@@ -15,6 +15,7 @@ from ..live.running import Running
 from ..live.waiting import active_session
 from ..recorded import takes
 from ..settings import properties
+from ..ui_text import localize
 from .action import Action
 from .poll_messages import edited, no_bed, no_session, session_waits
 
@@ -101,7 +102,7 @@ class RewindSession(OfSession, bpy.types.Operator):
         back = gestures.rewind(session)
         if session.recording is not None and back.recording is None:
             kept = takes.keep_recording(bed, session)
-            self.report({"INFO"}, kept or "The recording ended: the gesture began before it")
+            self.report({"INFO"}, kept or localize("The recording ended: the gesture began before it"))
         tick.show(bed, back)
         tick.place_finger(context, bed, back)
 

@@ -8,6 +8,7 @@ from ..device.view import bed_of
 from ..live import handlers, loop, selection, tick
 from ..overlay import views
 from ..press import tool
+from ..ui_text import localize
 from .action import Action
 from .poll_messages import baked, linked, no_bed, session_runs
 from .session_loop import LoopMixin
@@ -79,7 +80,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         bed = bed_of(context)
         leave_mode(context)
         notes = tick.start(context, bed)
-        self.tell(notes or [tick.Note("INFO", f"The session of {bed.name} runs: Esc stops it")])
+        self.tell(notes or [tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))])
         handlers.watch()
         views.follow()
         if preferences.get(context).take_press_tool:

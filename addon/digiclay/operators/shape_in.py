@@ -11,6 +11,7 @@ from ..exchange import shape_show
 from ..live import running
 from ..settings.declared import title
 from ..settings.shown_units import SHOWN, to_si
+from ..ui_text import localize
 from .action import Action, FileAction
 from .poll_messages import baked, edited, linked, no_bed, session_runs
 
@@ -96,7 +97,7 @@ class Shaped(Action):
         context.view_layer.update()
         laid, off = self.displayed(context, bed)
         lost = laid.too_low + laid.too_high + laid.overhanging
-        words = f"{laid.told()}; displayed to within {off * 1e6:.2g} µm"
+        words = localize("{}; displayed to within {:.2g} µm", laid.told(), off * 1e6)
         running.set_message(words)
         self.report({"WARNING" if lost else "INFO"}, words)
 
@@ -142,7 +143,7 @@ class ShapeFromObject(Shaped, bpy.types.Operator):
         if count == 1:
             return ""
         if count:
-            return f"Select one object besides the bed, not {count}"
+            return localize("Select one object besides the bed, not {}", count)
         return "Select the object first, then the bed with Shift: its upper side is displayed"
 
     def displayed(self, context: Any, bed: Any) -> Any:

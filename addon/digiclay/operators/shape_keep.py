@@ -9,6 +9,7 @@ from ..core.shapes.height_text import pack
 from ..core.shapes.request import Shape
 from ..device.view import bed_of
 from ..settings import properties
+from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_bed, session_runs
 
@@ -35,7 +36,9 @@ class KeepShape(Action, bpy.types.Operator):
         before = scene.shape or Shape()
         shape = replace(before, file="Formed", fit="placed", heights=pack(heights))
         properties.write_scene(bed, replace(scene, shape=shape))
-        self.report({"INFO"}, f"{bed.name} has a shape of {heights.size} heights: sessions begin with it")
+        self.report(
+            {"INFO"}, localize("{} has a shape of {} heights: sessions begin with it", bed.name, heights.size)
+        )
 
 
 class RemoveShape(Action, bpy.types.Operator):

@@ -11,6 +11,7 @@ from ..core.session.take import to_scene
 from ..device.view import bed_of
 from ..live import recovery, running, sculpting
 from ..recorded import takes
+from ..ui_text import localize
 from .action import Action, FileAction
 from .poll_messages import no_bed, no_take
 
@@ -73,10 +74,10 @@ class KeepTake(Action, bpy.types.Operator):
         take = takes.read_recording(session)
         running.put(sculpting.set_recording(session, False))
         if take is None:
-            self.report({"WARNING"}, "Nothing was recorded: the session was paused")
+            self.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
             return {"CANCELLED"}
         entry = takes.add(bed, take, self.name)
-        self.report({"INFO"}, f"{entry.name}: {entry.seconds:.1f} s kept")
+        self.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
         return None
 
 
@@ -111,7 +112,7 @@ class ExportTake(ChosenTake, FileAction, bpy.types.Operator):
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
         file = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".toml"))
         write_whole(file, format_scene(to_scene(take, entry.name)).encode())
-        self.report({"INFO"}, f"{entry.name} written to {file}")
+        self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 
 
 class RemoveTake(ChosenTake, Action, bpy.types.Operator):

@@ -22,6 +22,7 @@ from ..live import bed_state, sculpting, tick
 from ..live.running import Running
 from ..recorded import takes
 from ..settings import properties
+from ..ui_text import localize
 from . import status
 from .action import Action
 from .poll_messages import no_bed, no_take, session_runs
@@ -101,7 +102,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         view.show_state(bed, self._system, self._state)
         self._place(bed)
         seconds, whole = self._at * period, self._took.duration
-        status.show(context, f"Replay: {seconds:.1f} of {whole:.1f} s     Esc: stop")
+        status.show(context, localize("Replay: {:.1f} of {:.1f} s     Esc: stop", seconds, whole))
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Any) -> None:
@@ -141,15 +142,15 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         view.show_state(bed, system, self._state)
         seconds = f"{self._took.duration:.1f} s"
         if state == self._took.end:
-            self.report({"INFO"}, f"Replayed {seconds}: it ends in the same state, bit for bit")
+            self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
         elif self.parts == 1:
             self.report(
                 {"WARNING"},
-                f"Replayed {seconds}: it ends {self._off():.3g} µm away, as another version may",
+                localize("Replayed {}: it ends {:.3g} µm away, as another version may", seconds, self._off()),
             )
         else:
-            said = f"steps {self.parts} times finer end {self._off():.3g} µm away"
-            self.report({"INFO"}, f"Replayed {seconds}: {said}")
+            said = localize("steps {} times finer end {:.3g} µm away", self.parts, self._off())
+            self.report({"INFO"}, localize("Replayed {}: {}", seconds, said))
         return {"FINISHED"}
 
     def _off(self) -> float:
@@ -183,7 +184,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
                 tick.place_finger(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
-        self.report({"INFO"}, "Replay stopped: the bed is restored")
+        self.report({"INFO"}, localize("Replay stopped: the bed is restored"))
         return {"CANCELLED"}
 
     def _ended(self, context: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..ui_text import localize
 from .sections import ROW, Pen, Readings, describe_state, force_message
 
 __all__ = ["BRIEF"]
@@ -14,8 +15,8 @@ def _brief_height(told: Readings) -> float:
 
 def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
     """Write force, set point, simulated time and state in two rows."""
-    now = force_message(float(told.force[-1])) if told.force.size else "no force yet"
-    asked = "" if told.set_point is None else f"of {told.set_point:.2f} N"
+    now = force_message(float(told.force[-1])) if told.force.size else localize("no force yet")
+    asked = "" if told.set_point is None else localize("of {:.2f} N", told.set_point)
     top = pen.row(top, now, asked)
     pen.row(top, f"{float(told.time[-1]) if told.time.size else 0.0:.1f} s", describe_state(told))
 

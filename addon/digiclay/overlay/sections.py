@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..core.base.modes import Mode
 from ..core.model.finger_range import MOST_FORCE
 from ..device import heat
+from ..ui_text import localize
 from .look import Color, Look
 from .picture import Box, Dot, Floats, Line, Picture, Words, round_axis, scale_curve
 
@@ -156,22 +157,24 @@ class Pen:
 def error_message(errors: tuple[float, float] | None) -> str:
     """Return the text of the estimated errors of a height, m, and of a cell's force, N."""
     if errors is None:
-        return "Solver error: not estimated yet"
-    return f"Solver error: about {_size(errors[0] * 1e6, 'µm')}, {_size(errors[1] * 1e3, 'mN')}"
+        return localize("Solver error: not estimated yet")
+    return localize("Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN"))
 
 
 def force_message(force: float) -> str:
     """Return the text of the total force, N, and its excess over `core.model.finger_range`."""
     if force <= MOST_FORCE:
         return f"{force:.2f} N"
-    return f"{force:.3g} N: no finger" if force >= 100.0 else f"{force:.1f} N: beyond {MOST_FORCE:g} N"
+    if force >= 100.0:
+        return localize("{:.3g} N: no finger", force)
+    return localize("{:.1f} N: beyond {:g} N", force, MOST_FORCE)
 
 
 def describe_state(told: Readings) -> str:
     """Return whether a session is paused or waits, and else its speed."""
     if told.paused or told.waiting:
-        return "paused" if told.paused else "waiting"
-    return "" if told.factor is None else f"{told.factor:.2f} x real time"
+        return localize("paused" if told.paused else "waiting")
+    return "" if told.factor is None else localize("{:.2f} x real time", told.factor)
 
 
 def _head_height(told: Readings) -> float:
@@ -182,7 +185,7 @@ def _head_height(told: Readings) -> float:
 def _draw_head(told: Readings, pen: Pen, top: float) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
     top = pen.row(top, told.name, describe_state(told))
-    top = pen.row(top, f"Method: {told.method.replace('_', ' ') or 'none'}")
+    top = pen.row(top, localize("Method: {}", localize(told.method.replace("_", " ") or "none")))
     pen.row(top, error_message(told.errors), small=True)
 
 
@@ -194,8 +197,8 @@ def _force_height(told: Readings) -> float:
 def _draw_force(told: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
     now = force_message(float(told.force[-1])) if told.force.size else ""
-    asked = "" if told.set_point is None else f"set point {told.set_point:.2f} N"
-    top = pen.row(top, f"Total force  {now}", asked)
+    asked = "" if told.set_point is None else localize("set point {:.2f} N", told.set_point)
+    top = pen.row(top, localize("Total force  {}", now), asked)
     recent = told.force[told.time >= told.window[0]]
     asked_for = told.set_point or 0.0
     largest = float(recent.max(initial=0.0))
@@ -209,7 +212,7 @@ def _draw_force(told: Readings, pen: Pen, top: float) -> None:
         line = np.array([[box.x, y], [box.x + box.width, y]])
         pen.picture.lines.append(Line(line, pen.look.set_point, 1.5 * pen.scale, dashed=True))
     pen.curve(told, told.force, ends, box)
-    pen.row(box.y, "", f"last {told.seconds:g} s", small=True)
+    pen.row(box.y, "", localize("last {:g} s", told.seconds), small=True)
 
 
 def _heights_height(told: Readings) -> float:
@@ -220,9 +223,9 @@ def _heights_height(told: Readings) -> float:
 def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
     """Draw the heights of the picked pins over the last seconds."""
     if not told.pins:
-        pen.row(top, "Pick pins to see their heights (Display panel)", small=True)
+        pen.row(top, localize("Pick pins to see their heights (Display panel)"), small=True)
         return
-    top = pen.row(top, "Heights of picked pins")
+    top = pen.row(top, localize("Heights of picked pins"))
     values = told.heights * 1e3
     recent = values[told.time >= told.window[0]]
     known = recent[np.isfinite(recent)]
@@ -232,7 +235,7 @@ def _draw_heights(told: Readings, pen: Pen, top: float) -> None:
     box = pen.frame(top, f"{ends[0]:g} mm", f"{ends[1]:g} mm")
     for place in range(len(told.pins)):
         pen.curve(told, values[:, place], ends, box, pin=place)
-    top, column = pen.row(box.y, "", f"last {told.seconds:g} s", small=True), pen.width / 3
+    top, column = pen.row(box.y, "", localize("last {:g} s", told.seconds), small=True), pen.width / 3
     for place, pin in enumerate(told.pins):
         x, y = pen.x + place % 3 * column, top - (place // 3 + 0.75) * ROW * pen.scale
         now = f" {values[-1, place]:.1f} mm" if len(values) and np.isfinite(values[-1, place]) else ""
@@ -248,7 +251,7 @@ def _draw_scale(told: Readings, pen: Pen, top: float) -> None:
     """Draw the colors of the force on a pin."""
     if told.top is None:
         return
-    top = pen.row(top, "Force on a pin")
+    top = pen.row(top, localize("Force on a pin"))
     width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
     for place, color in enumerate(heat.COLORS):
         pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, color))
@@ -262,16 +265,17 @@ def _modes_height(told: Readings) -> float:
 
 def _draw_modes(told: Readings, pen: Pen, top: float) -> None:
     """List how many pins are in each mode that occurs, with its color."""
-    top = pen.row(top, "Pins by mode", f"{int(told.modes.sum())}")
+    top = pen.row(top, localize("Pins by mode"), f"{int(told.modes.sum())}")
     for place, code in enumerate(np.flatnonzero(told.modes)):
         x, y = pen.x + place % 2 * pen.width / 2, top - (place // 2 + 0.75) * ROW * pen.scale
         mode = Mode(int(code))
-        _entry(pen, x, y, told.colors[mode], f"{told.modes[code]} {mode.name.lower().replace('_', ' ')}")
+        name = localize(mode.name.lower().replace("_", " "))
+        _entry(pen, x, y, told.colors[mode], f"{told.modes[code]} {name}")
 
 
 def _size(error: float, unit: str) -> str:
     """Return the text of an error."""
-    return f"{error:.2g} {unit}" if error >= 0.01 else f"0.01 {unit} or less"
+    return f"{error:.2g} {unit}" if error >= 0.01 else localize("0.01 {} or less", unit)
 
 
 def _entry(pen: Pen, x: float, y: float, color: tuple[float, float, float], text: str) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..device import display, form, view
+from ..ui_text import localize
 from .base import Panel, bed_of, draw_number
 
 __all__ = ["CLASSES", "Display"]
@@ -50,7 +51,7 @@ class Display(Panel, bpy.types.Panel):
         row.active = shown.overlay_full
         draw_number(row, shown, "seconds")
         pins = ", ".join(str(pin) for pin in display.picked_pins(bed))
-        column.label(text=f"Picked pins: {pins or 'none'}")
+        column.label(text=localize("Picked pins: {}", pins or localize("none")))
         row = column.row(align=True)
         row.operator("digiclay.pick_pins")
         row.operator("digiclay.clear_pins")

@@ -9,6 +9,7 @@ from ..live import bed_state, running
 from ..live.running import Running
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
+from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines
 
 __all__ = ["CLASSES", "Session", "Takes", "error_line"]
@@ -40,7 +41,7 @@ class Session(Panel, bpy.types.Panel):
             _buttons(column, session)
             _numbers(self.layout, session)
         said = (
-            session.blocking_reason and f"Waits: {session.blocking_reason}"
+            session.blocking_reason and localize("Waits: {}", session.blocking_reason)
             if session
             else running.last_message()
         )
@@ -59,7 +60,7 @@ def _buttons(column: Any, session: Running) -> None:
     row.operator("digiclay.session_step", icon="FRAME_NEXT")
     row.operator("digiclay.session_reset", icon="LOOP_BACK")
     count = len(session.gestures)
-    words = f"Take Back a Gesture ({count})" if count else "Take Back a Gesture"
+    words = localize("Take Back a Gesture ({})", count) if count else "Take Back a Gesture"
     column.operator("digiclay.session_rewind", text=words, icon="REW")
 
 
@@ -67,16 +68,16 @@ def _numbers(layout: Any, session: Running) -> None:
     """Draw how a session fares."""
     column = layout.column(align=True)
     period = session.system.period
-    column.label(text=f"Simulated: {session.state.period * period:.1f} s")
+    column.label(text=localize("Simulated: {:.1f} s", session.state.period * period))
     if session.paused:
         column.label(text="Paused", icon="PAUSE")
     elif session.factor:
         slow = session.factor < 0.9
-        words = f"Speed: {session.factor:.2f} × real time"
+        words = localize("Speed: {:.2f} × real time", session.factor)
         column.label(text=words, icon="ERROR" if slow else "NONE")
     draw_lines(column, error_line(session), "NONE")
     if session.path is not None:
-        column.label(text=f"Recording: {(len(session.path) - 1) * period:.1f} s", icon="REC")
+        column.label(text=localize("Recording: {:.1f} s", (len(session.path) - 1) * period), icon="REC")
 
 
 def error_line(session: Running) -> str:
@@ -99,7 +100,9 @@ class Takes(Panel, bpy.types.Panel):
         session = running.find(bed)
         if session is not None and session.recording is not None:
             seconds = (len(session.recording.path) - 1) * session.system.period
-            layout.operator("digiclay.take_keep", text=f"Keep Take ({seconds:.1f} s)", icon="CHECKMARK")
+            layout.operator(
+                "digiclay.take_keep", text=localize("Keep Take ({:.1f} s)", seconds), icon="CHECKMARK"
+            )
         else:
             layout.operator("digiclay.take_record", icon="RECORD_ON")
         for entry in takes.list_takes(bed):

@@ -8,6 +8,7 @@ from ..core.model.fingertip import Fingertip
 from ..device import view
 from ..live import waiting
 from ..live.stroke import Brush
+from ..ui_text import localize
 
 __all__ = [
     "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "PATH_ITEMS", "SYMMETRY_ITEMS", "TOOL", "amount_name",
@@ -123,7 +124,7 @@ def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: floa
     strength : float, optional
         Share of it.
     """
-    return f"Size {2e3 * finger.width:.3g} mm   {describe_stroke(brush, depth, strength)}"
+    return localize("Size {:.3g} mm   {}", 2e3 * finger.width, describe_stroke(brush, depth, strength))
 
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
@@ -138,6 +139,6 @@ def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
         Share of it.
     """
     if not brush.has_amount:
-        return f"{LABELS[brush]} {100.0 * strength:.0f} %"
+        return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
-    return f"{LABELS[brush]}, {amount_name(brush)} {1e3 * depth:.3g} mm{share}"
+    return f"{localize(LABELS[brush])}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"

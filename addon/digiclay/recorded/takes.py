@@ -16,6 +16,7 @@ from ..core.session import snapshot
 from ..core.session.live_periods import simulate_path
 from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
+from ..ui_text import localize
 
 __all__ = [
     "START", "Entry", "add", "find", "keep_recording", "list_takes", "read", "read_recording", "remove",
@@ -116,7 +117,7 @@ def keep_recording(bed: Any, session: Running) -> str:
     if take is None:
         return ""
     entry = add(bed, take)
-    return f"The recording ended and was kept as {entry.name} ({entry.seconds:.1f} s)"
+    return localize("The recording ended and was kept as {} ({:.1f} s)", entry.name, entry.seconds)
 
 
 def read(bed: Any, number: str = "") -> Take:

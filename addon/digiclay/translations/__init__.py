@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .. import operators, panels, preferences
+from .. import operators, panels, preferences, ui_text
 from ..compat import bpy
 from ..core.scene.toml_table import PRESETS
 from ..device import display
@@ -49,7 +49,7 @@ def translate(text: str, language: str) -> str | None:
         One of `LANGUAGES`.
     """
     known = _catalog(language)
-    for section in ("labels", "tooltips", "parameters"):
+    for section in ("labels", "tooltips", "parameters", "messages"):
         if text in known[section]:
             return known[section][text]
     label, bracket, unit = text.rpartition(" (")
@@ -120,14 +120,16 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
 
 def register() -> None:
     """Register the catalogs; Blender names a language alone, or with a country."""
-    texts = collect_strings()
+    texts = collect_strings().union(*(_catalog(language)["messages"] for language in LANGUAGES))
     catalogs: dict[str, dict[tuple[str, str], str]] = {}
     for language in LANGUAGES:
         entries = make_entries(texts, language)
         catalogs |= dict.fromkeys((language, f"{language}_{language.upper()}"), entries)
     bpy.app.translations.register(__package__, catalogs)
+    ui_text.set_translator(bpy.app.translations.pgettext_iface)
 
 
 def unregister() -> None:
     """Undo `register`."""
+    ui_text.set_translator()
     bpy.app.translations.unregister(__package__)

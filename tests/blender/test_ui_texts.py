@@ -1,0 +1,121 @@
+"""Texts with values and messages are translated: found by reading the source of what the user sees."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from string import Formatter
+
+import bpy
+import digiclay
+import pytest
+from digiclay import translations, ui_text
+from digiclay.ui_text import localize
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+ROOT = Path(digiclay.__file__).parent
+FOLDERS = ("operators", "panels", "press", "overlay", "live")
+#: Its texts are of the parameters in files of strokes, which are English like scene files.
+DATA = {ROOT / "live" / "recorded_strokes.py"}
+WORD = re.compile(r"[A-Za-z]{3,}")
+#: Beginnings of what is no language: names of Blender, lines of a preset, features as files name them.
+NAMES = (
+    "3D View", "Object Mode", "Error: ", "wm = ", "settings", "DIGICLAY_PT_part_", "use_",
+    "session:", "shape:", ", crest ", "    {} mm²", "Lengths in ",
+)  # fmt: skip
+#: Properties that Blender does not show.
+HIDDEN = (
+    "Exclude beds without a session, so that the key cannot reset them by accident",
+    "Only While It Runs",
+    "Length, width and height of the fingertip that the Press tool is about, in mm",
+)
+
+
+def source() -> Iterator[tuple[str, ast.Module]]:
+    """Yield what users see, file by file."""
+    for folder in FOLDERS:
+        for path in sorted({*(ROOT / folder).glob("*.py")} - DATA):
+            yield f"{folder}/{path.name}", ast.parse(path.read_text(encoding="utf-8"))
+
+
+def inner(tree: ast.AST, *kinds: type[ast.AST]) -> set[int]:
+    """Return the identities of all nodes inside nodes of some kinds."""
+    found = (node for node in ast.walk(tree) if isinstance(node, kinds))
+    return {id(one) for node in found for one in ast.walk(node)}
+
+
+def docstrings(tree: ast.AST) -> set[int]:
+    """Return the identities of docstrings."""
+    return {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+
+
+def join(node: ast.JoinedStr) -> str:
+    """Return an f-string with its values left out."""
+    return "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
+
+
+def test_no_text_with_values_escapes_translation() -> None:
+    found = [
+        f"{name}:{node.lineno}: {join(node)}"
+        for name, tree in source()
+        for raised in [inner(tree, ast.Raise)]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.JoinedStr) and id(node) not in raised
+        if WORD.search(join(node).replace("{}", "")) and not join(node).startswith(NAMES)
+    ]
+    assert found == []
+
+
+def test_every_report_goes_through_the_one_function() -> None:
+    plain = [
+        f"{name}:{node.lineno}"
+        for name, tree in source()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "report"
+        if isinstance(node.args[1], ast.Constant | ast.JoinedStr)
+    ]
+    assert plain == []
+
+
+def test_every_message_has_a_translation() -> None:
+    texts = {
+        node.value
+        for _, tree in source()
+        for other in [inner(tree, ast.Raise, ast.JoinedStr) | docstrings(tree)]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in other
+        if " " in node.value and WORD.search(node.value)
+    }
+    said = {text for text in texts if not text.startswith(NAMES) and text not in HIDDEN}
+    assert len(said) > 150
+    assert sorted(text for text in said if translations.translate(text, "de") is None) == []
+
+
+def test_a_translation_has_the_places_of_its_text() -> None:
+    def places(text: str) -> list[tuple[str | None, str | None]]:
+        return [(spec, how) for _, name, spec, how in Formatter().parse(text) if name is not None]
+
+    messages = translations._catalog("de")["messages"]
+    assert [text for text, german in messages.items() if places(text) != places(german)] == []
+
+
+def test_values_come_into_their_places_in_the_language_of_the_interface() -> None:
+    # Blender's module has no languages: its window shows them (tests/window).
+    ui_text.set_translator(lambda text: translations.translate(text, "de") or text)
+    try:
+        assert localize("Simulated: {:.1f} s", 1.25) == "Simuliert: 1.2 s"
+        assert localize("Nobody has written this {}", 1) == "Nobody has written this 1"
+    finally:
+        ui_text.set_translator(bpy.app.translations.pgettext_iface)
+    assert localize("Simulated: {:.1f} s", 1.25) == "Simulated: 1.2 s"
+
+
+def test_without_a_translator_texts_are_english() -> None:
+    ui_text.set_translator()
+    try:
+        assert localize("waiting") == "waiting"
+    finally:
+        ui_text.set_translator(bpy.app.translations.pgettext_iface)
