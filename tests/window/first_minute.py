@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import drag, finish, focus_window, hand, note, on_the_screen, to
+from hand_strokes import catch_up, drag, finish, focus_window, hand, note, on_the_screen, to
 
 #: Places in the sidebar, pixels from its upper right corner at a resolution scale of 1: the tab, and in it
 #: the first button.
@@ -110,6 +110,7 @@ def script(blender: Any) -> Iterator[float | None]:
     """Do what the page says; then take hold of the ball."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
+    catch_up(blender)
     yield from focus_window()
     began, waited = time.perf_counter(), waiting()
     for words, step in STEPS:

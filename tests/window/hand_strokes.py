@@ -85,7 +85,11 @@ def add_bed(blender: Any, **chosen: Any) -> None:
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.digital_clay_add, **chosen)
     blender.call(bpy.ops.view3d.view_all)
-    # A frame takes software GL half a second: the session catches up between two of them.
+    catch_up(blender)
+
+
+def catch_up(blender: Any) -> None:
+    """Let the session catch up between two frames: one takes software GL half a second."""
     entry = bpy.context.preferences.addons.new()
     entry.module = blender.EXTENSION
     entry.preferences.most_periods = 1000
