@@ -15,6 +15,7 @@ from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
 from digiclay.core.base.whole_files import read_json
 from digiclay.core.studies.series import finish
+from distributed import Client
 
 from tests.package_copy import copy_package
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
@@ -85,7 +86,7 @@ def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here: Path
         [sys.executable, "-m", "digiclay", "sweep", "my.toml", *varied, "--workers", "2", "--out", "o"],
         capture_output=True, text=True, check=False, timeout=TIMEOUT,
         env={**os.environ, "PYTHONPATH": str(ADDON)},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (5, 5)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (4, 4)),
     )  # fmt: skip
     rule = "A worker died twice of this (signal 9), perhaps for lack of memory"
     failed = sorted(line for line in done.stderr.splitlines() if rule in line)
@@ -144,9 +145,11 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Pa
     front.write_text(text.replace('__version__ = "', '__version__ = "9.'), encoding="utf-8")
     _, address = start_scheduler(start, here)
     first = start_worker(start, address, "--no-nanny")
-    command = ["digiclay", *SWEEP, "--scheduler", address, "--out", "far"]
+    hours = ["--set", "simulation.duration=1e5", "--set", "recorder.every=1000"]
+    command = ["digiclay", *SWEEP, *hours, "--scheduler", address, "--out", "far"]
     sweep = start(*command)
-    wait_until(lambda: points(here / "far"))
+    with Client(address, set_as_default=False) as client:
+        wait_until(lambda: any(client.processing().values()))
     start_worker(start, address, "--no-nanny", addon=other)
     _, said = sweep.communicate(timeout=TIMEOUT)
     assert sweep.returncode == 2
