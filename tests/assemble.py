@@ -194,6 +194,7 @@ def master(*toward: float, **known: Any) -> Master:
 STACKABLE = {
     "virtual_master": "ridge_mound_valley",
     "cell_states": "ridge_mound_valley",
+    "hybrid": "slow_press",
     "elastic": "elastic_press",
     "plastic": "plastic_press",
     "viscous": "viscous_press",

@@ -16,6 +16,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.snapshot import START
+from digiclay.core.session.snapshot_memory import flatten
 
 from tests.assemble import path
 
@@ -44,7 +45,9 @@ def packed_parts(state: State) -> list[Any]:
     held = state.active
     arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.quadratic_basis)
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
-    return [*(array.tobytes() for array in arrays), *rest, state.memory, type(state.memory)]
+    kept: list[Any] = []
+    memory = flatten(state.memory, kept)
+    return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory]
 
 
 @pytest.mark.parametrize("method", METHODS)

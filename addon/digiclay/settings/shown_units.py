@@ -14,6 +14,7 @@ SHOWN: dict[str, tuple[str, int]] = {
     "s": ("ms", 3),
     "Pa": ("bar", -5),
     "m/s": ("mm/s", 3),
+    "m/s2": ("m/s²", 0),
     "1/m": ("1/mm", -3),
     "m2/s": ("mm²/s", 6),
     "kg/m3": ("kg/m³", 0),

@@ -43,6 +43,8 @@ class DeviceInfo:
         Force from which on the reading of a cell is no noise, N; see `sensors.Sensing`.
     height_floor : float
         How far the reading of a height may be off, m.
+    dead_time : float
+        Of the valves' commands, s.
     """
 
     grid: Grid
@@ -52,6 +54,7 @@ class DeviceInfo:
     heights: Floats | None = None
     force_floor: float = 0.0
     height_floor: float = 0.0
+    dead_time: float = 0.0
 
     @property
     def lift(self) -> float:

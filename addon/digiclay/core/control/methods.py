@@ -51,6 +51,7 @@ METHODS: dict[str, Method] = {
     "cell_states": Method(
         "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
     ),
+    "hybrid": Method("control.hybrid", "Hybrid", {}),
     "elastic": Method("control.elastic", "Elastic", recovers=True),
     "plastic": Method("control.plastic", "Plastic"),
     "viscous": Method("control.viscous", "Viscous", recovers=True, by_set=True),

@@ -14,7 +14,6 @@ method is on its own.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +24,7 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
-from ..model.layout import Disc, Grid
+from ..model.layout import Disc, Grid, enclose_discs
 from ..model.physics import Cell
 from .drive import Drive, DriveParameters, make_drive
 from .exchange import Exchange, make_exchange
@@ -97,7 +96,7 @@ class SmoothingControl:
         if self.method is None:
             return memory, self.reach
         memory, disc = self.method.locate(memory, touched)
-        return memory, self.reach if disc is None else _enclose(disc, self.reach)
+        return memory, self.reach if disc is None else enclose_discs(disc, self.reach)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Smooth, and drive the pins there; the method commands all others. See `Controller`."""
@@ -181,16 +180,3 @@ def find_fault(orders: Floats, periods: int) -> str:
     good = (np.abs(orders) <= FARTHEST).all(axis=1) & ((radius == 0.0) | (radius >= SMALLEST))
     good &= (strength >= 0.0) & (strength <= 1.0)
     return "" if good.all() else f"row {int(good.argmin())} is {orders[good.argmin()].tolist()}"
-
-
-def _enclose(one: Disc, other: Disc) -> Disc:
-    """Return the least disc that holds two."""
-    (x, y, radius), (other_x, other_y, other_radius) = one, other
-    apart = math.hypot(other_x - x, other_y - y)
-    if apart + other_radius <= radius:
-        return one
-    if apart + radius <= other_radius:
-        return other
-    whole = (apart + radius + other_radius) / 2.0
-    share = (whole - radius) / apart
-    return x + share * (other_x - x), y + share * (other_y - y), whole

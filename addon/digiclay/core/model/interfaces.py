@@ -120,6 +120,16 @@ class Pulp(Protocol):
     """Relaxation of the pulp; `own` are its state rows, shape (rows, k)."""
 
     @property
+    def rates(self) -> Floats:
+        """Rates of the filters, shape (rows, 1), 1/s."""
+        ...
+
+    @property
+    def shares(self) -> Floats:
+        """Shares of the force that the filters take in the end, shape (rows,)."""
+        ...
+
+    @property
     def rows(self) -> int: ...
 
     def relaxed(self, own: Floats) -> Any: ...

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "make_grid"]
+__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "make_grid"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -177,3 +177,22 @@ def make_grid(layout: Layout) -> Grid:
     x = column - width / 2 + (row[:, None] % 2) * layout.shift
     y = np.broadcast_to(((row - (layout.rows - 1) / 2) * layout.row_spacing)[:, None], x.shape)
     return Grid(layout, x.ravel(), y.ravel())
+
+
+def enclose_discs(one: Disc, other: Disc) -> Disc:
+    """Return the least disc that holds two.
+
+    Parameters
+    ----------
+    one, other : (float, float, float)
+        x, y and radius, m.
+    """
+    (x, y, radius), (other_x, other_y, other_radius) = one, other
+    apart = math.hypot(other_x - x, other_y - y)
+    if apart + other_radius <= radius:
+        return one
+    if apart + radius <= other_radius:
+        return other
+    whole = (apart + radius + other_radius) / 2.0
+    share = (whole - radius) / apart
+    return x + share * (other_x - x), y + share * (other_y - y), whole

@@ -50,6 +50,8 @@ class Unrelaxed:
     """No relaxation: the pulp is elastic."""
 
     rows = 0
+    rates: Floats = np.empty((0, 1))
+    shares: Floats = np.empty(0)
 
     def relaxed(self, own: Floats) -> float:
         """Return no loss of force."""

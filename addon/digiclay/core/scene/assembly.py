@@ -197,7 +197,8 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
 
     known = scene.sensors
     floors = (known.force_floor, known.height_floor) if known else (0.0, 0.0)
-    device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors)
+    dead_time = scene.delay.dead_time if scene.delay else 0.0
+    device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time)
     if scene.shape:
         from ..shapes.source_file import fit_shape
 

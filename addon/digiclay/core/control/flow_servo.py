@@ -1,0 +1,184 @@
+"""Height servo by the inverse of the flow law: openings that bring loaded pins to their heights in time.
+
+The speed asked for is ``w = (e - Σ w_j t_j) / (T_a - δ)`` for the error e, the time T_a until the height is
+aimed at, the delay δ of the valve, and earlier commands with speeds w_j that still act for t_j. The error of
+a free pin then decays with poles at 0 and about 0.3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.delay import Queue
+from ..model.physics import Cell
+from .drive import OPENINGS
+
+__all__ = ["FlowServo", "make_flow_servo"]
+
+Floats = NDArray[np.float64]
+
+#: Instants of a control period at which the lag of the valve is looked at.
+INSTANTS = 64
+#: Speeds smaller than this share of the free speed are none: a valve must not stay open for them.
+STILL = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class FlowServo:
+    """Servo of a device.
+
+    Attributes
+    ----------
+    cell : Cell
+    ratios, openings : ndarray (257,)
+        Openings from -1 to 1, and the speed of a pin without load at them, as a share of the largest.
+    fall, rise : float
+        Largest speeds without load, m/s, both positive.
+    pull, lift : float
+        Forces of the reservoirs on a pin, N, both positive.
+    ahead : float
+        Time until the heights aimed at, s.
+    left : tuple of float (q,)
+        How long earlier commands still act, s, the newest first.
+    dead_band : float
+        m.
+    exact : bool
+        Whether the flow is proportional to the pressure drop, so that a load scales all speeds alike.
+    """
+
+    cell: Cell
+    ratios: Floats
+    openings: Floats
+    fall: float
+    rise: float
+    pull: float
+    lift: float
+    ahead: float
+    left: tuple[float, ...]
+    dead_band: float
+    exact: bool
+
+    @property
+    def rows(self) -> int:
+        """Rows a cell needs: the speeds of the commands that still act."""
+        return len(self.left)
+
+    @cached_property
+    def span(self) -> float:
+        """How long a new command acts until the heights aimed at, s."""
+        return self.ahead - sum(self.left)
+
+    def find_limits(self, force: Floats) -> tuple[Floats, Floats]:
+        """Return the lowest (negative) and highest speeds of pins under forces (m,), N; m/s."""
+        rise = force * (-self.rise / self.lift)
+        rise += self.rise
+        np.maximum(rise, 0.0, out=rise)
+        fall = force * (-self.fall / self.pull)
+        fall -= self.fall
+        return fall, rise
+
+    def coast(self, height: Floats, speeds: Floats) -> Floats:
+        """Return the heights at which commands that still act will leave pins, (m,), m.
+
+        Parameters
+        ----------
+        height : ndarray (m,)
+            Measured, m.
+        speeds : ndarray (q, m)
+            Asked for earlier, the newest first, m/s.
+        """
+        coasted: Floats = height + np.dot(self.left, speeds)
+        return coasted
+
+    def serve(self, error: Floats, limits: tuple[Floats, Floats], force: Floats, speeds: Floats) -> Floats:
+        """Return the valve commands (m,); the speeds asked for are put before the earlier ones, in place.
+
+        Parameters
+        ----------
+        error : ndarray (m,)
+            Commanded heights less those of `coast`, m.
+        limits : (ndarray, ndarray)
+            From `find_limits`, m/s.
+        force : ndarray (m,)
+            N.
+        speeds : ndarray (q, m)
+            Asked for earlier, the newest first, m/s.
+        """
+        speed = error * (1.0 / self.span)
+        np.putmask(speed, np.abs(error) <= self.dead_band, 0.0)
+        np.maximum(speed, limits[0], out=speed)
+        np.minimum(speed, limits[1], out=speed)
+        np.putmask(speed, np.abs(speed) < STILL * self.rise, 0.0)
+        speeds[1:] = speeds[:-1]
+        speeds[0] = speed
+        share = speed / np.where(speed > 0.0, limits[1], -limits[0])
+        command: Floats = np.interp(share, self.ratios, self.openings)
+        if not self.exact:
+            command = self._refine(command, speed, force)
+        return command
+
+    def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:
+        """Return commands at which the flow law gives the speeds: one step from those of a load that scales.
+
+        Parameters
+        ----------
+        command : ndarray (m,)
+        speed : ndarray (m,)
+            m/s.
+        force : ndarray (m,)
+            N.
+        """
+        moving = np.flatnonzero(command)
+        opening, wanted = command[moving], speed[moving]
+        drop = self.cell.supply.pressure(opening) - self.cell.actuator.pressure(force[moving])
+        found = self.cell.flow.flow(opening, drop) / self.cell.actuator.area
+        share = np.interp(opening, self.openings, self.ratios)
+        share *= np.clip(wanted / found, 0.5, 2.0)
+        command[moving] = np.interp(share, self.ratios, self.openings)
+        return command
+
+
+def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
+    """Make the servo of a device; it aims two control periods ahead, plus the whole periods of the dead time.
+
+    Parameters
+    ----------
+    cell : Cell
+    period : float
+        Control period, s.
+    dead_time : float
+        Of the valve's commands, s.
+    dead_band : float
+        m.
+    """
+    area, supply, flow = cell.actuator.area, cell.supply, cell.flow
+
+    def speeds(pressure: float) -> Floats:
+        """Return the speeds at `OPENINGS` under a pressure, growing, m/s."""
+        free = flow.flow(OPENINGS, np.full(OPENINGS.size, abs(pressure))) / area
+        return np.asarray(np.maximum(free, 0.0) + 1e-12 * OPENINGS)
+
+    up, down = speeds(supply.high), speeds(supply.low)
+    ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))
+    openings = np.concatenate((-OPENINGS[::-1], OPENINGS[1:]))
+    half = speeds(0.5 * supply.high)
+    delay = dead_time + _measure_lag(cell, period)
+    whole = math.ceil(delay / period - 1e-9)
+    left = tuple(min(delay - number * period, period) for number in range(whole))
+    ahead = 2.0 * period + math.floor(delay / period + 1e-9) * period
+    exact = bool(np.allclose(2.0 * half, up, rtol=1e-6, atol=1e-12))
+    return FlowServo(
+        cell, ratios, openings, float(down[-1]), float(up[-1]), -supply.low * area, supply.high * area,
+        ahead, left or (0.0,), dead_band, exact,
+    )  # fmt: skip
+
+
+def _measure_lag(cell: Cell, period: float) -> float:
+    """Return how much later the valve's opening is than its command, over a control period, s."""
+    times = (np.arange(INSTANTS) + 0.5) * (period / INSTANTS)
+    return period * float(np.mean(1.0 - cell.lag.response(Queue(), times.tolist())[:, -1]))

@@ -1,0 +1,108 @@
+"""Force to height: the one height of the blister's top at which predicted forces add up to a force.
+
+Heights of the cells follow from that of the top, and are limited to what pins can reach in time; forces
+follow from heights, undersides and relaxation. The sum grows with the top, so one table of it is enough.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pulp_estimate import PulpEstimate
+
+__all__ = ["Reach", "find_top", "form_heights", "lead_heights"]
+
+Floats = NDArray[np.float64]
+
+#: Heights of the top that are tried, as shares of what pins can reach: steps of 15 µm on a level bed.
+SHARES = np.linspace(0.0, 1.0, 33)
+
+
+class Reach(NamedTuple):
+    """Range of the cells near the finger until the heights aimed at.
+
+    Attributes
+    ----------
+    part : ndarray (m,)
+        Profile of the blister, 1 at its top.
+    drop : ndarray (m,)
+        How far they may stand below the top, above it in a valley, m; infinite: not led.
+    least, most : ndarray (m,)
+        Lowest and highest they can be, m.
+    """
+
+    part: Floats
+    drop: Floats
+    least: Floats
+    most: Floats
+
+
+def form_heights(top: Floats | float, edge: float, part: Floats, drop: Floats, *, raised: bool) -> Floats:
+    """Return heights of cells for a top: the blister's, or nearer to the top where they are led, m.
+
+    Parameters
+    ----------
+    top : float or ndarray (t, 1)
+        m.
+    edge : float
+        Height of the surface around, m.
+    part, drop : ndarray (m,)
+        See `Reach`.
+    raised : bool
+        Whether the top is above the surface around it.
+    """
+    heights: Floats = (top - edge) * part
+    heights += edge
+    return lead_heights(heights, top, drop, raised=raised)
+
+
+def lead_heights(heights: Floats, top: Floats | float, drop: Floats, *, raised: bool) -> Floats:
+    """Return heights, but no farther from the top than cells may stand that are led, m.
+
+    Parameters
+    ----------
+    heights : ndarray (m,) or (t, m)
+        m.
+    top : float or ndarray (t, 1)
+        m.
+    drop : ndarray (m,)
+        See `Reach`.
+    raised : bool
+        Whether the top is above the surface around it.
+    """
+    return np.maximum(heights, top - drop) if raised else np.minimum(heights, top + drop)
+
+
+def find_top(
+    wanted: float, edge: float, reach: Reach, under: Floats, lost: Floats, pulp: PulpEstimate, *, raised: bool
+) -> float:
+    """Return the height of the top at which the predicted forces add up to a force, m.
+
+    Where none does, it is the end of the range nearest to it.
+
+    Parameters
+    ----------
+    wanted : float
+        N.
+    edge : float
+        Height of the surface around, m.
+    reach : Reach
+    under : ndarray (m,)
+        Predicted undersides of the finger, m.
+    lost : ndarray (m,)
+        From `PulpEstimate.predict_loss`, N.
+    pulp : PulpEstimate
+    raised : bool
+        Whether the top is above the surface around it.
+    """
+    level = reach.part >= reach.part.max()
+    low, high = float(reach.least[level].min()), float(reach.most[level].max())
+    tops = low + (high - low) * SHARES
+    depths = form_heights(tops[:, None], edge, reach.part, reach.drop, raised=raised)
+    np.maximum(depths, reach.least, out=depths)
+    np.minimum(depths, reach.most, out=depths)
+    depths -= under
+    return float(np.interp(wanted, pulp.predict_force(depths, lost).sum(axis=1), tops))

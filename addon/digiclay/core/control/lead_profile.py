@@ -1,0 +1,76 @@
+"""Heights ahead of a moving blister, and around one at rest, such that pins arrive in time.
+
+A pin d ahead of the level part must already stand at ``top - d v_free / v`` for a finger at speed v, or it
+would block it. Around a finger at rest the same holds for the speed of the drags to be expected: the skirt.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["LeadProfile"]
+
+Floats = NDArray[np.float64]
+
+#: A finger slower than this has no direction, m/s.
+SLOWEST = 1e-3
+
+
+@dataclass(frozen=True)
+class LeadProfile:
+    """Slopes of the heights around the finger.
+
+    Attributes
+    ----------
+    level : float
+        Radius within which pins are level with the top, m.
+    rise, fall : float
+        Speeds of free pins that are counted on, m/s.
+    skirt : float
+        Speed of the drags expected from rest, m/s; 0: no skirt.
+    """
+
+    level: float
+    rise: float
+    fall: float
+    skirt: float
+
+    def find_reach(self, height: float, speed: float) -> float:
+        """Return the radius within which pins may be led, m.
+
+        Parameters
+        ----------
+        height : float
+            Of the top over the surface around, m; negative below.
+        speed : float
+            Of the finger in the plane, m/s.
+        """
+        quickest = max(speed, self.skirt)
+        return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
+
+    def find_drop(self, distance: Floats, ahead: Floats, speed: float, *, raised: bool) -> Floats:
+        """Return how far below the top (above it, in a valley) pins may stand at most, (m,), m.
+
+        Parameters
+        ----------
+        distance : ndarray (m,)
+            From the finger, m.
+        ahead : ndarray (m,)
+            How far ahead of it, m.
+        speed : float
+            Of the finger in the plane, m/s.
+        raised : bool
+            Whether the top is above the surface around it.
+        """
+        free = self.rise if raised else self.fall
+        around = free / self.skirt if self.skirt else math.inf
+        drop = distance - self.level
+        np.maximum(drop, 0.0, out=drop)
+        if speed < SLOWEST or free / speed >= around:
+            return drop * around if self.skirt else np.where(drop > 0.0, math.inf, 0.0)
+        steep = drop * around if self.skirt else np.where(drop > 0.0, math.inf, 0.0)
+        return np.where(ahead > 0.0, drop * (free / speed), steep)

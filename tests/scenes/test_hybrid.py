@@ -1,0 +1,253 @@
+"""Method III holds the force where the others lose it: fast drags, wrong models, noise, turned fingers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.hybrid_parameters import Hybrid
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.fingertip import Fingertip
+from digiclay.core.model.trajectory import Path, Waypoint
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_result import Result
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.speed_limits import Drag, Follows, Lift, track
+
+from tests.assemble import Record, path, record
+
+REST = 40.0
+
+
+def device(method: str = "hybrid", **tables: object) -> Scene:
+    """Return the default device with a method."""
+    return resolve({"control": {"method": method}, **tables})
+
+
+def along(scene: Scene, *waypoints: tuple[float, float, float, float], turn: float = 0.0) -> Scene:
+    """Return a scene whose finger goes through waypoints (s, then mm), and turns about the vertical, rad."""
+    end = waypoints[-1][0]
+    points = tuple(
+        Waypoint(
+            time=t,
+            position=(x * 1e-3, y * 1e-3, z * 1e-3),
+            orientation=(np.cos(turn * t / end / 2), 0.0, 0.0, np.sin(turn * t / end / 2)),
+        )
+        for t, x, y, z in waypoints
+    )
+    finger = replace(scene.fingers[0], trajectory=Path("smooth", points))
+    return replace(scene, fingers=(finger,), simulation=replace(scene.simulation, duration=end))
+
+
+#: A press, a lift of 8 mm, and a drag of 15 mm at 15 mm/s.
+STROKE = (
+    (0.0, -8, 0, 41),
+    (0.2, -8, 0, 38),
+    (0.3, -8, 0, 38),
+    (1.2, -8, 0, 46),
+    (2.2, 7, 0, 46),
+    (2.4, 7, 0, 46),
+)
+
+
+@cache
+def stroke(method: str, turn: float = 0.0) -> Result:
+    """Return the run of the stroke with a method."""
+    return run(along(device(method), *STROKE, turn=turn))
+
+
+def test_the_force_deviates_less_than_half_as_much_as_method_i_on_the_paper_s_session() -> None:
+    session = "addon/digiclay/sample_shapes/sessions/ridge_mound_valley.toml"
+    found = run(_load(session, "hybrid")).metrics
+    # Measured 0.027 N; Method I has 0.068 N.
+    assert found["rfd"] < 0.5 * 0.068
+    # Twice: both are asked for, the finger is lifted off.
+    assert found["losses"] == 2
+    assert found["ridge_unevenness"] < 0.21e-3 + 0.2e-3
+    assert found["max_total_force"] < 0.6
+
+
+def _load(name: str, method: str) -> Scene:
+    """Return a scene file with another method."""
+    import tomllib
+    from pathlib import Path as File
+
+    table = tomllib.loads((File(__file__).parents[2] / name).read_text(encoding="utf-8"))
+    return resolve(table | {"control": {"method": method}})
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.2])
+def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn: float) -> None:
+    one, three = (stroke(method, turn).metrics["rfd"] for method in ("virtual_master", "hybrid"))
+    # Measured 0.36 and 0.4 of it.
+    assert three < 0.55 * one
+
+
+# Speed
+
+
+@pytest.mark.parametrize(
+    ("way", "speed", "deviation"),
+    [
+        (Drag(), 50e-3, 0.02),
+        (Drag(height=-1.5e-3), 50e-3, 0.02),
+        (Drag(height=-10e-3), 50e-3, 0.03),
+        (Lift(), 22e-3, 0.12),
+    ],
+    ids=["ridge", "surface", "valley", "lift"],
+)
+def test_a_finger_is_followed_at(way: Drag | Lift, speed: float, deviation: float) -> None:
+    found, _ = track(device(), way, speed)
+    assert (found.losses, found.loss_share) == (0, 0.0)
+    # Measured 0.009, 0.008, 0.015 and 0.06 N; Method I loses all of them but the lift.
+    assert found.rfd < deviation
+
+
+def test_with_a_wide_orifice_it_follows_the_speed_of_exploring_hands() -> None:
+    found: Follows
+    found, _ = track(device(valve={"orifice_diameter": 0.8e-3}), Drag(), 80e-3)
+    assert (found.losses, found.loss_share) == (0, 0.0)
+    # 15 % of 0.4 N, what a finger can tell; measured 0.016 N.
+    assert found.rfd < 0.15 * 0.4
+
+
+def test_without_a_skirt_a_quick_drag_from_rest_is_blocked() -> None:
+    found, _ = track(device(control={"method": "hybrid", "skirt_speed": 0.0}), Drag(), 40e-3)
+    assert found.rfd > 0.1
+
+
+def test_the_skirt_leaves_no_lump_behind_the_start() -> None:
+    result = run(along(device(), *STROKE, (2.5, 7, 0, 60), (3.3, 7, 0, 60)))
+    end, (x, y) = result.history["height"][-1], result.history["position"].T
+    # Beside and behind the ridge, beyond the blister's 15 mm and a pitch.
+    off = np.hypot(np.clip(x, -8e-3, 7e-3) - x, y) > 18.5e-3
+    assert off.sum() > 100
+    assert np.abs(end[off] - REST * 1e-3).max() < 20e-6
+
+
+# What the controller knows wrongly
+
+
+def with_model(true: Scene, model: Scene) -> Record:
+    """Return the session of a device under a controller made for another one."""
+    system = replace(assemble(true), controller=assemble(model).controller)
+    (trajectory,) = true.trajectories()
+    return record(system, trajectory, true.periods)
+
+
+def change(scene: Scene, part: str, **factors: float) -> Scene:
+    """Return a scene whose finger has a part with some numbers times a factor."""
+    known = getattr(scene.fingers[0], part)
+    other = replace(known, **{name: getattr(known, name) * factor for name, factor in factors.items()})
+    return replace(scene, fingers=(replace(scene.fingers[0], **{part: other}),))
+
+
+TRUE = along(device(), *STROKE)
+SIZES = ("length", "width", "height")
+#: The laminar flow goes with the fourth power of the diameter.
+VALVES = {
+    f"valve times {share}": replace(TRUE, valve=replace(TRUE.valve, orifice_diameter=0.5e-3 * share**0.25))
+    for share in (0.7, 1.3)
+}
+MODELS = {
+    **VALVES,
+    "stiffness halved": change(TRUE, "contact", stiffness=0.5),
+    "stiffness doubled": change(TRUE, "contact", stiffness=2.0),
+    "exponent times 0.7": change(TRUE, "contact", exponent=0.7),
+    "exponent times 1.4": change(TRUE, "contact", exponent=1.4),
+    "fingertip times 0.75": change(TRUE, "fingertip", **dict.fromkeys(SIZES, 0.75)),
+    "fingertip times 1.3": change(TRUE, "fingertip", **dict.fromkeys(SIZES, 1.3)),
+}
+
+
+@pytest.mark.parametrize("known", MODELS)
+def test_with_a_wrong_model_the_finger_is_held_no_worse_than_by_method_i(known: str) -> None:
+    found = with_model(TRUE, MODELS[known])
+    total = found.force.sum(axis=1)
+    touching = total > 0.0
+    first = int(np.argmax(touching))
+    assert touching[first:-1].all()
+    assert total.max() < 1.0
+    rfd = float(np.sqrt(np.mean((total[touching] - 0.4) ** 2)))
+    assert rfd <= stroke("virtual_master").metrics["rfd"]
+
+
+def test_the_size_of_a_fingertip_known_wrongly_is_found() -> None:
+    found = with_model(TRUE, MODELS["fingertip times 0.75"])
+    assert found.last.memory.estimate.mean[7] == pytest.approx(-np.log(0.75), abs=5e-3)
+
+
+@pytest.mark.parametrize("sensors", [{"force_noise": 2e-3}, {"delay": 1}], ids=["noise", "delay"])
+def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors: dict[str, float]) -> None:
+    found = run(along(device(sensors=sensors), *STROKE)).metrics
+    one = run(along(device("virtual_master", sensors=sensors), *STROKE)).metrics
+    assert (found["losses"], found["contact_loss_share"]) == (0, 0.0)
+    assert found["rfd"] <= one["rfd"]
+
+
+# Extremes
+
+
+def test_a_finger_that_jumps_is_found_again_where_it_is() -> None:
+    way = path(
+        (0.0, -20, 0, 41),
+        (0.5, -20, 0, 37),
+        (0.8, -20, 0, 37),
+        (0.805, 20, 0, 37),
+        (1.6, 20, 0, 37),
+        interpolation="linear",
+    )
+    found = record(assemble(device()), way, 320)
+    x, *_ = found.last.memory.estimate.mean
+    assert x == pytest.approx(20e-3, abs=0.3e-3)
+    assert found.force[300:].sum(axis=1) == pytest.approx(0.4, abs=0.03)
+
+
+def test_a_touched_cell_is_never_frozen() -> None:
+    found = record(
+        assemble(device()),
+        path(*[(t, x, y, z) for t, x, y, z in STROKE], (3.4, -8, 0, 46), (3.6, -8, 0, 44)),
+        720,
+    )
+    assert np.any(found.mode == Mode.FROZEN)
+    assert not np.any((found.mode == Mode.FROZEN)[:-1] & (found.force > Hybrid().release_force)[:-1])
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"relaxation": "absent"},
+        {"valve_lag": "absent", "conduit": "absent"},
+        {"delay": {"dead_time": 12e-3}},
+        {"simulation": {"control_period": 10e-3, "physics_step": 10e-3}},
+        {"layout": {"rows": 11, "columns": 11}},
+        {"layout": {"rows": 15, "columns": 15, "arrangement": "staggered"}},
+    ],
+    ids=["no relaxation", "instant valve", "dead time of 12 ms", "10 ms period", "small bed", "staggered"],
+)
+def test_it_holds_a_press_on_other_devices(tables: dict[str, object]) -> None:
+    known = along(device(**tables), (0.0, 1.3, 0.4, 41), (0.4, 1.3, 0.4, 38.5), (1.2, 1.3, 0.4, 38.5))
+    found = run(known)
+    late = found.history["total_force"][int(0.8 / known.simulation.control_period) :]
+    # With commands under way for three periods it swings by 0.02 N about 0.44 N, and the trim takes 0.5 s.
+    assert late == pytest.approx(0.4, abs=0.08 if "delay" in tables else 0.02)
+
+
+def test_a_bed_without_a_finger_stays_at_rest() -> None:
+    system = assemble(device().with_sections(fingertip=None))
+    *_, last = periods(system, [path((0.0, 0, 0, 41))], begin(system), 20)
+    assert np.all(last.row(0) == REST * 1e-3)
+
+
+def test_a_finger_much_larger_than_the_bed_is_held() -> None:
+    tip = Fingertip(40e-3, 40e-3, 40e-3)
+    known = along(
+        device(layout={"rows": 13, "columns": 13}), (0.0, 0, 0, 40.5), (0.4, 0, 0, 39), (1.0, 0, 0, 39)
+    )
+    found = run(replace(known, fingers=(replace(known.fingers[0], fingertip=tip),)))
+    assert found.history["total_force"][-1] == pytest.approx(0.4, abs=0.05)

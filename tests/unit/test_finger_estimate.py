@@ -1,0 +1,107 @@
+"""The filter of Method III finds a fingertip from its undersides: place, velocity, turn and size."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread, invert_small
+from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
+from numpy.typing import NDArray
+
+from tests.assemble import make_basis
+
+Floats = NDArray[np.float64]
+
+PERIOD = 5e-3
+#: Cells about the origin, 3 mm apart.
+X, Y = (grid.ravel() * 3e-3 for grid in np.meshgrid(np.arange(-6.0, 7.0), np.arange(-6.0, 7.0)))
+
+
+def filter_of(tip: Fingertip) -> FingerFilter:
+    """Return a filter of a fingertip, with the spread that Method III has."""
+    return FingerFilter(tip, Spread(1.0, 0.5, 0.05, 30e-6), PERIOD)
+
+
+def underside(tip: Fingertip, x: float, y: float, z: float, turn: float) -> Floats:
+    """Return the underside that the physics has over all cells, m."""
+    pose = np.array([[x, y, z, math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)]])
+    under: Floats = compute_underside(*compute_forms(tip.outline(pose)), make_basis(X, Y))[0]
+    return under
+
+
+def follow(
+    known: FingerFilter, tip: Fingertip, speed: float = 0.0, turn: float = 0.0, count: int = 200
+) -> Estimate:
+    """Return what a filter makes of a fingertip that moves along x, by the cells less than 2 mm above it."""
+    found = known.begin(-9e-3, 0.0, 40.5e-3)
+    for number in range(count):
+        found = known.predict(found)
+        under = underside(tip, speed * number * PERIOD - 10e-3, 1e-3, 40e-3, turn)
+        here = under < 42e-3
+        at = known.measure(found.mean, make_basis(X, Y)[:, here])
+        found, _ = known.correct(found, at, under[here], np.full(np.count_nonzero(here), 1e-10))
+    return found
+
+
+def test_a_fingertip_at_rest_is_found_to_a_micrometer() -> None:
+    found = follow(filter_of(Fingertip()), Fingertip())
+    assert found.mean[:3] == pytest.approx([-10e-3, 1e-3, 40e-3], abs=1e-6)
+
+
+def test_the_velocity_of_a_drag_is_found() -> None:
+    found = follow(filter_of(Fingertip()), Fingertip(), speed=20e-3)
+    assert found.mean[3:6] == pytest.approx([20e-3, 0.0, 0.0], abs=0.2e-3)
+
+
+def test_a_turn_is_found() -> None:
+    found = follow(filter_of(Fingertip()), Fingertip(), speed=10e-3, turn=0.6)
+    assert found.mean[6] == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.parametrize("size", [0.75, 1.3])
+def test_a_fingertip_of_another_size_than_known_is_found(size: float) -> None:
+    tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
+    found = follow(filter_of(Fingertip()), tip, speed=5e-3)
+    assert found.mean[7] == pytest.approx(math.log(size), abs=5e-3)
+
+
+def test_the_errors_left_are_those_of_the_corrected_fingertip() -> None:
+    known = filter_of(Fingertip())
+    found, basis = known.begin(0.2e-3, 0.0, 40e-3), make_basis(X, Y)
+    under = underside(Fingertip(), 0.0, 0.0, 40e-3, 0.0)
+    here = under < 42e-3
+    found, left = known.correct(
+        found, known.measure(found.mean, basis[:, here]), under[here], np.full(here.sum(), 1e-10)
+    )
+    again = under[here] - known.measure(found.mean, basis[:, here]).under
+    # They are the slopes' prediction: right but for the curvature over 0.2 mm, 2.5 µm at a radius of 8 mm.
+    assert left == pytest.approx(again, abs=5e-6)
+
+
+def test_the_underside_at_another_place_is_that_of_the_physics() -> None:
+    known = filter_of(Fingertip())
+    shape = Estimate(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0]), np.eye(8))
+    found = known.find_underside((1e-3, 2e-3, 40e-3), shape, make_basis(X, Y))
+    true = underside(Fingertip(), 1e-3, 2e-3, 40e-3, 0.4)
+    # Inside the outline; the turn is rounded to 0.02 rad, and a slope makes up for the rest.
+    assert found[true < 45e-3] == pytest.approx(true[true < 45e-3], abs=1e-6)
+
+
+def test_slopes_are_differences_of_the_underside() -> None:
+    known, basis = filter_of(Fingertip()), make_basis(X, Y)
+    mean = np.array([0.5e-3, -0.3e-3, 40e-3, 0.0, 0.0, 0.0, 0.3, 0.02])
+    at = known.measure(mean, basis)
+    near = at.under < 45e-3
+    for row, place in enumerate((0, 1, 2, 6, 7)):
+        step = np.zeros(8)
+        step[place] = 1e-5
+        slope = (known.measure(mean + step, basis).under - known.measure(mean - step, basis).under) / 2e-5
+        assert at.slopes[row][near] == pytest.approx(slope[near], rel=2e-2, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_inverse_is_that_of_numpy(seed: int) -> None:
+    matrix = np.random.default_rng(seed).normal(size=(5, 5)) * np.logspace(-3, 3, 5)
+    assert invert_small(matrix) == pytest.approx(np.linalg.inv(matrix), rel=1e-9)
