@@ -151,8 +151,8 @@ def test_a_take_keeps_the_path_of_every_finger(words: str) -> None:
 def test_a_take_of_a_later_version_is_refused() -> None:
     take, written = take_of(scene(ONE)), io.BytesIO()
     with np.load(io.BytesIO(to_bytes(take))) as kept:
-        np.savez(written, **{**kept, "version": np.array(3)})
-    with pytest.raises(OutputError, match=r"its version must be at most 2 \(got 3\)"):
+        np.savez(written, **{**kept, "version": np.array(4)})
+    with pytest.raises(OutputError, match=r"its version must be at most 3 \(got 4\)"):
         from_bytes(written.getvalue())
 
 
