@@ -125,6 +125,7 @@ def script(blender: Any) -> Iterator[float | None]:
         yield from reset(blender)
     yield from taps(blender)
     yield from navigation(blender)
+    yield from pie_menu(blender)
     yield from taken_back(blender)
 
 
@@ -161,6 +162,32 @@ def navigation(blender: Any) -> Iterator[float | None]:
     yield from finish(blender, process)
     note(blender, "after orbit")
     blender.shot("hand_orbit")
+    yield from reset(blender)
+
+
+def pie_menu(blender: Any) -> Iterator[float | None]:
+    """Pan in the middle of a stroke; then open the pie menu of the shading, and let go over Solid."""
+    running = blender.part("live.running")
+    start, end = ends(blender)
+    middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
+    area, _ = blender.view()
+    before = list(area.spaces.active.region_3d.view_location)
+    process = hand(
+        to(start), "mousedown 1", drag(start, middle, 0.5, 60),
+        "keydown shift mousedown 2 sleep 0.05", drag(middle, (middle[0], middle[1] + 40), 0.3, 60),
+        "mouseup 2 keyup shift sleep 0.3 key z sleep 1",
+        drag((middle[0], middle[1] + 40), (middle[0] + 60, middle[1] + 40), 0.3, 30),
+        "sleep 0.3 mouseup 1 sleep 0.5",
+        drag((middle[0] + 60, middle[1] + 40), (middle[0] + 90, middle[1] + 40), 0.3, 30),
+    )  # fmt: skip
+    yield from blender.until(lambda: process.poll() is not None)
+    yield from blender.until(
+        lambda: not any(one.held for session in running.list_sessions() for one in session.strokes)
+    )
+    after = list(area.spaces.active.region_3d.view_location)
+    yield from finish(blender, process)
+    note(blender, "pie menu")
+    blender.SEEN["pie menu"]["panned"] = [b - a for a, b in zip(before, after, strict=True)]
     yield from reset(blender)
 
 

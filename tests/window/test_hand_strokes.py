@@ -58,6 +58,16 @@ def test_the_view_turns_and_zooms_in_mid_stroke_and_the_stroke_goes_on(seen: dic
     assert ends.min() > FORMED
 
 
+def test_a_stroke_pans_in_its_middle_and_ends_where_a_pie_menu_has_taken_the_release(
+    seen: dict[str, Any],
+) -> None:
+    assert np.abs(seen["pie menu"]["panned"]).max() > 0.01
+    row = down(seen, "pie menu")[ROW]
+    # Formed up to the middle, and not to where the mouse went after the release.
+    assert row[4:12].min() > FORMED
+    assert np.abs(row[20:]).max() < 0.5
+
+
 @pytest.mark.parametrize("name", ["undone", "escaped"])
 def test_an_unfinished_stroke_is_taken_back_by_ctrl_z_and_by_esc_and_the_session_goes_on(
     seen: dict[str, Any], name: str
