@@ -12,6 +12,7 @@ from . import (
     cluster_cost,
     made,
     mesh_export,
+    method_figures,
     precision,
     runs_together,
     session_parts,
@@ -35,6 +36,7 @@ examples:
   python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
   python -m benchmarks ticks          how the time of a tick is distributed
+  python -m benchmarks methods        force deviation of Methods I and III over paths and drags
   python -m benchmarks made           things formed by recorded strokes, beside what was intended
 """
 
@@ -51,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
     for kind in (
         session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
-        cluster_cost,
+        cluster_cost, method_figures,
     ):  # fmt: skip
         kind.add(kinds)
     return top

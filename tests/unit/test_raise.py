@@ -119,12 +119,18 @@ def test_no_pin_of_a_finer_bed_carries_more_than_its_reservoir_lifts_while_it_is
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_goes_with_every_size_of_bed(method: str) -> None:
     for bed in BEDS.values():
-        assemble(make_scene("paper", Layout(15, 15, bed.pitch), method, bed.share))
+        made = assemble(make_scene("paper", Layout(15, 15, bed.pitch), method, bed.share))
+        assert made.controller is not None
 
 
 def test_method_2_raises_the_whole_line() -> None:
     formed = along(form(begin(control={"method": "cell_states"}), ALONG, Brush.RAISE))
     np.testing.assert_allclose(formed, 15.0, rtol=0, atol=2.0)
+
+
+def test_method_3_raises_the_whole_line() -> None:
+    formed = along(form(begin(control={"method": "hybrid"}), ALONG, Brush.RAISE))
+    np.testing.assert_allclose(formed, 15.0, rtol=0, atol=1.0)
 
 
 def test_noisy_sensors_do_not_lose_the_ridge() -> None:

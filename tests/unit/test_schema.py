@@ -159,8 +159,8 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown preset": ({"preset": "quick"}, "preset must be one of paper, fast, viscous (got 'quick')."),
     "unknown method": (
         {"control": {"method": "hand"}},
-        "control.method must be one of virtual_master, cell_states, hybrid, elastic, plastic, viscous, "
-        "push_pull, force_display, shape_display (got 'hand').",
+        "control.method must be one of virtual_master, cell_states, elastic, plastic, viscous, "
+        "push_pull, force_display, shape_display, hybrid (got 'hand').",
     ),
     "blister wider than the bed": (
         {"blister": {"radius": 0.038, "edge_radius": 0.041}},

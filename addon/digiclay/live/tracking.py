@@ -1,6 +1,6 @@
 """Tracking of a fingertip by a device's blister: what a press stroke that raises has to keep to. No Blender.
 
-Method I and Method II hold the force under the finger: once it has been pressed in, pins that feel it rise
+Methods I, II and III hold the force under the finger: once it has been pressed in, pins that feel it rise
 with it. So clay is raised by a light press and a rise that the pins can follow, and it is leveled by a
 finger that goes along at one height.
 """
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.control.blister import Blister
 from ..core.control.cell_states import CellStates
+from ..core.control.hybrid_parameters import Hybrid
 from ..core.control.virtual_master import VirtualMaster
 from ..core.engine.system import System
 from ..core.model.fingertip import Fingertip
@@ -78,19 +79,20 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
         Of the scene.
     """
     control, touch, blister = scene.control, system.cell.touch, scene.blister
-    if not isinstance(control, VirtualMaster | CellStates) or touch is None or blister is None:
+    if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
         return None
     asked = control.force_setpoint
-    # Method II holds a force on every pin, so that they take on the finger's form; Method I holds their sum.
+    # Method II holds a force on every pin, so that they take on the finger's form; the others hold their sum.
     if isinstance(control, CellStates):
         sink, trigger = _find_sink(touch, np.zeros(1), 1.0, asked), control.spring_trigger
     else:
         gap, share = _sample_underside(find_ellipsoid(scene), system.grid.layout)
         sink, trigger = _find_sink(touch, gap, share, asked), asked
-    # Before a blister starts the pins give way like springs.
-    press = sink + trigger / control.spring_stiffness + MARGIN
+    # Before a blister starts the pins give way like springs; Method III follows from the first touch on.
+    spring = 0.0 if isinstance(control, Hybrid) else trigger / control.spring_stiffness
+    press = sink + spring + MARGIN
     # A valve that feels no force opens by gain times set point; the flow goes with the square of that.
-    opening = min(1.0, control.force_gain * asked)
+    opening = 1.0 if isinstance(control, Hybrid) else min(1.0, control.force_gain * asked)
     speed = float(system.fastest)
     lift, highest = SHARE * speed * opening**2, system.cell.actuator.stroke
     return Tracking(sink, press, speed, lift, _find_slope(blister), blister.radius, highest)

@@ -46,16 +46,17 @@ class Method:
     by_set: bool = False
 
 
+#: A .blend keeps a method's place in this table: new ones are added at its end.
 METHODS: dict[str, Method] = {
     "virtual_master": Method("control.virtual_master", "VirtualMaster", {}),
     "cell_states": Method(
         "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
     ),
-    "hybrid": Method("control.hybrid", "Hybrid", {}),
     "elastic": Method("control.elastic", "Elastic", recovers=True),
     "plastic": Method("control.plastic", "Plastic"),
     "viscous": Method("control.viscous", "Viscous", recovers=True, by_set=True),
     "push_pull": Method("control.push_pull", "PushPull", by_set=True),
     "force_display": Method("control.force_display", "ForceDisplay", recovers=True),
     "shape_display": Method("control.shape_display", "ShapeDisplay"),
+    "hybrid": Method("control.hybrid", "Hybrid", {}),
 }

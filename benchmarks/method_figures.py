@@ -1,0 +1,203 @@
+"""``python -m benchmarks methods``: force deviation of Methods I and III over paths and drags."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from digiclay.commands.tables import table
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session.run_scene import run
+from digiclay.core.studies.speed_limits import Drag
+from digiclay.plots.figure import empty
+
+from .method_trials import (
+    DRAGS,
+    Outcome,
+    draw_drags,
+    follow_drag,
+    follow_path,
+    list_models,
+    list_paths,
+    run_mismatched,
+    with_path,
+)
+from .plots import STYLE, write
+from .report import add_kind, kept, made_with, progress
+
+__all__ = ["add"]
+
+SESSION = "ridge_mound_valley"
+#: Methods with a set point of the total force, and their colors and marks: Okabe and Ito's.
+SHOWN = {"virtual_master": ("Method I", "#0072B2", "o"), "hybrid": ("Method III", "#D55E00", "D")}
+#: Random drags with --quick and without.
+QUICK, FULL = 2, 20
+#: Sessions that are timed, by turns.
+TURNS = 5
+#: Drags of Method III alone: name, way, orifice, m, and speed, m/s.
+FAST = (
+    ("ridge, 44 mm/s", Drag(), 0.5e-3, 44e-3),
+    ("ridge, 50 mm/s", Drag(), 0.5e-3, 50e-3),
+    ("surface, 50 mm/s", Drag(height=-1.5e-3), 0.5e-3, 50e-3),
+    ("valley, 50 mm/s", Drag(height=-10e-3), 0.5e-3, 50e-3),
+    ("ridge, orifice 0.8 mm, 80 mm/s", Drag(), 0.8e-3, 80e-3),
+)
+#: Speed of the ridge drag with parts left out, m/s.
+PARTS_SPEED = 40e-3
+#: Parameters with which a part of Method III is left out.
+PARTS: dict[str, dict[str, str]] = {
+    "all": {},
+    "without skirt": {"skirt_speed": "0"},
+    "without trim": {"trim_time": "1e6"},
+    "without level margin": {"level_margin": "0"},
+    "without turn and size": {"turn": "0", "size_drift": "0"},
+}
+
+#: No parameter that differs.
+NOTHING: Mapping[str, str] = {}
+
+Row = tuple[str, str, Outcome]
+
+
+def add(kinds: Any) -> None:
+    """Add the benchmark."""
+    examples = "  python -m benchmarks methods\n  python -m benchmarks methods --quick --out results\n"
+    parser = add_kind(kinds, "methods", "force deviation of Methods I and III over paths and drags", examples)
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Run every trial, and print the tables."""
+    count = QUICK if arguments.quick else FULL
+    paths = {SESSION: None, **list_paths()}
+    total = len(SHOWN) * (len(paths) + len(DRAGS) + count) + len(FAST) + 10 + len(PARTS)
+    with progress(arguments, "trials", total) as bar:
+        rows = list(_run_trials(count, bar))
+        fast = [
+            (name, "hybrid", _run(bar, name, follow_drag, _scene("hybrid", orifice=bore), speed, way))
+            for name, way, bore, speed in FAST
+        ]
+        wrong = list(_run_models(bar))
+        parts = [
+            (name, "hybrid", _run(bar, name, follow_drag, _scene("hybrid", known), PARTS_SPEED))
+            for name, known in PARTS.items()
+        ]
+    cost = _compare_cost(2 if arguments.quick else TURNS)
+    text = "\n".join(_text(rows, fast, wrong, parts, cost))
+    print(text)
+    head = ("trial", "method", "rfd_N", "losses", "lag_m", "largest_force_N", "unevenness_m")
+    every = [*rows, *fast, *wrong, *parts]
+    figures = [[name, method, o.rfd, o.losses, o.lag, o.largest, o.unevenness] for name, method, o in every]
+    kept(arguments.out, "methods", text, head, figures)
+    if arguments.out is not None:
+        _draw(rows, arguments.out / "methods.png")
+    return 0
+
+
+def _scene(method: str, control: Mapping[str, str] = NOTHING, orifice: float = 0.5e-3) -> Scene:
+    """Return the paper's session with a method."""
+    settings = [Setting("control.method", method), Setting("valve.orifice_diameter", str(orifice))]
+    settings += [Setting(f"control.{name}", value) for name, value in control.items()]
+    return load(find(SESSION), settings)
+
+
+def _run(bar: Callable[[str], None], name: str, trial: Callable[..., Outcome], *arguments: Any) -> Outcome:
+    """Return the result of a trial, and step the bar."""
+    found = trial(*arguments)
+    bar(name)
+    return found
+
+
+def _run_trials(count: int, bar: Callable[[str], None]) -> Iterator[Row]:
+    """Run paths, drags and random drags with both methods."""
+    random = draw_drags(count)
+    for method in SHOWN:
+        scene = _scene(method)
+        yield SESSION, method, _run(bar, SESSION, follow_path, scene)
+        for name, (interpolation, poses) in list_paths().items():
+            yield name, method, _run(bar, name, follow_path, with_path(scene, poses, interpolation))
+        for speed in DRAGS:
+            name = f"ridge, {1e3 * speed:g} mm/s"
+            yield name, method, _run(bar, name, follow_drag, scene, speed)
+        for number, (interpolation, poses) in enumerate(random, 1):
+            name = f"random {number}"
+            yield name, method, _run(bar, name, follow_path, with_path(scene, poses, interpolation))
+
+
+def _run_models(bar: Callable[[str], None]) -> Iterator[Row]:
+    """Run the session with controllers made for other devices, with noise and with delay."""
+    true = _scene("hybrid")
+    for name, model in list_models(true).items():
+        yield name, "hybrid", _run(bar, name, run_mismatched, true, model)
+    for name, key, value in (("noise 2 mN", "force_noise", "2 mN"), ("delay 1 period", "delay", "1")):
+        scene = load(find(SESSION), [Setting("control.method", "hybrid"), Setting(f"sensors.{key}", value)])
+        yield name, "hybrid", _run(bar, name, follow_path, scene)
+
+
+def _compare_cost(turns: int) -> dict[str, float]:
+    """Return the processor time of a control period by method, s: medians of sessions run by turns."""
+    spent: dict[str, list[float]] = {method: [] for method in SHOWN}
+    for _ in range(turns):
+        for method, times in spent.items():
+            scene = replace(_scene(method), recorder=None)
+            start = time.process_time()
+            run(scene)
+            times.append((time.process_time() - start) / scene.periods)
+    return {method: statistics.median(times) for method, times in spent.items()}
+
+
+def _text(
+    rows: list[Row], fast: list[Row], wrong: list[Row], parts: list[Row], cost: dict[str, float]
+) -> Iterator[str]:
+    """Give the lines of the report."""
+    yield made_with()
+    names = list(dict.fromkeys(name for name, _, _ in rows))
+    by = {(name, method): found for name, method, found in rows}
+    yield "\nRFD, N, of a whole session, or of a drag where a speed is given. Lag: mean; largest of a drag.\n"
+    lines = []
+    for name in names:
+        one, three = by[name, "virtual_master"], by[name, "hybrid"]
+        lines.append([name, *_numbers(one), *_numbers(three), f"{three.rfd / one.rfd:.2f}"])
+    columns = ("RFD", "lost", "lag mm", "largest N")
+    yield from table(("", *(f"I {c}" for c in columns), *(f"III {c}" for c in columns), "III / I"), lines)
+    for title, some in (
+        ("Method III at speeds that Method I does not follow", fast),
+        ("Method III made for another device, or with sensors", wrong),
+        ("Method III with a part left out: ridge drag at 40 mm/s", parts),
+    ):
+        yield f"\n{title}\n"
+        yield from table(("", *columns), [[name, *_numbers(found)] for name, _, found in some])
+    ratio = cost["hybrid"] / cost["virtual_master"]
+    listed = ", ".join(f"{SHOWN[method][0]} {1e6 * spent:.0f} µs" for method, spent in cost.items())
+    yield f"\nProcessor time a control period, medians by turns: {listed}; ratio {ratio:.2f}"
+
+
+def _numbers(found: Outcome) -> list[str]:
+    """Return the cells of a table."""
+    lag = "" if math.isnan(found.lag) else f"{1e3 * found.lag:.2f}"
+    return [f"{found.rfd:.4f}", f"{found.losses:d}", lag, f"{found.largest:.2f}"]
+
+
+def _draw(rows: list[Row], out: Path) -> None:
+    """Draw the RFD of all trials, one line a trial."""
+    names = list(dict.fromkeys(name for name, _, _ in rows))[::-1]
+    with empty(7.2, 0.8 + 0.22 * len(names), STYLE, layout="constrained") as figure:
+        panel = figure.subplots()
+        for method, (label, color, mark) in SHOWN.items():
+            found = {name: outcome.rfd for name, own, outcome in rows if own == method}
+            panel.plot(
+                [1e3 * found[name] for name in names], range(len(names)), mark, color=color, label=label
+            )
+        panel.set_yticks(range(len(names)), names)
+        panel.set_xscale("log")
+        panel.set_xlabel("reference force deviation, mN")
+        panel.grid(axis="x", which="both", alpha=0.3)
+        panel.legend(loc="lower right")
+        write(figure, out)
