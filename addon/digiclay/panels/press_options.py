@@ -33,7 +33,14 @@ class Popover:
             self.draw_settings(layout.column(), settings)
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw the tool's settings that it holds."""
+        """Draw the tool's settings that it holds.
+
+        Parameters
+        ----------
+        column : bpy.types.UILayout
+        settings : bpy.types.OperatorProperties
+            Settings of the Press tool.
+        """
         raise NotImplementedError
 
 
@@ -44,7 +51,14 @@ class StrokeOptions(Popover, bpy.types.Panel):
     bl_idname = "DIGICLAY_PT_press_stroke"
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw them."""
+        """Draw them.
+
+        Parameters
+        ----------
+        column : bpy.types.UILayout
+        settings : bpy.types.OperatorProperties
+            Settings of the Press tool.
+        """
         draw_presets(column)  # a narrow header has them here alone
         column.prop(settings, "path")
         row = column.column()
@@ -60,7 +74,14 @@ class PenOptions(Popover, bpy.types.Panel):
     bl_idname = "DIGICLAY_PT_press_pen"
 
     def draw_settings(self, column: Any, settings: Any) -> None:
-        """Draw them."""
+        """Draw them.
+
+        Parameters
+        ----------
+        column : bpy.types.UILayout
+        settings : bpy.types.OperatorProperties
+            Settings of the Press tool.
+        """
         column.prop(settings, "use_pressure")
         row = column.column()
         row.enabled = settings.use_pressure
