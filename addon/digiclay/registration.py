@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import command_line, operators, panels, preferences, translations
+from . import command_line, manual_map, operators, panels, preferences, translations
 from .device import detail, display, unit_watch
 from .exchange import image_reader
 from .live import handlers
@@ -25,6 +25,7 @@ MODULES: tuple[ModuleType, ...] = (
     tool,
     translations,  # of all that is registered before
     command_line,
+    manual_map,
     unit_watch,
     detail,
     handlers,  # the last to come and the first to go: it ends what runs
