@@ -28,6 +28,8 @@ __all__ = ["Cluster", "open_cluster"]
 PATIENCE, PAUSE = 10.0, 0.1
 #: Seconds between two looks at how many workers there are, and without any before that is told.
 LOOK, ALONE = 1.0, 10.0
+#: Packages whose loggers are silenced.
+NOISY = ("distributed", "tornado", "asyncio")
 
 
 class Cluster(Executor):
@@ -216,17 +218,17 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
     importlib.import_module("distributed")
     if stop():
         raise KeyboardInterrupt
-    with _be_quiet():
-        client = _connect(address)
-        try:
-            with Cluster(client, address) as cluster:
-                cluster.wait_for_workers(stop, draw)
-                if not stop():
-                    cluster.refuse_other_versions()
-                yield cluster
-        finally:
-            with suppress(Exception):
-                client.close(timeout=PATIENCE if client.status == "running" else PAUSE)
+    _silence_log()
+    client = _connect(address)
+    try:
+        with Cluster(client, address) as cluster:
+            cluster.wait_for_workers(stop, draw)
+            if not stop():
+                cluster.refuse_other_versions()
+            yield cluster
+    finally:
+        with suppress(Exception):
+            client.close(timeout=PATIENCE if client.status == "running" else PAUSE)
 
 
 def _connect(address: str) -> Any:
@@ -256,12 +258,11 @@ async def _try_address(address: str) -> None:
     await comm.close()
 
 
-@contextmanager
-def _be_quiet() -> Iterator[None]:
-    """Keep Dask's log off the terminal: what matters is told in lines of this program."""
-    former = logging.root.manager.disable
-    logging.disable()
-    try:
-        yield
-    finally:
-        logging.disable(former)
+def _silence_log() -> None:
+    """Keep Dask's log off the terminal: what matters is told in lines of this program.
+
+    For good: its threads still write when a client has been closed whose scheduler is gone.
+    """
+    for name, logger in logging.root.manager.loggerDict.items():
+        if name.partition(".")[0] in NOISY and isinstance(logger, logging.Logger):
+            logger.disabled = True
