@@ -129,6 +129,14 @@ def add_bed() -> Iterator[float | None]:
     yield None
 
 
+def add_paper_bed() -> Iterator[float | None]:
+    """Add the bed of the paper, 25 x 25 pins, and look at all of it."""
+    call(bpy.ops.mesh.digital_clay_add, bed="paper")
+    yield None
+    key("HOME", middle())
+    yield None
+
+
 def beds() -> list[Any]:
     """Return the beds of the scene shown."""
     return [thing for thing in window().scene.objects if part("device.view").is_bed(thing)]

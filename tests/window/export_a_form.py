@@ -12,7 +12,7 @@ import numpy as np
 def script(blender: Any) -> Iterator[float | None]:
     """Form a ridge and a pit, and take them out of the bed in every way there is."""
     yield from blender.empty_scene()
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     bed = blender.beds()[0]
     form(blender, bed)
     with unfolded(blender.part("panels"), "Export", "DIGICLAY_PT_export"):

@@ -23,7 +23,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.empty_scene()
     yield from blender.open_sidebar()
     blender.shot("panels_start")
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     blender.shot("panels_all")
     for picture, (root, sections) in PICTURES.items():
         with unfolded(blender.part("panels"), picture, {root}, sections.split()) as tab:

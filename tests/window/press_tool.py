@@ -73,7 +73,7 @@ def note(blender: Any, name: str) -> None:
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a user does; every yield lets Blender work off the events."""
     yield from blender.empty_scene()
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
     entry = bpy.context.preferences.addons.new()
     entry.module = blender.EXTENSION
@@ -138,7 +138,7 @@ def depths(blender: Any) -> Iterator[float | None]:
 
 def disabled(blender: Any) -> Iterator[float | None]:
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     workspace, at = bpy.context.window_manager.windows[0].workspace, blender.on_the_bed(-15, 5)
     held = [workspace.tools.from_space_view3d_mode("OBJECT").idname]
     blender.event("MOUSEMOVE", "NOTHING", at)

@@ -11,7 +11,7 @@ import bpy
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a user does; every yield lets Blender work off the events."""
     yield from blender.empty_scene()
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     yield from blender.open_sidebar()
     blender.key("HOME", blender.middle())
     yield None

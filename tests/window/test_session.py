@@ -24,7 +24,7 @@ def lowest(look: dict[str, Any]) -> float:
     return float(look["heights"][0])
 
 
-def test_the_add_menu_adds_one_bed_at_rest(seen: dict[str, Any]) -> None:
+def test_one_bed_is_added_at_rest(seen: dict[str, Any]) -> None:
     assert (seen["added"]["beds"], seen["added"]["modes"][0]) == (1, 625)
 
 
