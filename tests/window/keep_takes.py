@@ -16,7 +16,7 @@ import numpy as np
 def script(blender: Any) -> Iterator[float | None]:
     """Do what a user does with takes; the Takes panel is in sight from the first take on."""
     yield from blender.empty_scene()
-    yield from blender.add_bed()
+    yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
     entry = bpy.context.preferences.addons.new()
     entry.module = blender.EXTENSION
