@@ -22,6 +22,8 @@ from typing import Any
 import addon_utils
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 EXTENSION = "bl_ext.user_default.digiclay"
 OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
@@ -71,8 +73,6 @@ def evaluate() -> None:
 
 def pixel(place: Any) -> tuple[int, int]:
     """Return where a place in the world is seen, window pixels."""
-    from bpy_extras.view3d_utils import location_3d_to_region_2d
-
     area, region = view()
     at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
     return region.x + round(at.x), region.y + round(at.y)
@@ -80,8 +80,6 @@ def pixel(place: Any) -> tuple[int, int]:
 
 def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
     """Return where a place in the first bed's space, mm, is seen, window pixels; 40 mm: the pins at rest."""
-    from mathutils import Vector
-
     evaluate()
     scale = part("bridge").SCALE * 1e-3
     return pixel(beds()[0].matrix_world @ Vector((x * scale, y * scale, z * scale)))
@@ -132,7 +130,6 @@ def add_bed() -> Iterator[float | None]:
 def add_paper_bed() -> Iterator[float | None]:
     """Add the bed of the paper, 25 x 25 pins, and look at all of it."""
     call(bpy.ops.mesh.digital_clay_add, bed="paper")
-    yield None
     key("HOME", middle())
     yield None
 
