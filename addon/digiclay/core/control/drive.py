@@ -28,6 +28,7 @@ __all__ = [
     "DriveParameters",
     "TouchParameters",
     "check_damping",
+    "find_free_speeds",
     "make_drive",
     "raise_felt_force",
 ]
@@ -166,6 +167,22 @@ def _look_up(speed: Floats, speeds: Floats) -> Floats:
     return np.stack([np.interp(own, table, OPENINGS) for own, table in runs], axis=-1)
 
 
+def find_free_speeds(cell: Cell, pressure: float) -> Floats:
+    """Return the speeds of a pin without load at `OPENINGS`, growing, (129,), m/s.
+
+    A reservoir that cannot move a pin gets the valve wide open.
+
+    Parameters
+    ----------
+    cell : Cell
+    pressure : float
+        Of the reservoir, towards it, Pa.
+    """
+    free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
+    rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
+    return rising
+
+
 def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
     """Make the drive for a device.
 
@@ -184,20 +201,13 @@ def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
     if parameters.settling_time < 2.0 * period:
         rule = f"must be at least two control periods, {2.0 * period:g} s"
         raise ParameterError("control", "settling_time", rule, f"{parameters.settling_time:g} s")
-    area, supply = cell.actuator.area, cell.supply
-
-    def speeds(pressure: float) -> Floats:
-        """Return the speeds towards a reservoir; one that cannot move a pin gets the valve wide open."""
-        free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / area
-        rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
-        return rising
-
+    supply = cell.supply
     return Drive(
         parameters.settling_time,
         parameters.dead_band,
-        speeds(supply.high),
-        speeds(-supply.low),
-        supply.high * area,
+        find_free_speeds(cell, supply.high),
+        find_free_speeds(cell, -supply.low),
+        supply.high * cell.actuator.area,
     )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..model.delay import Queue
 from ..model.physics import Cell
-from .drive import OPENINGS
+from .drive import OPENINGS, find_free_speeds
 
 __all__ = ["FlowServo", "make_flow_servo"]
 
@@ -156,17 +156,11 @@ def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: floa
     dead_band : float
         m.
     """
-    area, supply, flow = cell.actuator.area, cell.supply, cell.flow
-
-    def speeds(pressure: float) -> Floats:
-        """Return the speeds at `OPENINGS` under a pressure, growing, m/s."""
-        free = flow.flow(OPENINGS, np.full(OPENINGS.size, abs(pressure))) / area
-        return np.asarray(np.maximum(free, 0.0) + 1e-12 * OPENINGS)
-
-    up, down = speeds(supply.high), speeds(supply.low)
+    area, supply = cell.actuator.area, cell.supply
+    up, down = find_free_speeds(cell, supply.high), find_free_speeds(cell, -supply.low)
     ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))
     openings = np.concatenate((-OPENINGS[::-1], OPENINGS[1:]))
-    half = speeds(0.5 * supply.high)
+    half = find_free_speeds(cell, 0.5 * supply.high)
     delay = dead_time + _measure_lag(cell, period)
     whole = math.ceil(delay / period - 1e-9)
     left = tuple(min(delay - number * period, period) for number in range(whole))

@@ -68,9 +68,8 @@ class LeadProfile:
         """
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else math.inf
-        drop = distance - self.level
-        np.maximum(drop, 0.0, out=drop)
-        if speed < SLOWEST or free / speed >= around:
-            return drop * around if self.skirt else np.where(drop > 0.0, math.inf, 0.0)
-        steep = drop * around if self.skirt else np.where(drop > 0.0, math.inf, 0.0)
-        return np.where(ahead > 0.0, drop * (free / speed), steep)
+        forward = free / speed if speed >= SLOWEST else math.inf
+        slope = np.where(ahead > 0.0, min(forward, around), around)
+        beyond = distance - self.level
+        # On the level part nothing drops, not even where pins are not led and the slope is infinite.
+        return np.multiply(beyond, slope, out=np.zeros_like(beyond), where=beyond > 0.0)
