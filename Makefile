@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test lint mutants test-matrix test-window test-proof guide-pictures clean
+.PHONY: help demo extension test test-convergence lint mutants test-matrix test-window test-proof guide-pictures clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -25,15 +25,19 @@ extension: ## build the Blender extension and leave its zip in dist/
 	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
 	@.venv/bin/python tools/extension.py
 
-test: ## run all tests but those of the matrix, of the window and of other programs
+test: ## run all tests but those of convergence, of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/window --ignore=tests/proof || status=1; \
+	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/window || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
 	awk '/ s of processor time/ { sub(/.*; /, ""); total += $$1 } \
 	  END { printf "processor time of make test: %d s, to be kept below 600 s\n", total }' .reports/test.txt >.reports/time.txt; \
 	cat .reports/time.txt >>.reports/test.txt; rm .reports/time.txt; \
 	echo; cat .reports/test.txt; exit $$status
+
+test-convergence: ## run tests/convergence: errors of the integration against references, tolerances and estimates
+	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- -n auto --dist loadfile tests/convergence
 
 lint: ## check style, format, types and docstrings
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
