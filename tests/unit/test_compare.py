@@ -82,7 +82,7 @@ def test_a_setting_reaches_every_method(here: Path) -> None:
     [
         (["--methods", "cell_stats"], "did you mean cell_states"),
         (["--methods", ","], "must name at least one method"),
-        (["--method", "cell_states"], "compare takes --methods"),
+        (["--method", "cell_stats"], "Did you mean cell_states"),
         (["--out", "my.toml"], "my.toml is a file"),
         (["--set", "control.spring_trigger=1"], "control.spring_trigger must be a known key"),
     ],

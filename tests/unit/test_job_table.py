@@ -86,7 +86,7 @@ def test_values_that_do_not_go_together_make_one_job_with_an_error(tmp_path: Pat
         ('scenes = ["tapp"]', "tapp is neither a file nor a sample .* Did you mean tap?"),
         ('scenes = ["tap"]\nmethod = ["cell_states"]', "method must be a known key .* Did you mean methods?"),
         ('scenes = ["tap"]\nmethods = []', "methods must be a list"),
-        ('scenes = ["tap"]\nmethods = ["magic"]', "methods must be some of virtual_master"),
+        ('scenes = ["tap"]\nmethods = ["magic"]', "methods must be one of virtual_master"),
         ('scenes = ["tap", "tap"]', r"scenes must not name one thing twice \(got tap twice\)"),
         ('scenes = ["tap"]\nsettings = 3', "settings must be a section of labels"),
         ('scenes = ["tap"]\nsettings.a = 3', r"settings\.a must be a table"),

@@ -160,7 +160,8 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown method": (
         {"control": {"method": "hand"}},
         "control.method must be one of virtual_master, cell_states, elastic, plastic, viscous, "
-        "push_pull, force_display, shape_display, hybrid (got 'hand').",
+        "push_pull, force_display, shape_display, hybrid (got 'hand'). A method of your own must be "
+        "loaded: by --method path/to/mine.py:Mine, in Blender by the preferences.",
     ),
     "blister wider than the bed": (
         {"blister": {"radius": 0.038, "edge_radius": 0.041}},

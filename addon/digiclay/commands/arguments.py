@@ -9,15 +9,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..core.base.errors import OutputError, ParameterError
+from ..core.base.errors import MethodError, OutputError, ParameterError
 from ..core.base.quantity import parse
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
+from ..plugins.method_loader import load_method
 
 __all__ = [
-    "Help", "add_command", "add_run", "add_scene", "length", "millimeters", "scene_of", "seconds",
-    "settings_of", "size", "told_as_options",
+    "METHOD", "Help", "add_command", "add_run", "add_scene", "length", "load_by_option", "millimeters",
+    "scene_of", "seconds", "settings_of", "size", "told_as_options",
 ]  # fmt: skip
+
+#: The key of the control method in scene files.
+METHOD = "control.method"
 
 
 class Help(argparse.RawDescriptionHelpFormatter):
@@ -42,7 +46,10 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
         parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{said}; default {default}")
     else:
         parser.add_argument("scene", metavar="SCENE", help=said)
-    parser.add_argument("--method", metavar="M", help="control method: the same as --set control.method=M")
+    parser.add_argument(
+        "--method", metavar="M",
+        help="control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
+    )  # fmt: skip
     parser.add_argument("--stepper", metavar="S", help="stepper: the same as --set simulation.stepper=S")
     parser.add_argument(
         "--tolerance",
@@ -69,14 +76,40 @@ def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
 def settings_of(arguments: argparse.Namespace) -> list[Setting]:
     """Return what the options of `add_scene` change of a scene file."""
     settings = list(arguments.settings)
-    for option, key in (("method", "control.method"), ("stepper", "simulation.stepper")):
+    for option, key in (("method", METHOD), ("stepper", "simulation.stepper")):
         if getattr(arguments, option) is not None:
             settings.append(Setting(key, getattr(arguments, option), f"--{option}"))
     if arguments.tolerance is not None:
         settings.append(Setting("simulation.tolerance", arguments.tolerance, "--tolerance"))
         if arguments.stepper is None:
             settings.append(Setting("simulation.stepper", "adaptive", "--tolerance"))
-    return settings
+    return [_with_method(one) if one.key == METHOD else one for one in settings]
+
+
+def _with_method(setting: Setting) -> Setting:
+    """Return a setting of the method by its name, with a method of one's own loaded that it names."""
+    return setting._replace(value=load_by_option(setting.value.strip("\"'"), setting.option))
+
+
+def load_by_option(word: str, option: str) -> str:
+    """Return the name of the method that a word of the command line names; load one of the user's own.
+
+    Parameters
+    ----------
+    word : str
+        Name of a method, or ``path/to/mine.py:Mine``.
+    option : str
+        That has the word, for messages.
+
+    Raises
+    ------
+    MethodError
+        In one line.
+    """
+    try:
+        return load_method(word)
+    except MethodError as error:
+        raise MethodError(f"{option}: {error}") from None
 
 
 def add_command(commands: Any, name: str, help: str, epilog: str, said: str = "") -> argparse.ArgumentParser:

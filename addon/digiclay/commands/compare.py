@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.base.errors import ParameterError, SceneError
+from ..core.base.errors import ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
-from ..core.control.methods import METHODS
+from ..core.control.methods import list_methods
 from ..core.metrics.finger_path import sum_cells
 from ..core.model.set_point import find_set_point
 from ..core.scene.recorder import Recorder
@@ -23,7 +23,8 @@ from ..core.scene.schema import Scene
 from ..core.session.run_result import RUN_METRICS, Result
 from ..core.session.run_scene import run
 from ..core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
-from .arguments import add_command, add_scene, settings_of
+from ..plugins.method_source import find_installed, is_file_word
+from .arguments import METHOD, add_command, add_scene, load_by_option, settings_of
 from .progress import Bar
 from .refusals import refuse_without
 from .stop import allow_interrupt
@@ -35,6 +36,7 @@ EXAMPLES = """\
 examples:
   digiclay compare ridge_mound_valley
   digiclay compare slow_press --methods virtual_master,cell_states --speed --out both
+  digiclay compare slow_press --method mine.py:Mine     a method of your own beside these two
 
 The folder holds compare.png and metrics.json; docs/metrics.md defines the metrics.
 """
@@ -72,25 +74,24 @@ def _methods(text: str) -> tuple[str, ...]:
     if not names:
         raise argparse.ArgumentTypeError(f"must name at least one method (got {text!r})")
     for name in names:
-        if name not in METHODS:
-            close = find_nearest_name(name, list(METHODS))
+        known = list_methods()
+        if name not in known and not is_file_word(name) and find_installed(name) is None:
+            close = find_nearest_name(name, list(known))
             asked = f"; did you mean {close}" if close else ""
-            raise argparse.ArgumentTypeError(f"must be among {', '.join(METHODS)} (got {name!r}{asked})")
+            raise argparse.ArgumentTypeError(f"must be among {', '.join(known)} (got {name!r}{asked})")
     return names
 
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run every method, print the table, write the folder."""
-    if arguments.method is not None:
-        raise SceneError("--method names one method: compare takes --methods.")
-    path = find(arguments.scene)
+    path, methods = find(arguments.scene), _list_methods(arguments)
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
     check_folder(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
     from ..plots.comparison import comparison
     from ..plots.figure import save
 
-    scenes = {method: _scene(arguments, path, method) for method in arguments.methods}
+    scenes = {method: _scene(arguments, path, method) for method in methods}
     found: dict[str, Metrics] = {}
     forces: dict[str, tuple[Any, Any, Any]] = {}
     beyond: dict[str, str] = {}
@@ -115,9 +116,16 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _list_methods(arguments: argparse.Namespace) -> list[str]:
+    """Return the names of the methods to compare; those of one's own are loaded."""
+    words = [(word, "--methods") for word in arguments.methods]
+    words += [(arguments.method, "--method")] if arguments.method is not None else []
+    return list(dict.fromkeys(load_by_option(word, option) for word, option in words))
+
+
 def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:
     """Return the scene with one method, and the settings of the command line."""
-    return load(path, [*settings_of(arguments), Setting("control.method", method, "--methods")])
+    return load(path, [*settings_of(arguments), Setting(METHOD, method, "--methods")])
 
 
 def _run(scene: Scene, method: str, *, quiet: bool) -> Result:

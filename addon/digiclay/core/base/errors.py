@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 __all__ = [
-    "BusyError", "DigiclayError", "DivergenceError", "OutputError", "ParameterError", "SceneError",
-    "StateError", "one_line",
+    "BusyError", "DigiclayError", "DivergenceError", "MethodError", "OutputError", "ParameterError",
+    "SceneError", "StateError", "one_line",
 ]  # fmt: skip
 
 #: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
@@ -49,6 +49,10 @@ class ParameterError(DigiclayError, ValueError):
 
 class SceneError(DigiclayError):
     """Invalid scene file or ``--set`` value."""
+
+
+class MethodError(DigiclayError):
+    """Control method of one's own that breaks a rule; its text names file, class and rule."""
 
 
 class OutputError(DigiclayError):

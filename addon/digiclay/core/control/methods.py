@@ -1,14 +1,24 @@
-"""Control methods of a scene: one row a method, one module each."""
+"""Control methods of a scene: one row a method, one module each; and those of one's own, added by name.
+
+What a scene, a panel or a comparison has to know of a method it finds here, by `find_method`.
+"""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from ..base.quantity import Parameters
+from ..base.errors import ParameterError
+from ..base.part_table import show_value
+from ..base.quantity import Parameters, find_nearest_name
 from ..model.set_point import SetPoint
 
-__all__ = ["METHODS", "ControlParameters", "Method"]
+__all__ = [
+    "METHODS", "ControlParameters", "Method", "add_method", "find_method", "list_added", "list_methods",
+    "remove_method",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,34 @@ class Method:
     recovers: bool = False
     by_set: bool = False
 
+    def import_parameters(self) -> type[ControlParameters]:
+        """Import the class of its parameters, now that a scene needs it."""
+        kind: type[ControlParameters] = getattr(self._import(), self.parameters)
+        return kind
+
+    def build(self, parameters: Any, device: Any) -> Any:
+        """Return its controller for a device.
+
+        Parameters
+        ----------
+        parameters : ControlParameters
+        device : DeviceInfo
+
+        Raises
+        ------
+        ParameterError
+            When the parameters do not go together with the device.
+        """
+        return self._import().build(parameters, device)
+
+    def describe(self) -> str:
+        """Return what it does, in the first line of its module."""
+        return (self._import().__doc__ or "").partition("\n")[0].removesuffix(".")
+
+    def _import(self) -> Any:
+        """Import its module."""
+        return importlib.import_module(f"..{self.module}", __package__)
+
 
 #: A .blend keeps a method's place in this table: new ones are added at its end.
 METHODS: dict[str, Method] = {
@@ -60,3 +98,68 @@ METHODS: dict[str, Method] = {
     "shape_display": Method("control.shape_display", "ShapeDisplay"),
     "hybrid": Method("control.hybrid", "Hybrid", {}),
 }
+
+#: What has been added to this process, see `add_method`; a .blend keeps the names of these.
+_ADDED: dict[str, Method] = {}
+#: Where an unknown method may come from.
+HINT = "A method of your own must be loaded: by --method path/to/mine.py:Mine, in Blender by the preferences."
+
+
+def add_method(name: str, method: Method) -> None:
+    """Make a method known to this process, or exchange it for another one.
+
+    Parameters
+    ----------
+    name : str
+        As scene files have it.
+    method : Method
+
+    Raises
+    ------
+    ParameterError
+        When a built-in method has this name.
+    """
+    if name in METHODS:
+        raise ParameterError("control", "method", "must not have the name of a built-in method", repr(name))
+    _ADDED[name] = method
+
+
+def remove_method(name: str) -> None:
+    """Make an added method unknown again."""
+    _ADDED.pop(name, None)
+
+
+def list_added() -> dict[str, Method]:
+    """Return the methods of one's own that are known to this process, by name."""
+    return dict(_ADDED)
+
+
+def list_methods() -> dict[str, Method]:
+    """Return all methods, the built-in ones first, by name."""
+    return METHODS | _ADDED
+
+
+def find_method(name: Any, field: str = "control.method") -> Method:
+    """Return a method by its name.
+
+    Parameters
+    ----------
+    name : object
+        As a scene file has it.
+    field : str, optional
+        What messages call it.
+
+    Raises
+    ------
+    ParameterError
+        When there is none, with the remedy.
+    """
+    found = METHODS.get(name) or _ADDED.get(name) if isinstance(name, str) else None
+    if found is not None:
+        return found
+    known = list_methods()
+    owner, _, last = field.rpartition(".")
+    close = find_nearest_name(name, list(known), alike=0.7) if isinstance(name, str) else ""
+    hint = f"Did you mean {close}?" if close else HINT
+    rule = f"must be one of {', '.join(known)}"
+    raise ParameterError(owner or last, last if owner else "", rule, show_value(name), hint)

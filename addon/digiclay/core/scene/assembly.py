@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.methods import METHODS
+from ..control.methods import find_method
 from ..engine.active_set import Selection
 from ..engine.state import Rows
 from ..engine.system import System, make_segments
@@ -120,7 +120,7 @@ def _depends_on_set(scene: Scene) -> bool:
     """Return whether what becomes of a cell depends on which others are active."""
     if scene.sensors and scene.sensors.noisy:
         return True
-    return bool(scene.control) and METHODS[scene.method].by_set
+    return bool(scene.control) and find_method(scene.method).by_set
 
 
 def _make_stepper(scene: Scene) -> Stepper:
@@ -205,9 +205,10 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
         device = replace(device, heights=fit_shape(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
-        controller = import_part(METHODS[scene.method].module, "build")(scene.control, device)
+        controller = find_method(scene.method).build(scene.control, device)
     if scene.shape and not (controller and controller.name == "shape_display"):
         from ..control.handover import make_handover
 
-        controller = make_handover(scene.shape, device, controller, recovers=METHODS[scene.method].recovers)
+        recovers = find_method(scene.method).recovers
+        controller = make_handover(scene.shape, device, controller, recovers=recovers)
     return controller

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..control.methods import METHODS, ControlParameters
+from ..control.methods import ControlParameters, find_method
 from ..model.fingertip import require_one
 from ..model.laws import LAWS, law_parameters
 from ..model.set_point import SetPoint
@@ -48,8 +48,8 @@ __all__ = [
     "import_part",
 ]
 
-#: Parts a scene is made of: module and class. The control's depend on its method, see `METHODS`, and those of
-#: valve and contact on their law, see `LAWS`.
+#: Parts a scene is made of: module and class. The control's depend on its method, see
+#: `find_method`, and those of valve and contact on their law, see `LAWS`.
 PARTS: dict[str, tuple[str, str]] = {
     "layout": ("model.layout", "Layout"),
     "actuator": ("model.actuator", "Actuator"),
@@ -120,10 +120,9 @@ def import_parameters(section: str, method: str) -> type[Parameters]:
     """
     if section in LAWS:
         return law_parameters(section)
-    module, name = (
-        PARTS[section] if section != "control" else (METHODS[method].module, METHODS[method].parameters)
-    )
-    kind: type[Parameters] = import_part(module, name)
+    if section == "control":
+        return find_method(method).import_parameters()
+    kind: type[Parameters] = import_part(*PARTS[section])
     return kind
 
 

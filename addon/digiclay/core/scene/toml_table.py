@@ -10,7 +10,7 @@ from ..base.errors import ParameterError
 from ..base.part_table import ReadParts, read_part, refuse_unknown, shorten, show_value
 from ..base.quantity import Parameters, list_quantities
 from ..base.toml_text import format_value
-from ..control.methods import METHODS
+from ..control.methods import find_method
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
@@ -82,7 +82,7 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
             continue
         usual = defaults.get(section, {})
         if section == "blister":
-            usual |= METHODS[method].blister or {}
+            usual |= find_method(method).blister or {}
         parts[section] = known.read(section, import_parameters(section, method), usual, own)
     if parts["layout"].arrangement == "hexagonal":
         defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
@@ -166,18 +166,18 @@ def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] |
 def _take_method(control: dict[str, Any] | None) -> str:
     """Take the method out of the control's section."""
     method = (control or {}).pop("method", "virtual_master")
-    if not isinstance(method, str) or method not in METHODS:
-        raise ParameterError("control", "method", f"must be one of {', '.join(METHODS)}", show_value(method))
-    return method
+    find_method(method)
+    return str(method)
 
 
 def _forms_blister(method: str, own: dict[str, Any]) -> bool:
     """Return whether a method forms a blister; refuse a section [blister] where it does not."""
-    if METHODS[method].blister is None and own:
+    formed = find_method(method).blister is not None
+    if not formed and own:
         raise ParameterError(
             "blister", "", f"must be left out: the method {method} forms no blister", show_value(own)
         )
-    return METHODS[method].blister is not None
+    return formed
 
 
 def _read_path(owner: str, table: Any, rest_height: float) -> Path:

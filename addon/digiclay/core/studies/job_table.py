@@ -19,7 +19,7 @@ from ..base.part_table import refuse_unknown, show_value
 from ..base.safe_names import find_name, make_unique_names
 from ..base.sample_file import find_file, list_files
 from ..base.toml_text import format_value
-from ..control.methods import METHODS
+from ..control.methods import find_method
 from ..model.layout import make_grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
 from ..scene.schema import Scene
@@ -133,8 +133,7 @@ def _read_methods(table: Mapping[str, Any]) -> list[str]:
     if not isinstance(methods, list) or not methods:
         raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', show_value(methods))
     for method in methods:
-        if not isinstance(method, str) or method not in METHODS:
-            raise ParameterError("methods", "", f"must be some of {', '.join(METHODS)}", show_value(method))
+        find_method(method, "methods")
     return methods
 
 

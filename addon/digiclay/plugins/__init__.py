@@ -1,0 +1,1 @@
+"""Control methods of one's own: their code is found, loaded, checked and shipped."""

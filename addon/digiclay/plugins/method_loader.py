@@ -1,0 +1,227 @@
+"""Loading of control methods of one's own: code to a checked class, and that to the table of methods."""
+
+from __future__ import annotations
+
+import builtins
+import copyreg
+import dataclasses
+import importlib
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from ..core.base.errors import MethodError
+from ..core.control.guarded import Guarded, describe_failure, guard
+from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
+from .method_rules import check_class, list_classes
+from .method_source import MethodSource, read_source
+
+__all__ = [
+    "OwnRow", "add_class", "add_source", "load_method", "name_method", "restore_parameters", "run_code",
+]  # fmt: skip
+
+#: The package that this module is part of, in Blender another one than ``digiclay``.
+PACKAGE = __package__.rpartition(".")[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnRow(Method):
+    """Method of one's own in the table of methods.
+
+    Attributes
+    ----------
+    name : str
+        In scene files.
+    kind : type
+        Class of its parameters, which builds the controller.
+    source : MethodSource
+    """
+
+    name: str
+    kind: type[ControlParameters]
+    source: MethodSource
+
+    def import_parameters(self) -> type[ControlParameters]:
+        """Return the class of its parameters."""
+        return self.kind
+
+    def build(self, parameters: Any, device: Any) -> Guarded:
+        """Return its controller for a device, guarded; MethodError when that cannot be built."""
+        source = self.source
+        return guard(lambda: parameters.build(device), self.name, source.label, source.file, device.period)
+
+    def describe(self) -> str:
+        """Return what it does, in the first line of its class, where it has one of its own."""
+        line = (self.kind.__doc__ or "").strip().partition("\n")[0].removesuffix(".")
+        return "" if line.startswith(f"{self.kind.__name__}(") else line
+
+
+def load_method(word: str) -> str:
+    """Load the method that a word of the command line names, unless it is known; return its name.
+
+    Parameters
+    ----------
+    word : str
+        Name of a method, ``path/to/mine.py:Mine``, or the name of an installed method. A word that names
+        nothing is returned as it is: `methods.find_method` refuses it with the list of those there are.
+
+    Raises
+    ------
+    MethodError
+        In one line: file and rule.
+    """
+    if word in METHODS or word in list_added():
+        return word
+    source = read_source(word)
+    if source is None:
+        return word
+    name = word if source.module else name_method(source.attribute)
+    known = list_added().get(name)
+    if isinstance(known, OwnRow):
+        if known.source.digest == source.digest and known.source.attribute == source.attribute:
+            return name
+        other = known.source.file
+        raise MethodError(f"{source.label}: the method's name {name} must be its own (also that of {other}).")
+    add_source(name, source)
+    return name
+
+
+def name_method(attribute: str) -> str:
+    """Return the name of a method in scene files by that of its class: ``SoftPad`` is soft_pad."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", attribute).lower()
+
+
+def add_source(name: str, source: MethodSource) -> OwnRow:
+    """Load a method's code and put it into the table of methods, in place of one of the same name.
+
+    Parameters
+    ----------
+    name : str
+    source : MethodSource
+
+    Raises
+    ------
+    MethodError
+    """
+    if name in METHODS:
+        raise MethodError(f"{source.label}: the class must not have the name of the built-in method {name}.")
+    module = _import(source)
+    kind = getattr(module, source.attribute, None)
+    if kind is None:
+        there = ", ".join(f"{source.label.partition(':')[0]}:{one.__name__}" for one in list_classes(module))
+        rule = f"must have the class {source.attribute}"
+        raise MethodError(f"{source.label}: the file {rule} (it has {there or 'no control method'}).")
+    return add_class(name, source, kind)
+
+
+def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
+    """Check the class of a method, and put it into the table of methods.
+
+    Parameters
+    ----------
+    name : str
+    source : MethodSource
+    kind : type
+
+    Raises
+    ------
+    MethodError
+    """
+    check_class(source.label, kind)
+    blister = getattr(kind, "blister", None)
+    row = OwnRow(
+        module=source.module, parameters=kind.__name__, blister=None if blister is None else dict(blister),
+        recovers=bool(getattr(kind, "recovers", False)), by_set=True, name=name, kind=kind, source=source,
+    )  # fmt: skip
+
+    def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        values = {one.name: getattr(parameters, one.name) for one in dataclasses.fields(parameters)}
+        return restore_parameters, (name, source, values)
+
+    copyreg.pickle(kind, reduce)
+    add_method(name, row)
+    return row
+
+
+def restore_parameters(name: str, source: MethodSource, values: dict[str, Any]) -> ControlParameters:
+    """Return parameters that another process has pickled, with their class: its code comes along.
+
+    Parameters
+    ----------
+    name : str
+        Of the method.
+    source : MethodSource
+    values : dict
+        SI, by field.
+
+    Raises
+    ------
+    MethodError
+        When an installed package is missing here, or is of another version.
+    """
+    known = list_added().get(name)
+    if not isinstance(known, OwnRow) or known.source[1:] != source[1:]:
+        if source.module:
+            here = read_source(name)
+            if here is None or here.digest != source.digest:
+                got = f"of {here.package}, with other code" if here else "not installed"
+                rule = f"must be that of {source.package} here too"
+                raise MethodError(f"The method {name} {rule} (it is {got}).")
+        known = add_source(name, source)
+    return known.kind(**values)
+
+
+def _import(source: MethodSource) -> ModuleType:
+    """Run the code of a method, and return its module."""
+    if not source.module:
+        return run_code(source)
+    try:
+        return importlib.import_module(source.module)
+    except (Exception, SystemExit) as error:
+        why = describe_failure(error, source.file)
+        raise MethodError(f"{source.label}: {source.module} {why}.") from error
+
+
+def run_code(source: MethodSource) -> ModuleType:
+    """Run the code of a file as a module, without its folder: it may import what is installed.
+
+    In Blender the package has another name; for the code it is ``digiclay`` everywhere.
+
+    Parameters
+    ----------
+    source : MethodSource
+
+    Raises
+    ------
+    MethodError
+        When it cannot be run.
+    """
+    module = ModuleType(f"digiclay_own_{source.digest[:16]}")
+    module.__file__ = source.file
+    module.__dict__["__builtins__"] = {**vars(builtins), "__import__": _import_for_methods}
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(source.text, source.file, "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[module.__name__]
+        name = source.label.partition(":")[0]
+        raise MethodError(f"{name}: the code {describe_failure(error, source.file)}.") from error
+    return module
+
+
+def _import_for_methods(
+    name: str, namespace: Any = None, local: Any = None, wanted: Any = (), level: int = 0
+) -> Any:
+    """Import for the code of a method: ``digiclay`` is this package, whatever it is called here."""
+    top, _, rest = name.partition(".")
+    if level or top != "digiclay" or PACKAGE == "digiclay":
+        return builtins.__import__(name, namespace, local, wanted, level)
+    full = f"{PACKAGE}.{rest}" if rest else PACKAGE
+    module = importlib.import_module(full)
+    for one in wanted or ():
+        if one != "*" and not hasattr(module, one):
+            importlib.import_module(f"{full}.{one}")
+    return module if wanted else sys.modules[PACKAGE]

@@ -1,0 +1,59 @@
+"""Control methods of one's own as files, for the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from digiclay.core.control.methods import list_added, remove_method
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.schema import Scene
+
+__all__ = ["HEAD", "PAD", "forgotten", "small", "write_method"]
+
+HEAD = '''
+"""Method of a test."""
+from dataclasses import dataclass
+from typing import NamedTuple
+import numpy as np
+from digiclay.core.control.own_method import Cells, Mode, Orders, OwnMethod, quantity
+'''
+#: Pins under a force give way, step by step.
+PAD = f'''{HEAD}
+@dataclass(frozen=True)
+class SoftPad(OwnMethod):
+    """Pins under a force give way."""
+
+    yield_force: float = quantity(0.03, "force above which a pin gives way", unit="N", above=0.0, below=1.0)
+    step: float = quantity(50e-6, "way in a control period", unit="m", above=0.0)
+
+    def command(self, memory, cells, device):
+        down = cells.force > self.yield_force
+        return memory, Orders(height=np.where(down, cells.height - self.step, cells.target))
+'''
+
+
+def write_method(folder: Path, text: str = PAD, name: str = "pad.py") -> Path:
+    """Write the file of a method, and return it."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@contextmanager
+def forgotten() -> Iterator[None]:
+    """Make methods that the block adds unknown again at its end."""
+    before = list_added()
+    try:
+        yield
+    finally:
+        for name in list_added().keys() - before.keys():
+            remove_method(name)
+
+
+def small(method: str, *settings: str) -> Scene:
+    """Return a press on a small bed with a method."""
+    said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.2", *settings)
+    changes = [Setting(*one.split("=", 1)) for one in said]
+    return load(find("tap"), [Setting("control.method", method), *changes])

@@ -1,0 +1,140 @@
+"""Control methods of one's own: named on the command line, in scenes, in other processes."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.base.errors import MethodError, SceneError
+from digiclay.core.control.methods import METHODS, find_method, list_added, remove_method
+from digiclay.core.scene.toml_table import format_scene
+from digiclay.core.session.run_scene import run
+from digiclay.plugins import method_source
+from digiclay.plugins.method_loader import load_method, name_method
+
+from tests.own_methods import HEAD, PAD, forgotten, small, write_method
+from tests.timeouts import TIMEOUT
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Work in an empty folder; methods that a test loads are unknown after it."""
+    monkeypatch.chdir(tmp_path)
+    with forgotten():
+        yield tmp_path
+
+
+def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file() -> None:
+    write_method(Path())
+    name = load_method("pad.py:SoftPad")
+    assert (name, name in METHODS, name in list_added()) == ("soft_pad", False, True)
+    scene = small(name, "control.step=80 um")
+    text = format_scene(scene)
+    assert 'method = "soft_pad"' in text
+    assert "# m: way in a control period" in text
+    softer = run(small(name, "control.step=20 um")).history["height"].min()
+    assert run(scene).history["height"].min() < softer < 0.04
+
+
+def test_the_command_line_takes_it_wherever_it_takes_a_method(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_method(here)
+    size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.1"]
+    own = ["tap", "--method", "pad.py:SoftPad", "--quiet", *size]
+    assert main(["run", *own, "--out", "r", "--no-errors"]) == 0
+    assert json.loads((here / "r" / "metrics.json").read_text(encoding="utf-8"))["method"] == "soft_pad"
+    assert main(["describe", "tap", "--set", "control.method=pad.py:SoftPad"]) == 0
+    assert "soft_pad: " in capsys.readouterr().out
+    assert main(["compare", *own, "--out", "c"]) == 0
+    known = json.loads((here / "c" / "metrics.json").read_text(encoding="utf-8"))
+    assert list(known["methods"]) == ["virtual_master", "cell_states", "soft_pad"]
+
+
+def test_the_code_is_shipped_to_processes_that_have_no_file(here: Path) -> None:
+    path = write_method(here)
+    scene = small(load_method("pad.py:SoftPad"), "control.step=70 um")
+    packed = pickle.dumps(scene)
+    path.unlink()
+    script = (
+        "import pickle, sys; from digiclay.core.session.run_scene import run\n"
+        "scene = pickle.load(sys.stdin.buffer)\n"
+        "sys.stdout.buffer.write(run(scene).history['height'].tobytes())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], input=packed, capture_output=True, check=True, timeout=TIMEOUT
+    )
+    assert done.stdout == run(scene).history["height"].tobytes()
+    remove_method("soft_pad")
+    assert pickle.loads(packed).control.step == 70e-6
+
+
+def test_an_installed_package_offers_a_method_by_its_name(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_method(here, name="padpackage.py")
+    monkeypatch.syspath_prepend(here)
+    info = here / "pads-1.2.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: pads\nVersion: 1.2\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text("[digiclay.methods]\npad = padpackage:SoftPad\n", encoding="utf-8")
+    with pytest.raises(SceneError, match=r"must be one of virtual_master"):
+        small("pad")  # installed is not loaded
+    assert "padpackage" not in sys.modules
+    scene = small(load_method("pad"))
+    assert scene.method == "pad"
+    packed = pickle.dumps(scene)
+    assert b"way in a control period" not in packed
+    remove_method("pad")
+    assert run(pickle.loads(packed)).metrics["method"] == "pad"
+    remove_method("pad")
+    (here / "padpackage.py").write_text(PAD + "\n# another\n", encoding="utf-8")
+    with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
+        pickle.loads(packed)
+    monkeypatch.setattr(method_source, "entry_points", lambda **_: [
+        EntryPoint("pad", "one:Pad", method_source.GROUP), EntryPoint("pad", "two:Pad", method_source.GROUP)
+    ])  # fmt: skip
+    with pytest.raises(MethodError, match=r"one installed package \(got one:Pad, two:Pad\)"):
+        load_method("pad")
+
+
+COPY = f"""{HEAD}
+from digiclay.core.control import virtual_master
+
+@dataclass(frozen=True)
+class MethodOne(virtual_master.VirtualMaster):
+    blister = {{}}
+
+    def build(self, device):
+        return virtual_master.build(self, device)
+"""
+
+
+def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here: Path) -> None:
+    write_method(here, COPY, "one.py")
+    name = load_method("one.py:MethodOne")
+    own, built_in = run(small(name)), run(small("virtual_master"))
+    assert built_in.history["mode"].max() > 1
+    for key, values in built_in.history.items():
+        np.testing.assert_array_equal(own.history[key], values, key)
+    assert own.metrics["losses"] == built_in.metrics["losses"]
+
+
+@pytest.mark.parametrize(
+    ("attribute", "name"),
+    [("Mine", "mine"), ("SoftPad", "soft_pad"), ("PIDControl2", "pid_control2"), ("mine", "mine")],
+)
+def test_the_name_in_scene_files_is_that_of_the_class(attribute: str, name: str) -> None:
+    assert name_method(attribute) == name
+
+
+def test_the_table_of_methods_finds_built_in_ones_first() -> None:
+    assert find_method("elastic") is METHODS["elastic"]

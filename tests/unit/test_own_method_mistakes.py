@@ -1,0 +1,188 @@
+"""Control methods of one's own with mistakes: each is one line with file and rule, and nothing is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+from digiclay.core.base.errors import MethodError
+from digiclay.core.control.methods import list_added
+from digiclay.core.session.run_scene import run
+from digiclay.plugins.method_loader import load_method
+
+from tests.own_methods import HEAD, PAD, forgotten, small, write_method
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Work in an empty folder; methods that a test loads are unknown after it."""
+    monkeypatch.chdir(tmp_path)
+    with forgotten():
+        yield tmp_path
+
+
+def refusal(text: str, attribute: str = "Bad") -> str:
+    """Return the line that refuses the code of a method, when it is loaded or while it runs."""
+    write_method(Path(), text, "bad.py")
+    with pytest.raises(MethodError) as caught:
+        run(small(load_method(f"bad.py:{attribute}")))
+    said = str(caught.value)
+    assert "\n" not in said
+    assert said.startswith(("bad.py:", "bad.py ")), said
+    return said
+
+
+def bad(body: str, fields: str = "") -> str:
+    """Return the code of a method with fields, and with functions."""
+    inner = "\n".join(f"    {line}" for line in (*fields.splitlines(), *body.splitlines()))
+    return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
+
+
+def ordering(orders: str) -> str:
+    """Return the code of a method with certain orders."""
+    return bad(f"def command(self, memory, cells, device):\n    return memory, {orders}")
+
+
+def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_method(here)
+    for word in ("soft_pad", "pad.py:SoftPad"):
+        (here / "my.toml").write_text(f'[control]\nmethod = "{word}"\n', encoding="utf-8")
+        assert main(["run", "my.toml"]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "my.toml: control.method must be one of virtual_master" in said
+        assert "--method path/to/mine.py:Mine" in said
+        assert list_added() == {}
+    assert [path.name for path in here.iterdir() if path.is_dir()] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("import nothing_of_this_name", "the code must not raise (got ModuleNotFoundError in line 1: No"),
+        ("x = (", "pad.py: the code must not raise (got SyntaxError in line 1"),
+        ("raise SystemExit(3)", "pad.py: the code must not raise (got SystemExit in line 1: 3)"),
+        ("x = 1", "pad.py:SoftPad: the file must have the class SoftPad (it has no control method)."),
+        (PAD.replace("SoftPad", "Pad"), "the file must have the class SoftPad (it has pad.py:Pad)."),
+        ("SoftPad = 3", "the class must derive from OwnMethod of digiclay.core.control.own_method (got int)"),
+        ("class SoftPad: pass", "the class must derive from OwnMethod"),
+        (PAD.replace("@dataclass(frozen=True)", ""), "must be decorated with @dataclass(frozen=True)"),
+        (PAD.replace("def command", "def comand"), "must have a function command(self, "),
+        (PAD.replace('unit="m"', 'unit="inch"'), "the unit of step must be one of m, s, Pa"),
+        (PAD.replace("quantity(50e-6", "quantity([1]"), "mutable default"),
+        (PAD.replace("quantity(50e-6", "quantity(None"), "the default of step must be a bool, int, float"),
+        (PAD.replace("quantity(50e-6", "quantity(-1.0"), "the default of step must be above 0 m (got -1 m)"),
+        (PAD.replace("step: float", "method: float"), "a field must not be called method"),
+        (PAD + "\n    loose: float = 3.0\n", "the field loose must be declared with quantity"),
+        (PAD + "\n    rows = -1\n", "rows must be from 0 to 1000 (got -1)"),
+        (PAD + "\n    blister = 3\n", "blister must be None or a dictionary of defaults (got int)"),
+        (PAD + '\n    blister = {"radius": -1.0}\n', "blister must hold values of the section [blister]"),
+    ],
+)
+def test_a_class_that_is_no_method_is_refused_in_a_line(
+    here: Path, text: str, rule: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_method(here, text)
+    assert main(["run", "tap", "--method", "pad.py:SoftPad"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert said.startswith("--method: pad.py")
+    assert rule in said
+    assert [path.name for path in here.iterdir()] == ["pad.py"]
+
+
+@pytest.mark.parametrize(
+    ("word", "rule"),
+    [
+        ("absent.py:Mine", "absent.py cannot be read as a control method: No such file or directory."),
+        ("absent.py", "absent.py must be a file and a class in it, such as absent.py:Mine."),
+        (":Mine", "must be a file and a class in it"),
+        ("absent.py:", "must be a file and a class in it"),
+        (".:Mine", "cannot be read as a control method: Is a directory."),
+        ("bytes.py:Mine", "bytes.py must be UTF-8 text (byte 0 is not)."),
+        ("large.py:Mine", "large.py must have at most 1 MB of code (got 1)."),
+        ("magic", "control.method must be one of virtual_master"),
+    ],
+)
+def test_a_word_that_names_no_code_is_refused_in_a_line(
+    here: Path, word: str, rule: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "bytes.py").write_bytes(b"\xff\xfe")
+    (here / "large.py").write_bytes(b"#" * 1_000_001)
+    assert main(["run", "tap", "--method", word]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert said.startswith("--method: ")
+    assert rule in said
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        (ordering("Orders(height=cells.height[:-1])"), "command must return height of the shape ("),
+        (ordering("Orders(opening=cells.height * np.nan)"), "return opening as finite numbers (got nan)"),
+        (ordering("Orders(height=cells.height * 1j)"), "height as real numbers (got complex128)"),
+        (ordering("Orders(height=cells.height > 0)"), "height as real numbers (got bool)"),
+        (ordering("Orders(mode=cells.height)"), "mode as whole numbers (got float64)"),
+        (ordering("Orders(mode=np.full(cells.height.size, 8))"), "codes of Mode, from 0 to 7 (got 8)"),
+        (ordering("Orders(rows=cells.height)"), "rows of the shape (0, "),
+        (ordering("cells.height"), "must return Orders as its second result (got ndarray)"),
+        (bad("def command(self, memory, cells, device):\n    pass"), "command must not raise (got TypeError"),
+        (ordering("1 / 0"), "command must not raise (got ZeroDivisionError in line 11: division by zero)"),
+        (ordering("cells.force.sort() or Orders()"), "got ValueError in line 11: sort array is read-only"),
+        (bad("def begin(self, device):\n    return []\ncommand = lambda *_: None"), "begin must return a"),
+        (
+            bad("def locate(self, memory, touched, device):\n    return 3\ncommand = lambda *given: None"),
+            "locate must return two results, memory and a disc, or None (got int).",
+        ),
+        (
+            bad("def locate(self, memory, c, device):\n    return memory, (0, 0)\ncommand = lambda *_: None"),
+            "locate must return the disc of the shape (3,)",
+        ),
+        (
+            bad("def begin(self, device):\n    return 0.0\ndef command(self, memory, cells, device):\n"
+                "    return cells.force, Orders()"),
+            "command must keep the kinds of its memory, here float (got ndarray).",
+        ),
+        (
+            bad("def begin(self, device):\n    return 0.0\ndef command(self, memory, cells, device):\n"
+                "    return float('nan'), Orders()"),
+            "command must return a memory without NaN.",
+        ),
+        (bad("def build(self, device):\n    return 3"), "build must return a controller with begin (got"),
+    ],
+)  # fmt: skip
+def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text: str, rule: str) -> None:
+    said = refusal(text)
+    assert said.startswith("bad.py:Bad: ")
+    assert rule in said
+
+
+def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # Twenty calls of more than twenty control periods of 0.2 ms each.
+    text = bad(
+        "def command(self, memory, cells, device):\n"
+        "    import time\n"
+        "    end = time.thread_time() + 22 * device.period\n"
+        "    while time.thread_time() < end: pass\n"
+        "    return memory, Orders()"
+    )
+    write_method(here, text, "bad.py")
+    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
+    assert main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert "bad.py:Bad: command must take at most 20 control periods of processor time a call (got 2" in said
+    assert [path.name for path in here.iterdir()] == ["bad.py"]
+
+
+def test_two_methods_of_one_name_are_refused(here: Path) -> None:
+    write_method(here)
+    write_method(here, PAD.replace("50e-6", "60e-6"), "other.py")
+    assert load_method("pad.py:SoftPad") == load_method(str(here / "pad.py:SoftPad")) == "soft_pad"
+    with pytest.raises(MethodError, match=r"soft_pad must be its own \(also that of pad.py\)"):
+        load_method("other.py:SoftPad")
+    write_method(here, PAD.replace("SoftPad", "Elastic"), "elastic.py")
+    with pytest.raises(MethodError, match=r"must not have the name of the built-in method elastic"):
+        load_method("elastic.py:Elastic")
