@@ -123,10 +123,27 @@ def script(blender: Any) -> Iterator[float | None]:
         note(blender, f"stroke {duration:g}")
         blender.SEEN[f"stroke {duration:g}"]["took"] = took
         yield from reset(blender)
+    yield from message(blender)
     yield from taps(blender)
     yield from navigation(blender)
     yield from pie_menu(blender)
     yield from taken_back(blender)
+
+
+def message(blender: Any) -> Iterator[float | None]:
+    """Draw a stroke after another one, with no key between them, while Blender shows a message."""
+    tip, running = blender.fingertip(), blender.part("live.running")
+    size = tip.scale.copy()
+    for scale, waits in ((0.0 * size, True), (size, False)):
+        tip.scale = scale
+        yield from blender.until(
+            lambda waits=waits: bool(running.find(blender.beds()[0]).blocking_reason) == waits
+        )
+    blender.SEEN["message"] = running.last_message()
+    start, end = ends(blender)
+    yield from finish(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60), "mouseup 1"))
+    note(blender, "stroke under a message")
+    yield from reset(blender)
 
 
 def taps(blender: Any) -> Iterator[float | None]:

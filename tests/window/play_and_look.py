@@ -170,15 +170,14 @@ def views(blender: Any) -> Iterator[float | None]:
     yield from blender.until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
     yield from tapped(blender, region, area.spaces.active.region_3d, (-15.0, 9.0), "orthographic")
     blender.shot("play_orthographic")
+    areas = len(blender.window().screen.areas)
     blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
-    yield 1.0
+    yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
     blender.part("device.display").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
-    yield 1.0
-    area, _ = blender.view()
-    for region in (one for one in area.regions if one.type == "WINDOW"):
-        if region.data.view_matrix.to_quaternion().angle < 1e-3:  # seen from straight above
-            yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
+    yield from blender.until(lambda: top_quarter(blender) is not None)
+    region = top_quarter(blender)
+    yield from tapped(blender, region, region.data, (15.0, -9.0), "quad view")
     with drawn(blender) as marks:
         yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
@@ -193,6 +192,18 @@ def views(blender: Any) -> Iterator[float | None]:
     yield None
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     yield None
+
+
+def top_quarter(blender: Any) -> Any:
+    """Return the quarter of a quad view that looks from straight above, once it has been drawn as such."""
+    area, _ = blender.view()
+    quarters = [region for region in area.regions if region.type == "WINDOW"]
+    for region in quarters if len(quarters) == 4 else []:
+        matrix = np.array(region.data.view_matrix)
+        # Before the first drawing all of a matrix may be 0, or the unit matrix.
+        if np.allclose(matrix[:3, :3], np.eye(3), atol=1e-3) and matrix[2, 3] < 0.0:
+            return region
+    return None
 
 
 @contextmanager

@@ -35,6 +35,12 @@ def test_a_stroke_is_formed_in_all_its_columns(seen: dict[str, Any], duration: f
     assert formed.mean() >= 0.95
 
 
+def test_a_stroke_is_formed_while_blender_shows_a_message(seen: dict[str, Any]) -> None:
+    # The timer of a message gives every operator events that name the release of the stroke before.
+    assert seen["message"].endswith("goes on")
+    assert (down(seen, "stroke under a message")[ROW, COLUMNS] > FORMED).mean() >= 0.95
+
+
 def test_a_stroke_leaves_alone_what_it_does_not_pass(seen: dict[str, Any]) -> None:
     np.testing.assert_allclose(down(seen, "stroke 1")[:4], 0.0, rtol=0, atol=1e-3)
 

@@ -79,6 +79,11 @@ def test_the_overlay_writes_into_one_quarter_of_a_quad_view_and_marks_picked_pin
     assert [marks for _, marks in seen["drawn in the quarters"]] == [True] * 4
 
 
+def test_a_session_outlives_the_view_it_was_started_in(seen: dict[str, Any]) -> None:
+    # The view is maximized in mid-session. Blender states it when the area of an operator is gone.
+    assert "internal error" not in seen["output"]
+
+
 def test_every_picture_shows_more_than_an_empty_window(seen: dict[str, Any]) -> None:
     # Shaded pins and a shaded fingertip have thousands of colors, a blank screen has one.
     assert len(seen["colors"]) == 4

@@ -15,6 +15,7 @@ from ..live.stroke_path import pull
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
 from ..live.tracking import find_tracking
 from ..press import aim, brush, pen
+from ..press.release import begin_button, read_event
 from ..settings.declared import title
 from ..ui_text import localize
 from . import status
@@ -67,7 +68,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         self.region, self.began = context.region, time.perf_counter()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
         self.pressure, self.lean, self.ticked = 1.0, (0.0, 0.0), 0.0
-        self.keyed = False
+        self.button = begin_button(event.value, (event.type_prev, event.value_prev))
         self._feel(context, found.bed, event)
         place = float(found.point[0]), float(found.point[1])
         self.lagged = place
@@ -161,14 +162,11 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             self.lean = pen.find_lean(tuple(event.tilt), aim.find_view(context, bed))
 
     def _is_released(self, event: Any) -> bool:
-        """Return whether the button is up though no release has come: a pie menu, for instance, has had it.
-
-        A move tells of the last key or button; a timer's event of the one before that, which is one of this
-        stroke only after another key has come.
-        """
-        self.keyed |= event.type not in MOVES and event.type not in ("TIMER", "LEFTMOUSE")
-        tells = event.type in MOVES or (event.type == "TIMER" and self.keyed)
-        return tells and (event.type_prev, event.value_prev) == ("LEFTMOUSE", "RELEASE")
+        """Return whether the button is up though no release has come: a pie menu, say, has had it."""
+        if event.type == "LEFTMOUSE":
+            return False
+        self.button = read_event(self.button, event.type, (event.type_prev, event.value_prev))
+        return self.button.up
 
     def _keep_amount(self, context: Any) -> None:
         """Let the next stroke of this brush have the depth or height of this one."""

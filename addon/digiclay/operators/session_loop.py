@@ -29,7 +29,9 @@ class LoopMixin(Polled):
         loop.take_over()
         self.token, self.since = loop.token(), time.perf_counter()
         self.newer = _other_operators(context)
-        context.window_manager.modal_handler_add(self)
+        # Of the window alone: an area that it is started from goes when a view is maximized.
+        with context.temp_override(area=None, region=None):
+            context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
