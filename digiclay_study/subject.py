@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import add_scene, settings_of
+from digiclay.commands.arguments import add_scene, name_methods, settings_of
 from digiclay.commands.evaluation_pool import add_pool
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -103,7 +103,7 @@ def read_subject(arguments: argparse.Namespace) -> Subject:
     """
     names = tuple(dict.fromkeys(find_figure(word.strip()) for word in arguments.metric.split(",")))
     path, settings = find(arguments.scene), settings_of(arguments)
-    ranges = fit_ranges([read_range(said) for said in arguments.vary], path, settings)
+    ranges = fit_ranges([read_range(name_methods(said)) for said in arguments.vary], path, settings)
     scene = load(path, settings)
     if scene.recorder is None:
         raise OutputError("Metrics need a recorder, and the scene has recorder = 'absent'.")

@@ -17,7 +17,7 @@ from ..plugins.method_loader import load_method
 
 __all__ = [
     "METHOD", "Help", "add_command", "add_run", "add_scene", "length", "load_by_option", "millimeters",
-    "scene_of", "seconds", "settings_of", "size", "told_as_options",
+    "name_methods", "scene_of", "seconds", "settings_of", "size", "told_as_options",
 ]  # fmt: skip
 
 #: The key of the control method in scene files.
@@ -89,6 +89,14 @@ def settings_of(arguments: argparse.Namespace) -> list[Setting]:
 def _with_method(setting: Setting) -> Setting:
     """Return a setting of the method by its name, with a method of one's own loaded that it names."""
     return setting._replace(value=load_by_option(setting.value.strip("\"'"), setting.option))
+
+
+def name_methods(varied: str) -> str:
+    """Return the text of --vary with the names of the methods that it varies; one's own ones are loaded."""
+    key, _, words = varied.partition("=")
+    if key.strip() != METHOD:
+        return varied
+    return f"{METHOD}={','.join(load_by_option(word.strip(), '--vary') for word in words.split(','))}"
 
 
 def load_by_option(word: str, option: str) -> str:

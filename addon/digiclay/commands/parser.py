@@ -19,6 +19,7 @@ from . import (
     features,
     form,
     job,
+    new_method,
     outside,
     page,
     plot,
@@ -108,7 +109,8 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
     every = (
-        run, batch, job, page, form, describe, export, features, plot, render, sweep, compare, outside,
+        run, batch, job, page, form, describe, export, features, plot, render, sweep, compare, new_method,
+        outside,
     )  # fmt: skip
     for command in every:
         command.add(commands)

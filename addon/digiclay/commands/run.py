@@ -15,6 +15,7 @@ from ..core.base.safe_names import find_name
 from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import Result, run, save
+from ..plugins.method_copy import describe_origin, write_code
 from .arguments import add_command, add_scene, length, scene_of
 from .budget import noted, within
 from .exit_codes import STOPPED
@@ -41,8 +42,8 @@ examples:
   digiclay run ridge_mound_valley --budget 20um
   digiclay run tap --set layout.rows=9 --set control.force_setpoint="300 mN" --set conduit=absent
 
-The run folder holds scene.toml (every parameter), history.npz, metrics.json, and the files of the
-options. Ctrl-C keeps the computed rows, marked as incomplete.
+The run folder holds scene.toml (every parameter), history.npz, metrics.json, the files of the options,
+and method.py, the code of a method of your own. Ctrl-C keeps the computed rows, marked as incomplete.
 """
 
 
@@ -94,6 +95,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 result = replace(result, metrics={**result.metrics, "budget": noted(found)})
             with claim.write() as folder:
                 save(result, folder)
+                write_code(scene, folder)
                 left_out, wrong = make_extras(_extras(arguments, result), folder, stop)
     if not arguments.quiet:
         print(result.summary())
@@ -133,7 +135,10 @@ def _simulated(scene: Scene, origin: str, stop: Stop, *, quiet: bool) -> Result:
     try:
         with Bar(sys.stderr, scene.name, period) as bar:
             return run(
-                scene, progress=None if quiet else bar, stopped=stop, versions={"digiclay": __version__}
+                scene,
+                progress=None if quiet else bar,
+                stopped=stop,
+                versions={"digiclay": __version__, **describe_origin(scene)},
             )
     except ParameterError as error:
         raise SceneError(f"{origin}: {error}") from None

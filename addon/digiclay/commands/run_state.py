@@ -10,7 +10,7 @@ from typing import Any
 from ..core.base.errors import DigiclayError
 from ..core.base.run_folder import lock_name
 from ..core.base.whole_files import format_json, read_json, write_whole
-from ..core.scene.scene_source import load
+from ..core.scene.scene_source import load, load_recorded
 from ..core.session.finished_run import has_files, is_whole
 from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
@@ -54,7 +54,7 @@ def judge_run(job: Path, run: Path) -> RunState:
     if timing is None:
         return RunState.INCOMPLETE
     sizes = timing.get(FILES)
-    whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load(run / SCENE))
+    whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load_recorded(run / SCENE))
     return RunState.WHOLE if whole else RunState.INCOMPLETE
 
 

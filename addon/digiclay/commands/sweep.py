@@ -30,7 +30,7 @@ from ..core.studies.sweep_plan import (
     open_sweep,
     select_done,
 )
-from .arguments import add_scene, settings_of
+from .arguments import add_scene, name_methods, settings_of
 from .evaluation_pool import add_pool, open_pool
 from .exit_codes import STOPPED
 from .progress import Counted
@@ -76,7 +76,7 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write the table and the pictures."""
     names = list(dict.fromkeys(find_figure(word.strip()) for word in arguments.metric.split(",")))
-    axes = [read_axis(said) for said in arguments.vary]
+    axes = [read_axis(name_methods(said)) for said in arguments.vary]
     with Counted(sys.stderr, "sweep", "points read") as bar:
         told = None if arguments.quiet else bar
         points = make_points(find(arguments.scene), _read_settings(arguments, axes), axes, told)

@@ -134,7 +134,8 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     blister = getattr(kind, "blister", None)
     row = OwnRow(
         module=source.module, parameters=kind.__name__, blister=None if blister is None else dict(blister),
-        recovers=bool(getattr(kind, "recovers", False)), by_set=True, name=name, kind=kind, source=source,
+        recovers=bool(getattr(kind, "recovers", False)), by_set=True, digest=source.digest,
+        name=name, kind=kind, source=source,
     )  # fmt: skip
 
     def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:

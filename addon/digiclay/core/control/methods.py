@@ -47,6 +47,8 @@ class Method:
         Whether its cells go back to the height they had at rest.
     by_set : bool
         Whether its orders for a cell depend on which other cells are active; see `System.by_set`.
+    digest : str
+        Identifies the code of a method that is no part of this package; empty: it is.
     """
 
     module: str
@@ -54,6 +56,7 @@ class Method:
     blister: Mapping[str, float] | None = field(default=None)
     recovers: bool = False
     by_set: bool = False
+    digest: str = ""
 
     def import_parameters(self) -> type[ControlParameters]:
         """Import the class of its parameters, now that a scene needs it."""

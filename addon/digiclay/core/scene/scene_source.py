@@ -13,10 +13,11 @@ from ..base.errors import ParameterError, SceneError
 from ..base.part_table import ReadParts
 from ..base.sample_file import find_file, list_files
 from ..base.toml_text import LARGEST, parse_tables
+from ..control.methods import list_methods
 from .schema import Scene
-from .toml_table import merge_one_finger, resolve
+from .toml_table import ABSENT, merge_one_finger, resolve
 
-__all__ = ["SAMPLES", "Setting", "find", "list_samples", "load", "make_scene", "read_table"]
+__all__ = ["SAMPLES", "Setting", "find", "list_samples", "load", "load_recorded", "make_scene", "read_table"]
 
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
@@ -73,6 +74,28 @@ def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
         One line: file or option, key, rule, value.
     """
     return make_scene(path, read_table(path), settings)
+
+
+def load_recorded(path: Path) -> Scene:
+    """Read the scene of a finished run, which need not be simulated again.
+
+    Without its control, when that is a method of one's own that is not loaded.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    SceneError
+        As `load`.
+    """
+    table = read_table(path)
+    control = table.get("control")
+    method = control.get("method") if isinstance(control, dict) else None
+    if isinstance(method, str) and method.isidentifier() and method not in list_methods():
+        table = {key: value for key, value in table.items() if key != "blister"} | {"control": ABSENT}
+    return make_scene(path, table)
 
 
 def make_scene(

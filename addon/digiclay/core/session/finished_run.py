@@ -16,7 +16,7 @@ from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
 from ..base.run_folder import MARK
 from ..base.whole_files import read_json
 from ..scene.recorder import Recorder
-from ..scene.scene_source import load
+from ..scene.scene_source import load_recorded
 from ..scene.schema import Scene
 from .memory_limit import measure_available_memory
 
@@ -58,7 +58,7 @@ def read_run(folder: Path, *names: str) -> Run:
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
     if not path.is_file():
         raise OutputError(f"{folder} has no history.npz: its scene kept no record.")
-    scene = load(folder / "scene.toml")
+    scene = load_recorded(folder / "scene.toml")
     try:
         with zipfile.ZipFile(path) as archive:
             held = read_heads(archive, ("time", *names))

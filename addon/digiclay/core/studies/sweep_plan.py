@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import OutputError
 from ..base.whole_files import format_json, read_json, write_whole
+from ..control.methods import find_method
 from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
@@ -141,6 +142,8 @@ def hash_points(points: Sequence[Point]) -> str:
 
     for point in points:
         scenes.update((format_scene(point.scene, write) if point.scene else point.error).encode())
+        if point.scene is not None:
+            scenes.update(find_method(point.scene.method).digest.encode())  # nothing, of a built-in one
     return scenes.hexdigest()
 
 

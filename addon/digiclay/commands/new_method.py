@@ -1,0 +1,75 @@
+"""``digiclay new-method``: the file of a control method of one's own, which runs as it is."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from ..core.base.errors import OutputError
+from ..core.base.whole_files import write_whole
+from ..core.control.methods import METHODS
+from ..plugins.method_loader import name_method
+from .arguments import add_command
+from .refusals import refuse_unwritable
+
+__all__ = ["TEMPLATE", "add", "name_class"]
+
+EXAMPLES = """\
+examples:
+  digiclay new-method mine                            mine.py with the class Mine, in the working folder
+  digiclay run slow_press --method mine.py:Mine       the paper's press with it
+
+docs/own-methods.md explains the file.
+"""
+#: The file that is copied.
+TEMPLATE = Path(__file__).parents[1] / "sample_shapes" / "methods" / "template.txt"
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    said = "write the file of a control method of your own, which runs as it is"
+    parser = add_command(commands, "new-method", said, EXAMPLES)
+    parser.add_argument("name", metavar="NAME", type=_name, help="such as mine or soft_pad")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="default: the working folder")
+    parser.add_argument("--overwrite", action="store_true", help="replace an older file")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def _name(text: str) -> str:
+    """Read the name of a method."""
+    if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", text) or len(text) > 60:
+        rule = "must be small letters and digits, joined by _, such as soft_pad"
+        raise argparse.ArgumentTypeError(f"{rule} (got {text!r})")
+    if text in METHODS:
+        raise argparse.ArgumentTypeError(f"must not be that of a built-in method (got {text!r})")
+    if name_method(name_class(text)) != text:
+        raise argparse.ArgumentTypeError(f"must have no digit behind a _ (got {text!r})")
+    return text
+
+
+def name_class(name: str) -> str:
+    """Return the name of a method's class by that of the method: soft_pad is ``SoftPad``."""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Write the file."""
+    refuse_unwritable(arguments.out)
+    path: Path = arguments.out / f"{arguments.name}.py"
+    if os.path.lexists(path) and not (arguments.overwrite and path.is_file()):
+        raise OutputError(f"{path} is there already: choose another name, or --overwrite.")
+    name = name_class(arguments.name)
+    text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute({"Class": name, "file": path.name})
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path.parent} cannot be made: {error.strerror or error}.") from None
+    write_whole(path, text.encode())
+    if not arguments.quiet:
+        print(f"written to {path}", f"try: digiclay run slow_press --method {path}:{name}", sep="\n")
+    return 0
