@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test test-convergence lint mutants test-matrix test-window test-proof guide-pictures clean
+.PHONY: help demo extension test test-convergence lint mutants test-matrix test-window test-proof docs guide-pictures clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -28,7 +28,7 @@ extension: ## build the Blender extension and leave its zip in dist/
 test: ## run all tests but those of convergence, of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/site --ignore=tests/window || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
 	awk '/ s of processor time/ { sub(/.*; /, ""); total += $$1 } \
 	  END { printf "processor time of make test: %d s, to be kept below 600 s\n", total }' .reports/test.txt >.reports/time.txt; \
@@ -69,10 +69,16 @@ guide-pictures: ## follow the first page of the guide in a window, and retake it
 	@.venv/bin/python tools/guide_pictures.py .reports/guide
 
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids
-	@tools/proof .reports
+	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids" 600 -- tests/proof
 
+docs: ## build the site in site/, without a warning, and check it: links, search in a browser, commands of all pages
+	@$(ENVIRONMENT) requirements/docs.txt $(IN_311)
+	@tools/programs .reports/docs.log "chromium chromedriver" "chromium chromium-driver"
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --quiet
+	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- tests/site
+
 clean: ## remove all that make made
-	rm -rf .venv .matrix .reports demo build dist addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .matrix .reports demo build dist site addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find addon benchmarks digiclay_paper digiclay_study tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

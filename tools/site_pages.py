@@ -1,0 +1,221 @@
+"""Pages of the site that are made at each build: command line, parameters, Python, files from elsewhere.
+
+Each function returns the Markdown of a page; `tools/site_hook.py` hands them to MkDocs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import html
+import posixpath
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
+
+from digiclay.commands.parser import parser  # noqa: E402
+from digiclay.core.base.png import encode_png  # noqa: E402
+from digiclay.core.control.methods import METHODS  # noqa: E402
+from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
+from nomenclature import LEGEND, section  # noqa: E402
+
+from benchmarks.kinds import parser as benchmarks_parser  # noqa: E402
+
+#: Pages of the site that stand elsewhere in the repository: their file.
+ELSEWHERE = {
+    "contributing.md": "CONTRIBUTING.md",
+    "changes.md": "CHANGELOG.md",
+    "benchmarks.md": "benchmarks/README.md",
+}
+#: Folders of code with pages of their own, and the prefix of their import.
+CODE = {
+    "digiclay": ROOT / "addon" / "digiclay",
+    "digiclay_paper": ROOT / "digiclay_paper",
+    "digiclay_study": ROOT / "digiclay_study",
+}
+COMMANDS = """\
+# Command line
+
+Made from the parsers of the commands; `--help` prints the same.
+"""
+PARAMETERS = """\
+# Parameters
+
+Made from the declarations of the parameters in the core. A key of a scene file, `pitch = "2.5 mm"` in its
+section `[layout]`, is `--set "layout.pitch=2.5 mm"` on the command line. In Blender the panels *Device*,
+*Finger* and *Control* have the same parameters. The references are those of the
+[nomenclature](../nomenclature.md#references).
+
+"""
+PYTHON = """\
+# Python
+
+Made from the docstrings of the code. [Architecture](../architecture.md) describes how the packages work
+together; [tasks](../tasks.md#python) has a first program.
+
+| package | content |
+|---|---|
+"""
+#: Head of a page whose results of a search come after those of the pages for readers.
+BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
+#: Head of a page whose results come before those of the others.
+AHEAD = "---\nsearch:\n  boost: 20\n---\n"
+#: Width of the usage lines, characters.
+WIDTH = 76
+LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+
+
+def write_cell(text: str) -> str:
+    """Return a text for a cell of a table, where nothing in it is markup."""
+    return re.sub(r"([*_|\[\]`\\])", r"\\\1", html.escape(" ".join(text.split()), quote=False))
+
+
+def _usage(command: argparse.ArgumentParser) -> str:
+    """Return the usage lines of a command, at one width wherever the site is built."""
+    lines = command._get_formatter()
+    lines._width = WIDTH
+    lines.add_usage(command.usage, command._actions, command._mutually_exclusive_groups, prefix="")
+    return lines.format_help().strip()
+
+
+def _arguments(command: argparse.ArgumentParser) -> list[str]:
+    """Return the table of a command's arguments, without rows nothing."""
+    rows = []
+    for action in command._actions:
+        if isinstance(action, argparse._HelpAction | argparse._SubParsersAction) or not action.help:
+            continue
+        values = action.metavar or ("{" + ",".join(map(str, action.choices)) + "}" if action.choices else "")
+        value = " ".join(values) if isinstance(values, tuple) else values
+        if not value and action.nargs != 0:
+            value = action.dest.upper()
+        names = [" ".join(filter(None, (name, value))) for name in action.option_strings] or [value]
+        said = action.help % {**vars(action), "prog": command.prog}
+        rows.append(f"| {', '.join(f'`{name}`' for name in names)} | {write_cell(said)} |")
+    return ["| argument | meaning |", "|---|---|", *rows, ""] if rows else []
+
+
+def _describe(top: argparse.ArgumentParser) -> list[str]:
+    """Return the sections of all commands of a parser."""
+    (listed,) = [one for one in top._actions if isinstance(one, argparse._SubParsersAction)]
+    summaries = {one.dest: one.help or "" for one in listed._choices_actions}
+    lines: list[str] = []
+    for name, command in listed.choices.items():
+        said = command.description or summaries.get(name, "")
+        paragraphs = [write_cell(one) for one in said.strip().split("\n\n")]
+        lines += [f"### {top.prog} {name}", "", "\n\n".join(paragraphs), ""]
+        if command.add_help:
+            lines += ["```text", _usage(command), "```", "", *_arguments(command)]
+        if command.epilog:
+            lines += ["```text", command.epilog.strip(), "```", ""]
+    return lines
+
+
+def make_commands_page() -> str:
+    """Return the page of the command line, from its parsers."""
+    top, benchmarks = parser(), benchmarks_parser()
+    lines = [COMMANDS]
+    for one, where in ((top, ""), (benchmarks, " In a checkout alone.")):
+        lines += [f"## {one.prog}", "", write_cell(one.description or "") + where, "", *_describe(one)]
+    return "\n".join(lines) + "\n"
+
+
+def make_parameters_page() -> str:
+    """Return the page of all parameters of a scene, from their declarations."""
+    lines = [AHEAD + PARAMETERS + LEGEND.strip().partition("\n")[2].strip()]
+    for name in SECTIONS:
+        for method in METHODS if name == "control" else ("virtual_master",):
+            said = import_parameters(name, method).__doc__ or ""
+            _, heading, *table = section(name, method)
+            lines += ["", heading.removeprefix("#"), "", write_cell(said.split("\n\n")[0]), *table]
+    return "\n".join(lines) + "\n"
+
+
+def list_packages() -> dict[str, list[str]]:
+    """Return the modules of each package of the code, by the dotted name of the package."""
+    packages: dict[str, list[str]] = {}
+    for name, folder in CODE.items():
+        for path in sorted(folder.rglob("*.py")):
+            *parts, last = path.relative_to(folder).with_suffix("").parts
+            # A folder without this file holds data, such as Blender's presets.
+            if last not in ("__init__", "__main__") and (path.parent / "__init__.py").exists():
+                packages.setdefault(".".join((name, *parts)), []).append(last)
+    return dict(sorted(packages.items()))
+
+
+def _first_line(package: str) -> str:
+    """Return the first line of a package's docstring."""
+    name, *parts = package.split(".")
+    text = CODE[name].joinpath(*parts, "__init__.py").read_text(encoding="utf-8")
+    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
+
+
+def make_package_page(package: str, modules: list[str]) -> str:
+    """Return the page of a package: its modules by their docstrings.
+
+    Parameters
+    ----------
+    package : str
+        Dotted name.
+    modules : list of str
+    """
+    lines = [BEHIND, f"# {package}", "", _first_line(package), ""]
+    for module in modules:
+        lines += [f"::: {package}.{module}", ""]
+    return "\n".join(lines)
+
+
+def make_packages_page(packages: dict[str, list[str]]) -> str:
+    """Return the page that lists the packages."""
+    return PYTHON + "".join(f"| [`{one}`](python/{one}.md) | {_first_line(one)} |\n" for one in packages)
+
+
+def find_place(path: str) -> str:
+    """Return the place in the site of a file of the repository, or "" if it has none."""
+    moved = {file: page for page, file in ELSEWHERE.items()}
+    if path in moved:
+        return moved[path]
+    if path.startswith("docs/"):
+        return path.removeprefix("docs/")
+    return path if path.startswith("benchmarks/results/") and path.endswith(".png") else ""
+
+
+def relink(text: str, source: str, page: str) -> str:
+    """Return Markdown whose links to files lead to their places in the site; without one they become text.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        File of the text in the repository.
+    page : str
+        Its place in the site.
+    """
+
+    def place(found: re.Match[str]) -> str:
+        picture, label, target = found.groups()
+        name, mark, anchor = target.partition("#")
+        if not name or "://" in target or target.startswith("mailto:"):
+            return found[0]
+        file = posixpath.normpath(posixpath.join(posixpath.dirname(source), name))
+        there = find_place(file)
+        if not there:
+            return label
+        return f"{picture}[{label}]({posixpath.relpath(there, posixpath.dirname(page) or '.')}{mark}{anchor})"
+
+    return LINK.sub(place, text)
+
+
+def draw_icon() -> bytes:
+    """Return the icon of the site as a PNG: nine pins from above, one of them under the fingertip."""
+    size, pitch = 48, 16
+    y, x = np.mgrid[:size, :size]
+    away = np.hypot(x % pitch - (pitch - 1) / 2, y % pitch - (pitch - 1) / 2)
+    cover = np.clip(6.5 - away, 0.0, 1.0)[..., None]
+    blue, orange, dark = np.array([[86, 180, 233], [213, 94, 0], [38, 41, 46]], dtype=float)
+    middle = ((x // pitch == 1) & (y // pitch == 1))[..., None]
+    return encode_png(np.rint(dark + cover * (np.where(middle, orange, blue) - dark)).astype(np.uint8))
