@@ -6,7 +6,7 @@ import argparse
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,22 +15,14 @@ from digiclay.commands.tables import table
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.speed_limits import Drag
+from digiclay.core.studies.evaluation import Record
+from digiclay.core.studies.method_trials import GROUPS, LIMITS, Trial, list_trials, measure_trial, place_trial
+from digiclay.core.studies.speed_limits import Drag, place_way
 from digiclay.plots.figure import empty
 
-from .method_trials import (
-    DRAGS,
-    Outcome,
-    draw_drags,
-    follow_drag,
-    follow_path,
-    list_models,
-    list_paths,
-    run_mismatched,
-    with_path,
-)
 from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress
+from .wrong_models import list_models, run_mismatched
 
 __all__ = ["add"]
 
@@ -49,6 +41,12 @@ FAST = (
     ("valley, 50 mm/s", Drag(height=-10e-3), 0.5e-3, 50e-3),
     ("ridge, orifice 0.8 mm, 80 mm/s", Drag(), 0.8e-3, 80e-3),
 )
+#: Columns of the CSV by figure.
+WRITTEN = {
+    "rfd": "rfd_N", "losses": "losses", "lag_mean": "lag_mean_m", "lag_max": "lag_max_m",
+    "max_total_force": "largest_force_N", "ridge_unevenness": "unevenness_m", "relief_rms": "relief_rms_m",
+    "relief_largest": "relief_largest_m",
+}  # fmt: skip
 #: Speed of the ridge drag with parts left out, m/s.
 PARTS_SPEED = 40e-3
 #: Parameters with which a part of Method III is left out.
@@ -63,7 +61,8 @@ PARTS: dict[str, dict[str, str]] = {
 #: No parameter that differs.
 NOTHING: Mapping[str, str] = {}
 
-Row = tuple[str, str, Outcome]
+Figures = Mapping[str, float | None]
+Row = tuple[str, str, Figures]
 
 
 def add(kinds: Any) -> None:
@@ -75,26 +74,26 @@ def add(kinds: Any) -> None:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run every trial, and print the tables."""
-    count = QUICK if arguments.quick else FULL
-    paths = {SESSION: None, **list_paths()}
-    total = len(SHOWN) * (len(paths) + len(DRAGS) + count) + len(FAST) + 10 + len(PARTS)
+    groups = tuple(group for group in GROUPS if group not in LIMITS)
+    trials = list_trials(groups, QUICK if arguments.quick else FULL)
+    total = len(SHOWN) * len(trials) + len(FAST) + 10 + len(PARTS)
     with progress(arguments, "trials", total) as bar:
-        rows = list(_run_trials(count, bar))
+        rows = list(_run_trials(trials, bar))
         fast = [
-            (name, "hybrid", _run(bar, name, follow_drag, _scene("hybrid", orifice=bore), speed, way))
+            (name, "hybrid", _run(bar, name, _follow, _scene("hybrid", orifice=bore), way, speed))
             for name, way, bore, speed in FAST
         ]
         wrong = list(_run_models(bar))
         parts = [
-            (name, "hybrid", _run(bar, name, follow_drag, _scene("hybrid", known), PARTS_SPEED))
+            (name, "hybrid", _run(bar, name, _follow, _scene("hybrid", known), Drag(), PARTS_SPEED))
             for name, known in PARTS.items()
         ]
     cost = _compare_cost(2 if arguments.quick else TURNS)
     text = "\n".join(_text(rows, fast, wrong, parts, cost))
     print(text)
-    head = ("trial", "method", "rfd_N", "losses", "lag_m", "largest_force_N", "unevenness_m")
+    head = ("trial", "method", *WRITTEN.values())
     every = [*rows, *fast, *wrong, *parts]
-    figures = [[name, method, o.rfd, o.losses, o.lag, o.largest, o.unevenness] for name, method, o in every]
+    figures = [[name, method, *map(found.get, WRITTEN)] for name, method, found in every]
     kept(arguments.out, "methods", text, head, figures)
     if arguments.out is not None:
         _draw(rows, arguments.out / "methods.png")
@@ -108,27 +107,37 @@ def _scene(method: str, control: Mapping[str, str] = NOTHING, orifice: float = 0
     return load(find(SESSION), settings)
 
 
-def _run(bar: Callable[[str], None], name: str, trial: Callable[..., Outcome], *arguments: Any) -> Outcome:
-    """Return the result of a trial, and step the bar."""
+def _run(bar: Callable[[str], None], name: str, trial: Callable[..., Figures], *arguments: Any) -> Figures:
+    """Return the figures of a trial, and step the bar."""
     found = trial(*arguments)
     bar(name)
     return found
 
 
-def _run_trials(count: int, bar: Callable[[str], None]) -> Iterator[Row]:
-    """Run paths, drags and random drags with both methods."""
-    random = draw_drags(count)
+def _measure(scene: Scene, trial: Trial) -> Figures:
+    """Return the figures of a trial."""
+    placed, measure = place_trial(scene, trial)
+    return _take(measure(placed, None))
+
+
+def _follow(scene: Scene, way: Drag, speed: float) -> Figures:
+    """Return the figures of a drag."""
+    placed, start, end = place_way(scene, way, speed)
+    return _take(measure_trial(placed, phase=(start, end)))
+
+
+def _take(record: Record | None) -> Figures:
+    """Return the figures of a record."""
+    assert record is not None  # nobody stops it
+    figures: Figures = record["figures"]
+    return figures
+
+
+def _run_trials(trials: Sequence[Trial], bar: Callable[[str], None]) -> Iterator[Row]:
+    """Run all trials with both methods."""
     for method in SHOWN:
-        scene = _scene(method)
-        yield SESSION, method, _run(bar, SESSION, follow_path, scene)
-        for name, (interpolation, poses) in list_paths().items():
-            yield name, method, _run(bar, name, follow_path, with_path(scene, poses, interpolation))
-        for speed in DRAGS:
-            name = f"ridge, {1e3 * speed:g} mm/s"
-            yield name, method, _run(bar, name, follow_drag, scene, speed)
-        for number, (interpolation, poses) in enumerate(random, 1):
-            name = f"random {number}"
-            yield name, method, _run(bar, name, follow_path, with_path(scene, poses, interpolation))
+        for trial in trials:
+            yield trial.name, method, _run(bar, trial.name, _measure, _scene(method), trial)
 
 
 def _run_models(bar: Callable[[str], None]) -> Iterator[Row]:
@@ -138,7 +147,7 @@ def _run_models(bar: Callable[[str], None]) -> Iterator[Row]:
         yield name, "hybrid", _run(bar, name, run_mismatched, true, model)
     for name, key, value in (("noise 2 mN", "force_noise", "2 mN"), ("delay 1 period", "delay", "1")):
         scene = load(find(SESSION), [Setting("control.method", "hybrid"), Setting(f"sensors.{key}", value)])
-        yield name, "hybrid", _run(bar, name, follow_path, scene)
+        yield name, "hybrid", _run(bar, name, _measure, scene, Trial("session", "session"))
 
 
 def _compare_cost(turns: int) -> dict[str, float]:
@@ -160,12 +169,12 @@ def _text(
     yield made_with()
     names = list(dict.fromkeys(name for name, _, _ in rows))
     by = {(name, method): found for name, method, found in rows}
-    yield "\nRFD, N, of a whole session, or of a drag where a speed is given. Lag: mean; largest of a drag.\n"
+    yield "\nRFD, N, of a whole session, or of a drag where a speed is given. Lost: but for lift-offs.\n"
     lines = []
     for name in names:
         one, three = by[name, "virtual_master"], by[name, "hybrid"]
-        lines.append([name, *_numbers(one), *_numbers(three), f"{three.rfd / one.rfd:.2f}"])
-    columns = ("RFD", "lost", "lag mm", "largest N")
+        lines.append([name, *_numbers(one), *_numbers(three), f"{_divide(three, one):.2f}"])
+    columns = ("RFD", "lag mm", "max lag", "max N", "lost")
     yield from table(("", *(f"I {c}" for c in columns), *(f"III {c}" for c in columns), "III / I"), lines)
     for title, some in (
         ("Method III at speeds that Method I does not follow", fast),
@@ -179,10 +188,17 @@ def _text(
     yield f"\nProcessor time a control period, medians by turns: {listed}; ratio {ratio:.2f}"
 
 
-def _numbers(found: Outcome) -> list[str]:
+def _numbers(found: Figures) -> list[str]:
     """Return the cells of a table."""
-    lag = "" if math.isnan(found.lag) else f"{1e3 * found.lag:.2f}"
-    return [f"{found.rfd:.4f}", f"{found.losses:d}", lag, f"{found.largest:.2f}"]
+    lags = [found.get("lag_mean"), found.get("lag_max")]
+    numbers = [found["rfd"], *(None if lag is None else 1e3 * lag for lag in lags), found["max_total_force"]]
+    cells = ["" if number is None else f"{number:.4f}" for number in numbers]
+    return [*cells, f"{found['losses'] or 0.0:g}"]
+
+
+def _divide(one: Figures, other: Figures) -> float:
+    """Return the ratio of two RFDs."""
+    return (one["rfd"] or math.nan) / (other["rfd"] or math.nan)
 
 
 def _draw(rows: list[Row], out: Path) -> None:
@@ -191,7 +207,7 @@ def _draw(rows: list[Row], out: Path) -> None:
     with empty(7.2, 0.8 + 0.22 * len(names), STYLE, layout="constrained") as figure:
         panel = figure.subplots()
         for method, (label, color, mark) in SHOWN.items():
-            found = {name: outcome.rfd for name, own, outcome in rows if own == method}
+            found = {name: outcome["rfd"] or math.nan for name, own, outcome in rows if own == method}
             panel.plot(
                 [1e3 * found[name] for name in names], range(len(names)), mark, color=color, label=label
             )

@@ -5,16 +5,13 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import os
-import platform
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-import numpy as np
-from digiclay import __version__
 from digiclay.commands.arguments import add_command
+from digiclay.commands.machine import describe_machine as made_with
 from digiclay.commands.progress import Line, draw_share
 from digiclay.commands.refusals import refuse_unwritable
 from digiclay.commands.tables import table
@@ -92,24 +89,6 @@ def progress(arguments: argparse.Namespace, label: str, total: int) -> Steps:
         Steps of the bar.
     """
     return Steps(io.StringIO() if arguments.quiet else sys.stderr, label, total)
-
-
-def made_with(*packages: str) -> str:
-    """Return one line: versions, and the kind of machine."""
-    import importlib.metadata
-
-    versions = [f"digiclay {__version__}", f"Python {platform.python_version()}", f"numpy {np.__version__}"]
-    versions += [f"{name} {importlib.metadata.version(name)}" for name in packages]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return ", ".join(versions) + f"; {platform.system()}, {platform.machine()}, {_processor()}, {cores} cores"
-
-
-def _processor() -> str:
-    """Return the processor's name where the system tells it."""
-    told = Path("/proc/cpuinfo")
-    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown processor"
 
 
 def kept(out: Path | None, name: str, text: str, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from digiclay.core.studies.method_trials import find_free_speed
 from digiclay.core.studies.speed_limits import Criterion, Follows
 
-from . import scenes
 from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict
 from .results import PAPER_SPEED, WAYS, Results
 from .scenes import METHODS
@@ -47,7 +47,7 @@ def largest_speed(results: Results) -> Claim:
     fast, lift = results.fastest, results.lifting
     drag = ", ".join(f"{SHORT[method]} {speed(fast[method])}" for method in METHODS)
     up = ", ".join(f"{SHORT[method]} {speed(lift[method])}" for method in METHODS)
-    free = scenes.free_speed(results.printed[ONE].scene)
+    free = find_free_speed(results.printed[ONE].scene)
     control = results.printed[TWO].scene.control
     gain = getattr(control, "force_gain", 0.0) * getattr(control, "force_setpoint", 0.0)
     why = (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from . import scenes
+from digiclay.core.studies.method_trials import find_free_speed
+
 from .claim import MM, ONE, SHORT, TWO, Claim, times, verdict
 from .results import PAPER_SPEED, Results, Swing, onset_among
 from .scenes import METHODS, PRESSED
@@ -113,7 +114,7 @@ def onset(results: Results) -> Claim:
         "error hardly moves a pin: only a transient starts the cycle."
     )
     if results.quicker:
-        free = scenes.free_speed(results.printed[ONE].scene)
+        free = find_free_speed(results.printed[ONE].scene)
         why += (
             f" The device decides where: with pins of {results.quicker_speed * MM:.1f} instead of "
             f"{free * MM:.1f} mm/s without load, slower valves and a longer dead time, at K_p = "

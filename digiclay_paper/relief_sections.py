@@ -1,11 +1,6 @@
 """Intended relief of the session, and the deviation of the formed one, section by section.
 
-Asked for is what the method's own blister, carried along the finger's path, leaves behind:
-``H_j = H_rest + max_t p(d_j(t)) (z(t) - H_rest)`` for a boss, with the least instead of the
-greatest for a crease; p is the blister's profile, d_j the distance from cell j to the finger, and
-z the height of the fingertip's lowest point. Method II counts its blister from the nearest cell
-under the finger: there d_j is less by how far the middles of the cells of a disc reach that has as
-many cells as follow, the disc's radius less half a pitch.
+`core/studies/nominal_relief.py` states what is asked for.
 """
 
 from __future__ import annotations
@@ -15,14 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.blister import Blister
-from digiclay.core.metrics.summary import compute_cell_area, find_contact_rows
-from digiclay.core.scene.schema import Scene
+from digiclay.core.metrics.summary import find_contact_rows
 from digiclay.core.session.run_scene import Result
+from digiclay.core.studies.nominal_relief import evaluate_share, find_nominal, measure_reach
 from numpy.typing import NDArray
 
 from .results import Session
-from .scenes import METHODS
 
 __all__ = ["LIMITS", "Limits", "Section", "asked_for", "blister_section", "sections"]
 
@@ -122,34 +115,10 @@ class Section(NamedTuple):
 
 def asked_for(session: Session) -> Floats:
     """Return the heights over the bed at rest that the session asks for, shape (n,), m."""
-    history, blister = session.history, session.scene.blister
-    assert blister is not None  # both methods have one
-    rest = session.scene.actuator.rest_height
+    history = session.history
     touching = find_contact_rows(history["total_force"]) & ~np.isnan(history["set_point"])
-    tip = history["fingertip"][touching]
-    patch = _reach(session.scene, history["position"], history["following"][touching])
-    boss, crease = np.zeros(len(history["position"])), np.zeros(len(history["position"]))
-    for place, over, wide in zip(tip[:, :2], tip[:, 2] - rest, patch, strict=True):
-        swept = _share(blister, np.hypot(*(history["position"] - place).T) - wide) * over
-        np.maximum(boss, swept, out=boss)
-        np.minimum(crease, swept, out=crease)
-    # What was pressed in first and raised afterwards is a boss.
-    return np.where(boss > 0.0, boss, crease)
-
-
-def _reach(scene: Scene, position: Floats, following: Floats) -> Floats:
-    """Return how far the middles of the cells under the finger reach, m; 0 for Method I."""
-    if scene.method != METHODS[1]:
-        return np.zeros(len(following))
-    side = np.sqrt(compute_cell_area(position) or 0.0)
-    return np.asarray(np.maximum(side * (np.sqrt(following / np.pi) - 0.5), 0.0))
-
-
-def _share(blister: Blister, distance: Floats) -> Floats:
-    """Return the profile p(d), 0 outside the blister."""
-    inside = np.maximum(distance, 0.0)
-    share: Floats = np.where(inside < blister.radius, np.maximum(blister.evaluate_profile(inside), 0.0), 0.0)
-    return share
+    path = {"fingertip": history["fingertip"][touching], "position": history["position"]}
+    return find_nominal(session.scene, path, history["following"][touching])
 
 
 def sections(session: Session) -> Iterator[Section]:
@@ -186,10 +155,10 @@ def blister_section(done: Result) -> Section:
     place, rest = history["position"], scene.actuator.rest_height
     tip, row = history["fingertip"][-1], np.abs(history["position"][:, 1]) < ON
     following = np.count_nonzero(history["mode"][-1:] == Mode.FORCE_FOLLOW, axis=1)
-    distance = np.hypot(*(place - tip[:2]).T) - _reach(scene, place, following)
+    distance = np.hypot(*(place - tip[:2]).T) - measure_reach(scene, place, following)
     wanted, sign = float(tip[2]) - rest, 1.0 if tip[2] > rest else -1.0
     found, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
-    asked = _share(scene.blister, distance)[row] * found[middle]
+    asked = evaluate_share(scene.blister, distance)[row] * found[middle]
     high = sign * float(found[middle])
     rim = float((sign * found[row]).max()) - high
     along = place[row, 0]

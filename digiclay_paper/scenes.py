@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.model.trajectory import Path
-from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_scene import Result
+from digiclay.core.studies.method_trials import find_free_speed
 
 __all__ = [
     "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "at_rest", "blister", "fastest_lift",
-    "free_speed", "held", "slowed", "unintended",
+    "held", "slowed",
 ]  # fmt: skip
 
 METHODS = ("virtual_master", "cell_states")
@@ -127,15 +126,9 @@ def slowed(session: Scene, factor: float) -> Scene:
     return session.with_sections(trajectory=replace(path, waypoints=way), simulation=lasting)
 
 
-def free_speed(session: Scene) -> float:
-    """Return how fast a pin without load rises through an open valve, m/s."""
-    fastest: float = assemble(session).fastest
-    return fastest
-
-
 def fastest_lift(session: Scene) -> float:
     """Return the greatest speed upward on the ways a pin could follow on the whole, m/s."""
-    path, limit, highest = session.section("trajectory"), free_speed(session), 0.0
+    path, limit, highest = session.section("trajectory"), find_free_speed(session), 0.0
     way = path.trajectory()
     for start, end in pairwise(path.waypoints):
         span = end.time - start.time
@@ -143,11 +136,3 @@ def fastest_lift(session: Scene) -> float:
             moments = np.linspace(start.time, end.time, 201)
             highest = max(highest, float(np.diff(way.poses(moments)[:, 2]).max()) * 200.0 / span)
     return highest
-
-
-def unintended(done: Result) -> list[float]:
-    """Return when the finger was lost though it rose no faster than a pin can, s."""
-    limit, moments = free_speed(done.scene), done.history["time"]
-    rise = np.gradient(done.history["fingertip"][:, 2], moments)
-    lost = done.loss_times if done.loss_times is not None else np.empty(0)
-    return [float(t) for t in lost if rise[(moments > t - 0.2) & (moments <= t)].max() <= limit]

@@ -15,6 +15,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_result import Result, select_rows
 from digiclay.core.session.run_scene import run
+from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
 
 from . import scenes
@@ -62,7 +63,7 @@ def simulate(extent: Extent, told: Told) -> Results:
         told(f"oscillation, a quicker device, K_f {gain:g} 1/N")
         found, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
         results.quicker.append(found)
-        results.quicker_speed = scenes.free_speed(done.scene)
+        results.quicker_speed = find_free_speed(done.scene)
     for gain in extent.cell_gains:
         told(f"oscillation, Method II, K_FF {gain:g} 1/N")
         results.cell_swings.append(_swing(gain, extent.position_gains[0], None, METHODS[1])[0])
@@ -164,7 +165,7 @@ def _boiled_down(done: Result) -> Session:
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
-    return Session(done.scene, kept, detail, done.figures, scenes.unintended(done), followers)
+    return Session(done.scene, kept, detail, done.figures, find_unintended_losses(done), followers)
 
 
 def _swing(

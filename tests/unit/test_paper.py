@@ -11,6 +11,7 @@ from digiclay.core.control.transitions import BY_FORCE, BY_PLACE
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import Result
+from digiclay.core.studies.method_trials import find_free_speed, find_unintended_losses
 from digiclay.core.studies.speed_limits import Follows
 
 from digiclay_paper import scenes
@@ -126,7 +127,7 @@ def test_the_fastest_lift_of_a_slowed_session_is_as_many_times_slower() -> None:
 
 def test_the_fastest_lift_leaves_out_what_no_pin_could_follow() -> None:
     session = load(find(SESSION))
-    assert 0.0 < scenes.fastest_lift(session) < scenes.free_speed(session)
+    assert 0.0 < scenes.fastest_lift(session) < find_free_speed(session)
 
 
 @pytest.mark.parametrize(("speed", "times"), [(0.2, []), (5e-3, [0.5])])
@@ -135,7 +136,7 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float
     tip = np.zeros((201, 7))
     tip[:, 2] = speed * time
     done = Result(resolve({}), {"time": time, "fingertip": tip}, 200, 1.0, {}, np.array([0.5]))
-    assert scenes.unintended(done) == times
+    assert find_unintended_losses(done) == times
 
 
 def test_every_arrow_of_the_controller_is_a_row_of_the_page() -> None:

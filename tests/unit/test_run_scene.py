@@ -109,9 +109,9 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
     made = Result(
         result.scene, result.history, 40, 0.05, {**result.metrics, "rfd": 0.0612, "beyond_a_finger": ""}
     )
-    made.metrics.update(simulated=26.0, real_time_factor=21.6)
+    made.metrics.update(simulated=26.0, real_time_factor=21.6, rfd_jnd_least=0.567, rfd_jnd_most=1.02)
     made = Result(made.scene, made.history, 40, 1.204, made.metrics)
-    assert made.summary() == "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N"
+    assert made.summary() == "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND)"
 
 
 def test_the_summary_of_a_session_without_a_touch_says_so() -> None:

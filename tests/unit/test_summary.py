@@ -124,7 +124,8 @@ def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
     case = history(np.full(2001, 0.4))
     with_one, without = compute_metrics(case, WHOLE), compute_metrics(case, None)
     assert {name for name in METRICS if with_one[name] is not None and without[name] is None} == {
-        "set_point", "rfd", "rfd_shaping", "rfd_session", "force_overshoot", "settling_time"
+        "set_point", "rfd", "rfd_shaping", "rfd_session", "force_overshoot", "settling_time",
+        "rfd_jnd_least", "rfd_jnd_most",
     }  # fmt: skip
 
 
@@ -207,7 +208,7 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
     assert nothing == {
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
         "force_oscillation", "force_overshoot", "settling_time", "height_deviation", "ridge_offset",
-        "ridge_error", "ridge_unevenness",
+        "ridge_error", "ridge_unevenness", "rfd_jnd_least", "rfd_jnd_most", "ridge_unevenness_touch",
     }  # fmt: skip
     assert found["contact_share"] == 0.0
 

@@ -32,7 +32,7 @@ class Help(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 13
 
 
-def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
+def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it.
 
     Parameters
@@ -40,12 +40,14 @@ def add_scene(parser: argparse.ArgumentParser, default: str = "") -> None:
     parser : argparse.ArgumentParser
     default : str
         The scene where none is given; empty: one must be given.
+    optional : bool, optional
+        Whether SCENE may be missing, None then.
     """
     said = "a .toml file, a sample's name, or the folder of a run"
     if default:
         parser.add_argument("--scene", metavar="SCENE", default=default, help=f"{said}; default {default}")
     else:
-        parser.add_argument("scene", metavar="SCENE", help=said)
+        parser.add_argument("scene", metavar="SCENE", nargs="?" if optional else None, help=said)
     parser.add_argument(
         "--method", metavar="M",
         help="control method, also one of your own, mine.py:Mine: the same as --set control.method=M",

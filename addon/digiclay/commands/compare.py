@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.base.errors import ParameterError
+from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.base.run_folder import check_folder, write_folder
 from ..core.base.safe_names import find_name
@@ -28,6 +28,7 @@ from .arguments import METHOD, add_command, add_scene, load_by_option, settings_
 from .progress import Bar
 from .refusals import refuse_without
 from .stop import allow_interrupt
+from .suite import add_suite, list_suite_methods, run_suite
 from .tables import table as aligned
 
 __all__ = ["READ", "add", "table"]
@@ -37,8 +38,13 @@ examples:
   digiclay compare ridge_mound_valley
   digiclay compare slow_press --methods virtual_master,cell_states --speed --out both
   digiclay compare slow_press --method mine.py:Mine     a method of your own beside these two
+  digiclay compare --suite --out league
+  digiclay compare --suite --method mine.py:Mine --out mine
+  digiclay compare --suite --quick --methods virtual_master,hybrid --out look
 
-The folder holds compare.png and metrics.json; docs/metrics.md defines the metrics.
+The folder holds compare.png and metrics.json; docs/metrics.md defines the metrics. That of --suite
+holds index.html, the tables league.csv, trajectories.csv and results.csv, and points/, a small file
+for each finished trial; after Ctrl-C the same command continues (docs/suite.md).
 """
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, "")}
@@ -48,16 +54,22 @@ SPEEDS: dict[str, tuple[str, str]] = {
     "largest_lift_speed": ("m/s", "fastest lift straight up that is followed"),
 }
 Metrics = dict[str, float | None]
+#: Methods where none are named.
+DEFAULT = ("virtual_master", "cell_states")
+#: Options that need --suite.
+SUITE_ONLY = (
+    "trajectories", "repeats", "first_seed", "noise", "drags", "quick", "workers", "scheduler",
+)  # fmt: skip
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     said = "Run control methods on the same input, and compare their metrics."
     parser = add_command(commands, "compare", "compare control methods on the same input", EXAMPLES, said)
-    add_scene(parser)
+    add_scene(parser, optional=True)
     parser.add_argument(
-        "--methods", metavar="M,...", type=_methods, default=("virtual_master", "cell_states"),
-        help="default virtual_master,cell_states",
+        "--methods", metavar="M,...", type=_methods,
+        help="default virtual_master,cell_states; with --suite all that carry a blister",
     )  # fmt: skip
     parser.add_argument("--speed", action="store_true", help="also the largest tracking speeds")
     parser.add_argument(
@@ -65,6 +77,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--overwrite", action="store_true", help="replace an older folder at the end")
     parser.add_argument("--quiet", action="store_true", help="print errors only, without progress")
+    add_suite(parser)
     parser.set_defaults(carry_out=carry_out)
 
 
@@ -84,7 +97,11 @@ def _methods(text: str) -> tuple[str, ...]:
 
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run every method, print the table, write the folder."""
-    path, methods = find(arguments.scene), _list_methods(arguments)
+    if arguments.suite:
+        words = _list_words(arguments, list_suite_methods())
+        return run_suite(arguments, _list_methods(words), [word for word, _ in words])
+    _refuse_options_of_suite(arguments)
+    path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
     out: Path = arguments.out or Path(f"{find_name(path)}_compare")
     check_folder(out, overwrite=arguments.overwrite)
     refuse_without("matplotlib", "digiclay compare", "pip install digiclay[plots]")
@@ -116,11 +133,24 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _list_methods(arguments: argparse.Namespace) -> list[str]:
+def _list_words(arguments: argparse.Namespace, default: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the words that name methods, each with its option."""
+    words = [(word, "--methods") for word in arguments.methods or default]
+    return [*words, (arguments.method, "--method")] if arguments.method is not None else words
+
+
+def _list_methods(words: Sequence[tuple[str, str]]) -> list[str]:
     """Return the names of the methods to compare; those of one's own are loaded."""
-    words = [(word, "--methods") for word in arguments.methods]
-    words += [(arguments.method, "--method")] if arguments.method is not None else []
     return list(dict.fromkeys(load_by_option(word, option) for word, option in words))
+
+
+def _refuse_options_of_suite(arguments: argparse.Namespace) -> None:
+    """Refuse what needs --suite, and a missing scene."""
+    for name in SUITE_ONLY:
+        if getattr(arguments, name) not in (None, False):
+            raise OutputError(f"--{name.replace('_', '-')} is for --suite.")
+    if arguments.scene is None:
+        raise OutputError("The following arguments are required: SCENE, or --suite.")
 
 
 def _scene(arguments: argparse.Namespace, path: Path, method: str) -> Scene:

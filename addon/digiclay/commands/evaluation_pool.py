@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -13,11 +14,13 @@ from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record, evaluate_bundle
 from ..core.studies.series import finish
+from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
 from .evaluator import Evaluator, evaluate_elsewhere
+from .progress import Counted
 from .refusals import refuse_without
 from .worker import Processes, count_cores, in_blender
 
-__all__ = ["Pool", "add_pool", "open_pool", "read_count"]
+__all__ = ["Pool", "add_pool", "finish_points", "open_pool", "read_count"]
 
 #: The most processes of a command.
 MOST = 61
@@ -142,3 +145,56 @@ def open_pool(
         else:
             task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
         yield Pool(threads, task, processes.stopped)
+
+
+def finish_points(
+    arguments: argparse.Namespace,
+    label: str,
+    folder: Folder,
+    bundles: Sequence[Sequence[Point]],
+    keys: Sequence[str],
+    stop: Callable[[], bool],
+    *,
+    errors: bool = False,
+) -> dict[int, Record]:
+    """Run the points that are not in a folder yet, with a progress line; return the records of all.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        With the options of `add_pool`, and `quiet`.
+    label : str
+        At the beginning of the line.
+    folder : Folder
+    bundles : sequence of sequence of Point
+    keys : sequence of str
+        The varied parameters.
+    stop : callable
+        Whether somebody asks to stop.
+    errors : bool, optional
+        Whether errors of the points are estimated.
+    """
+    records = select_done(folder.read_records(), errors=errors)
+    todo, total = find_unfinished(bundles, records), sum(len(bundle) for bundle in bundles)
+    bar = Counted(sys.stderr, label, "points", len(records))
+
+    def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
+        folder.keep_bundle(bundle, found, keys, records)
+
+    def fail(bundle: Sequence[Point], why: str) -> None:
+        # Told, but not kept: the same command tries them again.
+        for point in bundle:
+            records.setdefault(point.index, {"error": why})
+        which = (
+            f"point {bundle[0].index}" if len(bundle) == 1 else f"{len(bundle)} points from {bundle[0].index}"
+        )
+        bar.tell(f"failed: {which}: {why}")
+
+    def draw(note: str) -> None:
+        if not arguments.quiet:
+            bar(len(records), total, note)
+
+    if todo:
+        with bar, open_pool(arguments, len(todo), stop, draw, errors=errors) as pool:
+            pool.evaluate(todo, keep, fail)
+    return records

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
-__all__ = ["Card", "page"]
+__all__ = ["Card", "page", "wrap"]
 
 STYLE = """\
 :root { color-scheme: light dark; --ink: #1a1f26; --faded: #5a626d; --paper: #f4f5f6; --card: #fff;
@@ -30,6 +30,13 @@ dt { color: var(--faded); } dd { margin: 0; text-align: right; font-variant-nume
 a { color: inherit; margin-right: .7rem; font-size: .87rem; } a.picture { margin: 0; }
 .failed { border-color: var(--bad); } .failed strong { color: var(--bad); }
 .failed span { overflow-wrap: anywhere; }
+table { border-collapse: collapse; margin: .6rem 0 1.2rem; font-size: .87rem;
+  display: block; overflow-x: auto; }
+th, td { border-bottom: 1px solid var(--edge); padding: .2rem .7rem .2rem 0; text-align: right;
+  vertical-align: top; font-variant-numeric: tabular-nums; }
+th { color: var(--faded); font-weight: normal; }
+th:first-child, td:first-child { text-align: left; }
+p > img { max-width: 100%; background: #fff; }
 """
 
 
@@ -72,6 +79,26 @@ def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> s
     refresh : int, optional
         Seconds after which a browser loads the page again; 0: never.
     """
+    body = [
+        f"<p>{_safe(summary)}</p>",
+        "<main>",
+        *(_card(card) for card in cards),
+        "</main>",
+    ]
+    return wrap(title, body, refresh)
+
+
+def wrap(title: str, body: Sequence[str], refresh: int = 0) -> str:
+    """Return a self-contained page.
+
+    Parameters
+    ----------
+    title : str
+    body : sequence of str
+        Lines of HTML below the title.
+    refresh : int, optional
+        Seconds after which a browser loads the page again; 0: never.
+    """
     again = [f'<meta http-equiv="refresh" content="{refresh}">'] if refresh else []
     return "\n".join(
         [
@@ -82,10 +109,8 @@ def page(title: str, summary: str, cards: Sequence[Card], refresh: int = 0) -> s
             f"<title>{_safe(title)}</title>",
             f"<style>\n{STYLE}</style></head><body>",
             f"<h1>{_safe(title)}</h1>",
-            f"<p>{_safe(summary)}</p>",
-            "<main>",
-            *(_card(card) for card in cards),
-            "</main></body></html>",
+            *body,
+            "</body></html>",
             "",
         ]
     )

@@ -13,25 +13,17 @@ from .. import __version__
 from ..core.base.errors import DigiclayError, OutputError, ParameterError
 from ..core.base.whole_files import write_whole
 from ..core.scene.scene_source import Setting, find
-from ..core.studies.axes import Axis, Column, Point, make_columns, make_points, read_axis
+from ..core.studies.axes import Axis, Column, make_columns, make_points, read_axis
 from ..core.studies.evaluation import (
     ERRORS,
-    Bundles,
     Record,
     explain_failed_batches,
     find_figure,
     make_bundles,
 )
-from ..core.studies.sweep_plan import (
-    Folder,
-    find_unfinished,
-    format_table,
-    make_grid,
-    open_sweep,
-    select_done,
-)
+from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
 from .arguments import add_scene, name_methods, settings_of
-from .evaluation_pool import add_pool, open_pool
+from .evaluation_pool import add_pool, finish_points
 from .exit_codes import STOPPED
 from .progress import Counted
 from .stop import Stop
@@ -86,7 +78,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         bundles = make_bundles(points, errors=errors)
     with open_sweep(arguments.out, points, axes, __version__) as folder:
         with Stop() as stop:
-            records = _finish(arguments, folder, bundles, axes, stop, errors=errors)
+            every = (*bundles.batches, *bundles.alone)
+            keys = [one.key for one in axes]
+            records = finish_points(arguments, "sweep", folder, every, keys, stop, errors=errors)
             if stop() and len(records) < len(points):
                 if not arguments.quiet:
                     said = f"{len(records)} of {len(points)} points are done and kept in {folder.path}"
@@ -94,11 +88,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
                 return STOPPED
         columns = make_columns(points, axes)
         values = itertools.product(*(one.values for one in columns))
-        every = [record for _, record in sorted(records.items())]
-        table = format_table([(one.key, one.unit) for one in columns], values, every, names)
+        found = [record for _, record in sorted(records.items())]
+        table = format_table([(one.key, one.unit) for one in columns], values, found, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
         notes = _draw_pictures(arguments.out, columns, axes, records, names)
-        failed = [record["error"] for record in every if "error" in record]
+        failed = [record["error"] for record in found if "error" in record]
         if len(failed) == len(points):
             raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
         if not arguments.quiet:
@@ -116,47 +110,6 @@ def _read_settings(arguments: argparse.Namespace, axes: Sequence[Axis]) -> list[
         if key in varied:
             raise ParameterError(f"--vary {key}", "", f"must not be given to {option} as well", key)
     return settings
-
-
-def _finish(
-    arguments: argparse.Namespace,
-    folder: Folder,
-    bundles: Bundles,
-    axes: Sequence[Axis],
-    stop: Stop,
-    *,
-    errors: bool,
-) -> dict[int, Record]:
-    """Run the points that are not in the folder yet; return the records of all."""
-    records = select_done(folder.read_records(), errors=errors)
-    every = (*bundles.batches, *bundles.alone)
-    todo = find_unfinished(every, records)
-    total = sum(len(bundle) for bundle in every)
-    keys = [one.key for one in axes]
-
-    def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
-        folder.keep_bundle(bundle, found, keys, records)
-
-    bar = Counted(sys.stderr, "sweep", "points", len(records))
-
-    def fail(bundle: Sequence[Point], why: str) -> None:
-        # Told, but not kept: the same command tries them again.
-        for point in bundle:
-            records.setdefault(point.index, {"error": why})
-        which = (
-            f"point {bundle[0].index}" if len(bundle) == 1 else f"{len(bundle)} points from {bundle[0].index}"
-        )
-        bar.tell(f"failed: {which}: {why}")
-
-    if todo:
-
-        def draw(note: str) -> None:
-            if not arguments.quiet:
-                bar(len(records), total, note)
-
-        with bar, open_pool(arguments, len(todo), stop, draw, errors=errors) as pool:
-            pool.evaluate(todo, keep, fail)
-    return records
 
 
 def _draw_pictures(

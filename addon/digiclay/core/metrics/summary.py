@@ -25,6 +25,7 @@ from .finger_path import (
     sum_cells,
 )
 from .force import compute_contact_loss_share, compute_rfd, find_first_touch, measure_touchdown
+from .perception import PERCEPTION, perceive
 from .signal import compute_deviation, compute_mean, compute_weights, measure_oscillation
 
 __all__ = [
@@ -80,6 +81,7 @@ METRICS: dict[str, tuple[str, str]] = {
     "height_range": ("m", "highest less lowest: the relief that was formed"),
     "raised_volume": ("m3", "volume formed above the initial surface"),
     "sunk_volume": ("m3", "volume formed below the initial surface"),
+    **PERCEPTION,
 }
 
 
@@ -198,9 +200,10 @@ def compute_metrics_from_sums(
         "raised_volume": None if area is None else area * float(np.sum(np.maximum(formed, 0.0))),
         "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
     }
-    return {
+    known = {
         name: value if value is not None and np.isfinite(value) else None for name, value in found.items()
     }
+    return known | perceive(known["rfd"], known["set_point"], known["ridge_unevenness"]).figures()
 
 
 def _typical(set_point: SetPoint | None, wanted: Floats, weight: Floats) -> float | None:

@@ -83,6 +83,8 @@ class Result:
         """Return the session in one line."""
         rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
         felt = f", RFD {rfd:.2g} N" if rfd is not None else ", no contact" if share == 0.0 else ""
+        if self.metrics.get("rfd_jnd_least") is not None:
+            felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
         simulated, factor = self.metrics["simulated"], self.metrics["real_time_factor"]
         end = " (incomplete: stopped)" if self.incomplete else ""
         errors = ""

@@ -58,12 +58,16 @@ class Point:
         A value on each axis.
     scene : Scene or None
         None where the values do not go together; `error` says why.
+    measure : callable or None
+        What is measured of it, see `evaluation.evaluate`; None: the figures of its session. Told the scene
+        and whether somebody asks to stop; returns the record, None after a stop.
     """
 
     index: int
     words: tuple[str, ...]
     scene: Scene | None
     error: str = ""
+    measure: Callable[[Scene, Callable[[], bool] | None], dict[str, Any] | None] | None = None
 
 
 @dataclass(frozen=True)

@@ -193,6 +193,18 @@ def evaluate(
     return None if result.incomplete else _make_record(result, errors=errors)
 
 
+def _measure(
+    point: Point, scene: Scene, stopped: Callable[[], bool] | None, *, errors: bool
+) -> Record | None:
+    """Return the record of a point that runs by itself."""
+    if point.measure is None:
+        return evaluate(scene, stopped, errors=errors)
+    try:
+        return point.measure(scene, stopped)
+    except Exception as error:  # whatever is wrong with one point, the others are worth having
+        return {"error": describe_error(error)}
+
+
 def _make_record(result: Result, *, errors: bool) -> Record:
     """Return the record of a finished session; `ERRORS` only if they were requested."""
     names = [name for name in FIGURES if errors or name not in ERRORS]
@@ -223,7 +235,8 @@ def evaluate_bundle(
     StackWarning
         When a batch failed neither for lack of memory nor by an error a user can cause.
     """
-    scenes = [point.scene for point in bundle if point.scene]
+    alone = [point for point in bundle if point.scene]
+    scenes = [point.scene for point in alone if point.scene]
     if not scenes:  # values that do not go together are in no batch
         return [{"error": point.error} for point in bundle]
     records: list[Record | None] = [None] * len(scenes)
@@ -245,6 +258,6 @@ def evaluate_bundle(
             records = [None] * len(scenes)
     for number, scene in enumerate(scenes):
         if records[number] is None and not (stopped and stopped()):
-            record = evaluate(scene, stopped, errors=errors)
+            record = _measure(alone[number], scene, stopped, errors=errors)
             records[number] = {**record, ALONE: why} if record and why else record
     return records

@@ -18,7 +18,9 @@ from ..scene.schema import Scene
 from ..session.run_result import Result, select_rows
 from ..session.run_scene import run
 
-__all__ = ["Criterion", "Drag", "Follows", "Lift", "bisect", "find_largest_speed", "track"]
+__all__ = [
+    "Criterion", "Drag", "Follows", "Lift", "bisect", "find_largest_speed", "judge", "place_way", "track",
+]  # fmt: skip
 
 #: How long the finger rests at the ends of a phase, s.
 REST = 0.3
@@ -155,23 +157,59 @@ def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result
     speed : float
         m/s.
     """
+    placed, start, end = place_way(scene, way, speed)
+    done = run(placed)
+    return judge(done, start, end, speed), done
+
+
+def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
+    """Return a scene with a drag or a lift as its trajectory, and when the judged phase starts and ends, s.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its device and method; its trajectory is left aside.
+    way : Drag or Lift
+    speed : float
+        m/s.
+
+    Raises
+    ------
+    ParameterError
+        When the bed is smaller than the drag.
+    """
     _refuse_small(scene, way)
     path, start, end = way.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
-    done = run(scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()))
+    return scene.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
+
+
+def judge(done: Result, start: float, end: float, speed: float) -> Follows:
+    """Judge a phase of a run.
+
+    Parameters
+    ----------
+    done : Result
+    start, end : float
+        s.
+    speed : float
+        That it was run with, m/s.
+    """
     part = select_rows(done.history, start, end)
     sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
-    behind, wanted = measure_lag(sums, part["fingertip"]), find_set_point(scene.set_point, sums.following)
+    behind, wanted = (
+        measure_lag(sums, part["fingertip"]),
+        find_set_point(done.scene.set_point, sums.following),
+    )
     deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
     losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
-    judged = Follows(
+    return Follows(
         speed,
         losses,
         float(np.mean(total <= 0.0)),
         float(behind.max()) if len(behind) else float("inf"),
         float("inf") if deviates is None else deviates,
     )
-    return judged, done
 
 
 def _refuse_small(scene: Scene, way: Drag | Lift) -> None:

@@ -1,0 +1,90 @@
+"""Sessions with controllers made for another device than the one they control."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.metrics.force import compute_rfd
+from digiclay.core.model.control_interface import Controller
+from digiclay.core.model.set_point import find_set_point
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+
+__all__ = ["change_finger", "list_models", "run_controller", "run_mismatched"]
+
+
+def change_finger(scene: Scene, part: str, **factors: float) -> Scene:
+    """Return a scene with some numbers of a part of its finger times a factor.
+
+    Parameters
+    ----------
+    scene : Scene
+    part : {"fingertip", "contact", "relaxation"}
+    **factors : float
+    """
+    known = scene.section(part)
+    return scene.with_sections(
+        **{part: replace(known, **{name: getattr(known, name) * by for name, by in factors.items()})}
+    )
+
+
+def list_models(true: Scene) -> dict[str, Scene]:
+    """Return scenes that differ from the true one, for controllers made for them.
+
+    Parameters
+    ----------
+    true : Scene
+    """
+    sizes = ("length", "width", "height")
+    # The laminar flow goes with the fourth power of the diameter.
+    valves = {
+        f"valve × {share}": replace(
+            true, valve=replace(true.valve, orifice_diameter=true.valve.orifice_diameter * share**0.25)
+        )
+        for share in (0.7, 1.3)
+    }
+    return {
+        **valves,
+        "pulp stiffness × 0.5": change_finger(true, "contact", stiffness=0.5),
+        "pulp stiffness × 2": change_finger(true, "contact", stiffness=2.0),
+        "exponent × 0.7": change_finger(true, "contact", exponent=0.7),
+        "exponent × 1.4": change_finger(true, "contact", exponent=1.4),
+        "fingertip × 0.75": change_finger(true, "fingertip", **dict.fromkeys(sizes, 0.75)),
+        "fingertip × 1.3": change_finger(true, "fingertip", **dict.fromkeys(sizes, 1.3)),
+    }
+
+
+def run_mismatched(true: Scene, model: Scene) -> dict[str, float | None]:
+    """Return the figures of a session whose controller is made for another device.
+
+    Parameters
+    ----------
+    true : Scene
+        The device, and the fingertip's path.
+    model : Scene
+        The device that the controller is made for.
+    """
+    controller = assemble(model).controller
+    assert controller is not None  # scenes of the benchmark have one
+    return run_controller(true, controller)
+
+
+def run_controller(scene: Scene, controller: Controller) -> dict[str, float | None]:
+    """Return RFD, losses and largest force of a session with a controller in place of the scene's.
+
+    Parameters
+    ----------
+    scene : Scene
+    controller : Controller
+    """
+    system = replace(assemble(scene), controller=controller)
+    forces, losses = [], 0
+    for state in periods(system, scene.trajectories(), begin(system), scene.periods):
+        forces.append(float(state.active.all.force.sum()))
+        losses = state.memory.losses
+    total = np.array(forces)
+    wanted = find_set_point(scene.set_point, total)
+    rfd = compute_rfd(np.arange(total.size) * system.period, total, wanted)
+    return {"rfd": rfd, "losses": float(losses), "max_total_force": float(total.max())}

@@ -1,0 +1,262 @@
+"""Benchmark of methods: trials with repeated noise, their league, resumption, mistakes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import statistics
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.cli import main
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.studies.league import find_interval, find_league
+from digiclay.core.studies.method_trials import (
+    GROUPS,
+    OUTCOMES,
+    RANDOM,
+    Trial,
+    list_trials,
+    measure_trial,
+    place_trial,
+)
+from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
+from digiclay.core.studies.trial_paths import draw_drags, list_paths
+from digiclay.plots.league_figures import draw_measures, draw_rfd
+from scipy.stats import t as student
+
+from tests.own_methods import forgotten, write_method
+from tests.scene_files import folder_with, left, scene_text
+
+SCENE = scene_text(11, 11, (0.0, 0.041), (0.1, 0.036), (0.2, 0.036))
+BOTH = ("virtual_master", "hybrid")
+SHORT = ["compare", "my.toml", "--suite", "--trajectories", "session", "--repeats", "2", "--workers", "1"]
+
+
+def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+    """Return the comments and the rows of a table."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    comments = [line for line in lines if line.startswith("#")]
+    return comments, list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+@pytest.fixture(scope="module")
+def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A suite of two methods and two seeds over a short session, run once."""
+    folder = tmp_path_factory.mktemp("suite")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        folder_with(SCENE, folder, monkeypatch)
+        assert main([*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]) == 0
+    return folder / "league"
+
+
+def test_the_folder_holds_page_tables_and_plots(league: Path) -> None:
+    files = {path.name for path in league.iterdir() if not path.name.startswith(".")}
+    assert files == {
+        "index.html", "league.csv", "trajectories.csv", "results.csv", "rfd.svg", "measures.svg",
+        "suite.json", "points",
+    }  # fmt: skip
+
+
+def test_every_trial_is_a_row_and_differs_with_the_seed(league: Path) -> None:
+    _, rows = read_table(league / "results.csv")
+    assert [(row["method"], row["trajectory"], row["seed"]) for row in rows] == [
+        (method, "session", seed) for method in BOTH for seed in "12"
+    ]
+    assert all(row["error"] == "" for row in rows)
+    assert len({row["rfd (N)"] for row in rows}) == 4
+    assert all(float(row["period_cost (s)"]) > 0.0 for row in rows)
+
+
+def test_the_league_holds_means_and_student_s_intervals_of_the_results(league: Path) -> None:
+    _, rows = read_table(league / "results.csv")
+    _, ranks = read_table(league / "league.csv")
+    assert [row["rank"] for row in ranks] == ["1", "2"]
+    assert float(ranks[0]["rfd (N)"]) <= float(ranks[1]["rfd (N)"])
+    for row in ranks:
+        values = [float(one["rfd (N)"]) for one in rows if one["method"] == row["method"]]
+        assert float(row["rfd (N)"]) == pytest.approx(statistics.fmean(values))
+        half = student.ppf(0.975, 1) * statistics.stdev(values) / math.sqrt(2)
+        assert float(row["rfd, half width (N)"]) == pytest.approx(half)
+
+
+def test_tables_and_page_name_their_origin(league: Path) -> None:
+    identity = json.loads((league / "suite.json").read_text(encoding="utf-8"))["scenes"]
+    comments, _ = read_table(league / "league.csv")
+    page = (league / "index.html").read_text(encoding="utf-8")
+    for text in ("\n".join(comments), page):
+        assert identity in text
+        assert "digiclay compare my.toml --suite --methods virtual_master,hybrid" in text
+        assert "seeds 1 to 2" in text
+        assert "noise 2 mN" in text
+    assert "Student&#x27;s t" in page
+    assert 'src="rfd.svg"' in page
+
+
+def test_a_finished_suite_runs_no_trial_again(league: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(league.parent)
+    before = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
+    gone = league / "points" / "000003.json"
+    record = json.loads(gone.read_text(encoding="utf-8"))
+    gone.unlink()
+    assert main([*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]) == 0
+    after = {path: path.stat().st_mtime_ns for path in (league / "points").iterdir()}
+    assert [path for path in before if path != gone and before[path] != after[path]] == []
+    again = json.loads(gone.read_text(encoding="utf-8"))["figures"]
+    del again["period_cost"], record["figures"]["period_cost"]
+    assert again == record["figures"]
+
+
+def test_another_suite_does_not_go_into_the_folder(
+    league: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(league.parent)
+    assert main([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"]) == 2
+    assert capfd.readouterr().err == (
+        "league holds another suite (4 trials, digiclay 0.1.0): choose another folder with --out.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--suite", "--trajectories", "figure-eigth"], "Did you mean figure-eight?"),
+        (["--suite", "--trajectories", ","], "--trajectories must name at least one trajectory"),
+        (["--suite", "--repeats", "0"], "--repeats: must be a whole number from 1 to 100 (got '0')"),
+        (["--suite", "--repeats", "two"], "must be a whole number from 1 to 100 (got 'two')"),
+        (["--suite", "--drags", "-3"], "--drags: must be a whole number from 1 to 200"),
+        (["--suite", "--noise", "nan"], "--noise: sensors.force_noise must be a finite number"),
+        (["--suite", "--noise", "-1 mN"], "force_noise must be at least 0 N"),
+        (["--suite", "--noise", "0"], "--repeats must be 1 without noise (got 5)"),
+        (["--suite", "--trajectories", "ridge-15"], "must make the bed at least as wide as the drag"),
+        (["--suite", "--methods", "hybird"], "did you mean hybrid"),
+        (["--suite", "--method", "hybird"], "Did you mean hybrid?"),
+        (["--suite", "--overwrite"], "--overwrite is not for --suite"),
+        (["--suite", "--speed"], "--speed is not for --suite"),
+        (["--repeats", "2"], "--repeats is for --suite"),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(
+    arguments: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    folder_with(SCENE, tmp_path, monkeypatch)
+    code = main(["compare", "my.toml", *arguments])
+    err = capfd.readouterr().err
+    assert (code, err.count("\n"), said in err) == (2, 1, True), err
+    assert left(tmp_path) == []
+
+
+def test_a_method_of_one_s_own_enters_by_one_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder_with(SCENE, tmp_path, monkeypatch)
+    write_method(tmp_path)
+    with forgotten():
+        arguments = ["--methods", "virtual_master", "--method", "pad.py:SoftPad", "--repeats", "1"]
+        assert main([*SHORT, *arguments, "--out", "mine"]) == 0
+    _, ranks = read_table(tmp_path / "mine" / "league.csv")
+    # It asks for no force, so that it has no RFD, and is last.
+    assert [bool(row["rfd (N)"]) for row in ranks] == [True, False]
+    comments, _ = read_table(tmp_path / "mine" / "results.csv")
+    assert "--methods virtual_master,pad.py:SoftPad" in comments[1]
+
+
+def test_without_a_scene_compare_needs_the_suite(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare"]) == 2
+    assert capfd.readouterr().err == "The following arguments are required: SCENE, or --suite.\n"
+
+
+def test_an_interval_is_student_s_and_one_value_has_none() -> None:
+    found = find_interval([1.0, 2.0, None, 3.0, math.nan])
+    assert found
+    assert (found.mean, found.count) == (2.0, 3)
+    assert found.half == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(0.975, 2), table
+    single = find_interval([1.0])
+    assert single
+    assert single.half is None
+    assert find_interval([None, math.inf]) is None
+
+
+def test_the_league_counts_worse_trajectories_and_random_drags_as_one() -> None:
+    def figures(rfd: float, cost: float = 1e-4) -> dict[str, float | None]:
+        return {"rfd": rfd, "period_cost": cost, "max_total_force": 10.0 * rfd, "losses": 1.0}
+
+    table = {
+        ("one", "lift", 1): figures(0.1), ("one", "random-1", 1): figures(0.2),
+        ("one", "random-2", 1): figures(0.4), ("two", "lift", 1): figures(0.2, 2e-4),
+        ("two", "random-1", 1): figures(0.1, 2e-4), ("two", "random-2", 1): figures(0.1, 2e-4),
+        ("two", "lift-limit", 1): {"speed_limit": 24e-3}, ("one", "lift-limit", 1): {"speed_limit": None},
+    }  # fmt: skip
+    first, second = find_league(table, ["one", "two"])
+    assert (first.method, second.method) == ("two", "one")
+    means = [row.measures["rfd"].mean for row in (first, second) if row.measures["rfd"]]
+    assert means == pytest.approx([0.15, 0.2])
+    assert (first.worse, first.trajectories, second.worse) == (1, 3, None)
+    ratio, force = first.measures["cost_ratio"], first.measures["max_total_force"]
+    assert ratio
+    assert force
+    assert (ratio.mean, force.mean) == pytest.approx((2.0, 2.0))
+    assert second.measures["lift-limit"] is None
+    assert second.searched == {"lift-limit"}
+
+
+def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their_seed() -> None:
+    scene = resolve({"control": {"method": "virtual_master"}})
+    trials = list_trials(GROUPS, 3)
+    assert [trial.name for trial in trials if trial.group == RANDOM] == ["random-1", "random-2", "random-3"]
+    placed = {trial.name: place_trial(scene, trial)[0] for trial in trials}
+    assert all(one.recorder for name, one in placed.items() if "limit" not in name)
+    assert draw_drags(2) == draw_drags(3)[:2]
+    assert set(list_paths()) < set(GROUPS)
+    # The fingertip leaves the bed at the end of every path, so that pins come to their final heights.
+    for name in ("ridge-15", "dead-stop", "random-1"):
+        assert placed[name].trajectories()[0].poses(np.array([1e3]))[0, 2] > 75e-3
+
+
+def test_a_phase_is_judged_alone() -> None:
+    scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": "virtual_master"}})
+    placed, _ = place_trial(scene, Trial("lift", "lift"))
+    short = placed.with_sections(simulation=replace(placed.simulation, duration=2.5))
+    whole, part = measure_trial(short), measure_trial(short, phase=(2.0, 2.4))
+    assert whole
+    assert part
+    assert list(whole["figures"]) == list(part["figures"]) == list(OUTCOMES)
+    assert part["figures"]["rfd"] != whole["figures"]["rfd"]
+
+
+def test_a_relief_that_is_nominal_has_no_error() -> None:
+    scene = resolve({"layout": {"rows": 9, "columns": 25}, "control": {"method": "virtual_master"}})
+    line = np.linspace(-30e-3, 30e-3, 61)
+    tip = np.zeros((61, 7))
+    tip[:, 0], tip[:, 2] = line, scene.actuator.rest_height + 8e-3
+    place = assemble(scene).grid.positions
+    following = np.full(61, 5)
+    history = {"fingertip": tip, "position": place, "total_force": np.full(61, 0.4)}
+    rest = scene.actuator.rest_height
+    # One row in four is taken.
+    thin = {**history, "fingertip": tip[::4]}
+    history["height"] = (rest + find_nominal(scene, thin, following[::4], 1.5e-3))[None]
+    assert measure_relief(scene, history, following, 1.5e-3).largest == pytest.approx(0.0, abs=1e-12)
+    off = measure_relief(scene, history, following, 1.0e-3)
+    assert off.largest == pytest.approx(0.5e-3)
+    assert measure_relief(scene, history, following, None).rms is None
+
+
+def test_every_method_has_its_mark_and_its_color() -> None:
+    table = {
+        (method, name, seed): {"rfd": 0.01 * (i + 1) + 0.001 * seed, "set_point": 0.4, "lag_mean": 1e-3}
+        for i, method in enumerate(BOTH) for name in ("lift", "surface") for seed in (1, 2)
+    }  # fmt: skip
+    figure = draw_rfd(table, BOTH)
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert sorted(labels) == ["hybrid", "one JND of the set point", "virtual_master"]
+    measures = draw_measures(find_league(table, BOTH), BOTH)
+    assert [axes.get_label() for axes in measures.axes] == ["lag_mean"]
