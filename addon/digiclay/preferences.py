@@ -7,8 +7,10 @@ from typing import Any
 from .compat import bpy
 from .device import palettes
 from .overlay.placement import CORNERS
+from .settings import own_folder
+from .settings.declared import title
 
-__all__ = ["Choices", "Preferences", "get", "register", "unregister"]
+__all__ = ["Choices", "Preferences", "get", "register", "take_methods", "unregister"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,10 @@ class Choices:
         Whether the start of a session takes the Press tool in hand.
     overlay_corner : str
         A key of `overlay.placement.CORNERS`.
+    run_own_methods : bool
+        Whether the Python files of the folder are run, when Blender starts and after a change.
+    methods_folder : str
+        Folder of control methods of one's own; as Blender has paths.
     """
 
     redraw_rate: int = 30
@@ -34,6 +40,8 @@ class Choices:
     palette: str = palettes.DEFAULT
     take_press_tool: bool = True
     overlay_corner: str = "top_left"
+    run_own_methods: bool = False
+    methods_folder: str = ""
 
 
 def take_palette(preferences: Any, context: Any) -> None:
@@ -58,6 +66,20 @@ def redraw_views(preferences: Any, context: Any) -> None:
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             area.tag_redraw()
+
+
+def take_methods(preferences: Any, context: Any) -> None:
+    """Run the files of the folder of own control methods where that is allowed; else take them back.
+
+    Parameters
+    ----------
+    preferences : bpy.types.AddonPreferences
+    context : bpy.types.Context
+    """
+    if preferences.run_own_methods:
+        own_folder.load(bpy.path.abspath(preferences.methods_folder))
+    else:
+        own_folder.clear()
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -105,6 +127,22 @@ class Preferences(bpy.types.AddonPreferences):
         default=Choices.overlay_corner,
         update=redraw_views,
     )
+    run_own_methods: bpy.props.BoolProperty(
+        name="Run Own Methods",
+        description=(
+            "Run all Python files of a folder, now and whenever Blender starts: "
+            "the control methods in them are offered in the panel Control"
+        ),
+        default=Choices.run_own_methods,
+        update=take_methods,
+    )
+    methods_folder: bpy.props.StringProperty(
+        name="Folder",
+        description="Folder with Python files of control methods",
+        default=Choices.methods_folder,
+        subtype="DIR_PATH",
+        update=take_methods,
+    )
 
     def draw(self, context: Any) -> None:
         """Draw the preferences."""
@@ -115,6 +153,25 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "palette")
         column.prop(self, "take_press_tool")
         column.prop(self, "overlay_corner")
+        column.separator()
+        column.prop(self, "run_own_methods")
+        if self.run_own_methods:
+            self._draw_methods(column)
+
+    def _draw_methods(self, column: Any) -> None:
+        """Draw the folder of own methods, a warning, what was loaded, and what was refused."""
+        warning = column.column()
+        warning.alert = True
+        warning.label(text="Every Python file in this folder is run with all your rights:", icon="ERROR")
+        warning.label(text="choose a folder that only you can write to, with code that you have read.")
+        row = column.row(align=True)
+        row.prop(self, "methods_folder")
+        row.operator("digiclay.methods_reload", text="", icon="FILE_REFRESH")
+        found = own_folder.read_present()
+        for name in found.names:
+            column.label(text=title(name), icon="CHECKMARK", translate=False)
+        for line in found.refused:
+            column.label(text=line, icon="CANCEL", translate=False)
 
 
 def get(context: Any) -> Any:
@@ -130,10 +187,12 @@ def get(context: Any) -> Any:
 
 
 def register() -> None:
-    """Register the preferences."""
+    """Register the preferences, and load the methods of the folder where they allow it."""
     bpy.utils.register_class(Preferences)
+    take_methods(get(bpy.context), bpy.context)
 
 
 def unregister() -> None:
     """Undo `register`."""
+    own_folder.clear()
     bpy.utils.unregister_class(Preferences)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import bridge, preferences
-from ..core.base.errors import DigiclayError, DivergenceError
+from ..core.base.errors import DigiclayError, DivergenceError, MethodError
 from ..device import display, unit, view
 from ..device.instant import find_ellipsoid
 from ..recorded import takes
@@ -180,7 +180,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         # The finger of a stroke is where the session has put it.
         pose = session.pose if session.strokes else bridge.pose(view.fingertip_of(bed))
         later = sculpting.advance(session, pose, now, most, display.picked_pins(bed))
-    except DivergenceError as error:
+    except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
         notes.append(Note("ERROR", localize("The session of {} is paused: {}", bed.name, error)))

@@ -22,6 +22,7 @@ from . import (
     press_presets,
     press_shape,
     press_stroke,
+    reload_methods,
     session_actions,
     session_loop,
     session_start,
@@ -90,6 +91,7 @@ CLASSES: tuple[type, ...] = (
     play_strokes.PlayStrokes,
     bake_session.Bake,
     bake_session.FreeBake,
+    reload_methods.ReloadMethods,
 )
 #: Entries in Blender's own menus: the menu, and the function that draws the entry.
 MENUS = (

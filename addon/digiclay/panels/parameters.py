@@ -6,13 +6,15 @@ from typing import Any
 
 from ..compat import bpy
 from ..core.base.quantity import list_quantities
-from ..core.control.methods import METHODS
+from ..core.control.methods import list_methods
 from ..core.scene.schema import NEEDS, OPTIONAL, import_parameters
 from ..core.scene.toml_table import PRESETS
 from ..live import running
 from ..settings import own_presets, properties
+from ..settings.chosen_method import method_of, method_property
 from ..settings.declared import title
 from ..settings.properties import part_group
+from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines
 
 __all__ = ["CLASSES", "Control", "Device", "Finger", "Presets", "Start", "section_panel"]
@@ -109,7 +111,12 @@ class Control(Panel, bpy.types.Panel):
         settings = bed_of(context).digiclay
         row = self.layout.row()
         row.active = settings.use_control
-        row.prop(settings, "method")
+        row.prop(settings, method_property(settings))
+        method = method_of(settings)
+        if method not in list_methods():
+            draw_lines(
+                self.layout, localize("{}: no such method is loaded. See the preferences", method), "ERROR"
+            )
 
 
 def section_panel(section: str, parent: str, order: int, words: str = "", closed: bool = True) -> type:
@@ -138,11 +145,12 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
 
         @classmethod
         def poll(cls, context: Any) -> bool:
-            """Show a blister only where the method forms one."""
+            """Show a blister only where the method forms one, and parameters of a method that is known."""
             bed = bed_of(context)
-            return bed is not None and (
-                section != "blister" or METHODS[bed.digiclay.method].blister is not None
-            )
+            if bed is None or section not in ("blister", "control"):
+                return bed is not None
+            method = list_methods().get(method_of(bed.digiclay))
+            return method is not None and (section == "control" or method.blister is not None)
 
         def draw_header(self, context: Any) -> None:
             if section in OPTIONAL:
@@ -153,7 +161,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
             column = self.layout.column(align=True)
             column.active = in_use(settings, section)
             group = part_group(settings, section)
-            for name in list_quantities(import_parameters(section, settings.method)):
+            for name in list_quantities(import_parameters(section, method_of(settings))):
                 place = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.
                 place.use_property_split = group.bl_rna.properties[name].type in BESIDE

@@ -8,12 +8,13 @@ from typing import Any
 from .. import bridge
 from ..compat import bpy
 from ..core.base.quantity import list_quantities
-from ..core.control.methods import METHODS
+from ..core.control.methods import METHODS, list_methods
 from ..core.model.fingertip import Fingertip
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from . import finger_size
+from .chosen_method import choose, list_offered, method_of, place_of
 from .declared import Update, group, title
 from .table import assign, read, reset
 
@@ -41,7 +42,7 @@ def take_preset(settings: Any, context: Any) -> None:
         (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
     }
     for section, name in sorted(changed):
-        own, kind = getattr(settings, section), import_parameters(section, settings.method)
+        own, kind = getattr(settings, section), import_parameters(section, "")
         values = PRESETS[settings.preset].get(section, {})
         if name in values:
             assign(own, kind, name, values[name])
@@ -50,17 +51,36 @@ def take_preset(settings: Any, context: Any) -> None:
 
 
 def take_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen method is made for.
+    """Set the blister the chosen built-in method is made for; it takes the place of one of one's own.
 
     Parameters
     ----------
     settings : bpy.types.PropertyGroup
     context : bpy.types.Context
     """
-    values = METHODS[settings.method].blister
+    if settings.own_method:
+        settings.own_method = ""
+    _take_blister(settings)
+
+
+def take_own_method(settings: Any, context: Any) -> None:
+    """Set the blister the chosen method of one's own is made for.
+
+    Parameters
+    ----------
+    settings : bpy.types.PropertyGroup
+    context : bpy.types.Context
+    """
+    _take_blister(settings)
+
+
+def _take_blister(settings: Any) -> None:
+    """Set the blister that the method is made for; none where it forms none, or is not known here."""
+    method = list_methods().get(method_of(settings))
+    values = method.blister if method is not None else None
     if values is None:
         return
-    kind = import_parameters("blister", settings.method)
+    kind = import_parameters("blister", "")
     for name in list_quantities(kind):
         if name in values:
             assign(settings.blister, kind, name, values[name])
@@ -77,7 +97,7 @@ def take_arrangement(layout: Any, context: Any) -> None:
     context : bpy.types.Context
     """
     settings = layout.id_data.digiclay
-    kind = import_parameters("contact", settings.method)
+    kind = import_parameters("contact", "")
     if layout.arrangement == "hexagonal":
         assign(settings.contact, kind, "share", HEXAGONAL_SHARE)
     else:
@@ -169,6 +189,14 @@ SETTINGS = make_group(
             items=method_items(),
             default="virtual_master",
             update=take_method,
+        ),
+        "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_own_method),
+        "chosen_method": bpy.props.EnumProperty(
+            name="Method",
+            description="Control method of the cells; a choice also sets its blister",
+            items=list_offered,
+            get=place_of,
+            set=choose,
         ),
         "own_preset": bpy.props.StringProperty(
             name="Own Preset", description="The custom preset that was applied last", options={"HIDDEN"}

@@ -6,7 +6,7 @@ import re
 
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import list_quantities
-from ..core.control.methods import METHODS
+from ..core.control.methods import list_methods
 from ..core.scene.schema import SECTIONS, import_parameters
 from .declared import title
 from .shown_units import convert_units
@@ -36,5 +36,5 @@ def relabel(error: ParameterError) -> ParameterError:
 
 def _known(section: str) -> set[str]:
     """Return the names of a section's parameters."""
-    methods = METHODS if section == "control" else ("virtual_master",)
+    methods = list_methods() if section == "control" else ("virtual_master",)
     return {name for method in methods for name in list_quantities(import_parameters(section, method))}

@@ -13,10 +13,11 @@ from .. import bridge
 from ..compat import bpy, read_stored
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters
-from ..core.control.methods import METHODS
+from ..core.control.methods import METHODS, find_method
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, resolve
+from .chosen_method import find_group, method_of
 from .groups import CLASSES, SETTINGS
 from .messages import relabel
 from .table import Notes, read, write
@@ -92,14 +93,15 @@ def table_of(bed: Any) -> dict[str, Any]:
         On a list that cannot be read; its owner is the section.
     """
     settings = bed.digiclay
-    method, notes = settings.method, _notes(settings)
+    method, notes = method_of(settings), _notes(settings)
+    formed = find_method(method).blister is not None  # refuses one that is not known here
     table: dict[str, Any] = {"name": _printable(bed.name), "preset": settings.preset}
     for section in SECTIONS:
         if section in OPTIONAL and not getattr(settings, f"use_{section}"):
             table[section] = ABSENT
         elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
             continue
-        elif section != "blister" or METHODS[method].blister is not None:
+        elif section != "blister" or formed:
             own = part_group(settings, section)
             kind = import_parameters(section, method)
             values = read(own, kind, notes.get(_key(section, method), {}), section)
@@ -120,7 +122,8 @@ def write_scene(bed: Any, scene: Scene) -> None:
     """
     settings = bed.digiclay
     # These two first: choosing them by hand sets others along with them.
-    settings.preset, settings.method = scene.preset, scene.method
+    settings.preset = scene.preset
+    setattr(settings, "method" if scene.method in METHODS else "own_method", scene.method)
     notes = _notes(settings)
     for section in SECTIONS:
         part: Parameters | None = scene.section(section)
@@ -149,7 +152,7 @@ def part_group(settings: Any, section: str) -> Any:
         Of the scene file.
     """
     if section == "control":
-        return getattr(settings.control, settings.method)
+        return find_group(settings)  # None: the method is not known here
     return getattr(settings, section)
 
 

@@ -1,0 +1,68 @@
+"""Methods of the folder in the preferences: loaded, with their properties, and taken back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..compat import bpy
+from ..core.base.errors import one_line
+from ..core.control.methods import remove_method
+from ..core.scene.schema import import_parameters
+from ..plugins.method_folder import FolderMethods, load_folder
+from .chosen_method import name_pointer
+from .declared import group, title
+from .groups import CONTROL
+
+__all__ = ["clear", "load", "read_present"]
+
+#: What is loaded, and the groups of the methods' parameters; Blender's classes are of the process as well.
+_PRESENT: list[FolderMethods] = [FolderMethods()]
+_GROUPS: dict[str, type] = {}
+
+
+def read_present() -> FolderMethods:
+    """Return what is loaded, and what was refused."""
+    return _PRESENT[0]
+
+
+def load(folder: str) -> None:
+    """Run the files of a folder, in place of those that were loaded before.
+
+    Parameters
+    ----------
+    folder : str
+        A full path; empty: none.
+    """
+    clear()
+    if not folder:
+        return
+    found = load_folder(Path(folder))
+    names, refused = [], list(found.refused)
+    for name in found.names:
+        try:
+            _register_group(name)
+        except (TypeError, ValueError, RuntimeError, OverflowError) as error:  # what Blender cannot hold
+            remove_method(name)
+            refused.append(f"{name}: Blender must be able to hold its parameters (got {one_line(error)}).")
+        else:
+            names.append(name)
+    _PRESENT[0] = FolderMethods(tuple(names), tuple(refused))
+
+
+def clear() -> None:
+    """Take back what was loaded; beds keep the name and the parameters of their method."""
+    for name in read_present().names:
+        remove_method(name)
+    for name, kind in _GROUPS.items():
+        delattr(CONTROL, name_pointer(name))
+        bpy.utils.unregister_class(kind)
+    _GROUPS.clear()
+    _PRESENT[0] = FolderMethods()
+
+
+def _register_group(name: str) -> None:
+    """Make the properties of a method's parameters."""
+    kind = group(name_pointer(name), import_parameters("control", name), {})
+    bpy.utils.register_class(kind)
+    _GROUPS[name] = kind
+    setattr(CONTROL, name_pointer(name), bpy.props.PointerProperty(type=kind, name=title(name)))
