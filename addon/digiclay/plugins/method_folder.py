@@ -15,7 +15,7 @@ __all__ = ["FolderMethods", "load_folder"]
 
 
 class FolderMethods(NamedTuple):
-    """What was found in a folder.
+    """Methods and refused code of a folder.
 
     Attributes
     ----------
