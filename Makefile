@@ -57,10 +57,16 @@ mutants: ## change the core's physics and control here and there, and list what 
 test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
 	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix
 
+# With WHOLE=1 a skipped test is a failure, for instance where DIGICLAY_BLENDER_DISPLAY is not set.
+WHOLE ?=
+# What the screen with a pen is built of and runs by: see tests/window/tablet.
+PEN_FILES := gcc pkg-config /usr/lib/xorg/Xorg /usr/lib/xorg/modules/drivers/dummy_drv.so /usr/include/xorg/xf86Xinput.h
+PEN_PACKAGES := gcc libc6-dev pkg-config xserver-xorg-core xserver-xorg-video-dummy xserver-xorg-dev
 test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 -- tests/window
+	@[ -z "$$DIGICLAY_BLENDER_DISPLAY" ] || tools/programs .reports/pen.log "$(PEN_FILES)" "$(PEN_PACKAGES)" || true
+	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 $(if $(WHOLE),--whole) -- tests/window
 
 guide-pictures: ## follow the first page of the guide in a window, and retake its pictures
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }

@@ -55,7 +55,7 @@ def run(command: list[str], limit: float) -> tuple[int | None, str]:
     return (None if late.is_set() else status), summary
 
 
-def judge(status: int | None, summary: str, limit: float) -> str:
+def judge(status: int | None, summary: str, limit: float, whole: bool) -> str:
     """Return why the part failed, or ``""``."""
     if status is None:
         return f"stopped at the time limit of {limit:g} s"
@@ -64,6 +64,8 @@ def judge(status: int | None, summary: str, limit: float) -> str:
         return f"ended by {signal.Signals(number).name}" + (" after its summary" if summary else "")
     if not re.search(r"\b[1-9]\d* passed\b", summary):
         return "no test passed"
+    if whole and re.search(r"\b[1-9]\d* skipped\b", summary):
+        return "tests were skipped"
     return f"status {status}" if status else ""
 
 
@@ -73,12 +75,13 @@ def main() -> int:
     parser.add_argument("report", type=Path, help="file the summary line is appended to")
     parser.add_argument("name", help="what the part is called there")
     parser.add_argument("limit", type=float, help="time limit, s")
+    parser.add_argument("--whole", action="store_true", help="a test that is skipped is a failure")
     parser.add_argument("pytest", nargs="+", help="arguments of pytest (after --)")
     arguments = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     command = [sys.executable, "-m", "pytest", *arguments.pytest]
     status, summary = run(command, arguments.limit)
-    reason = judge(status, summary, arguments.limit)
+    reason = judge(status, summary, arguments.limit, arguments.whole)
     verdict = f"FAILED ({reason})" if reason else "passed"
     spent = os.times()
     processor = f"{spent.children_user + spent.children_system:.0f} s of processor time"

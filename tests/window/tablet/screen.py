@@ -43,6 +43,8 @@ def pen_screen(folder: Path) -> Iterator[str]:
     folder : Path
         For the driver that is built, and the server's log.
     """
+    missing = find_missing()
+    assert not missing, f"a screen with a pen needs {missing}"
     inputs = folder / "modules" / "input"
     inputs.mkdir(parents=True)
     flags = subprocess.run(
