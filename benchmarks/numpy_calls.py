@@ -82,7 +82,7 @@ class Counted(np.ndarray[Any, Any]):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **known: Any) -> Any:
         call, arguments = getattr(ufunc, method), _plain(inputs)
-        name = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}"
+        name, known = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}", _plain(known)
         if out is not None:
             known["out"] = _plain(out)
         Counted.ledger.note(name, call, arguments, known)

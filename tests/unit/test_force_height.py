@@ -24,27 +24,28 @@ UNDER = 40e-3 + DISTANCE**2 / 16e-3
 def reach(low: float, high: float, part: Floats | None = None) -> Reach:
     """Return the range of cells from one height to another, m."""
     part = np.ones(9) if part is None else part
-    return Reach(part, np.full(9, np.inf), np.full(9, low), np.full(9, high))
+    return Reach(part, np.full(9, np.inf), np.array([np.full(9, low), np.full(9, high)]))
 
 
-def test_the_forces_at_the_top_found_add_up_to_what_is_wanted() -> None:
-    top = find_top(0.4, 40e-3, reach(39e-3, 43e-3), UNDER, np.zeros(9), PULP, raised=True)
+# Linear between nine heights, 0.16 mm apart near the guess, and up to 2.4 mm far from it.
+@pytest.mark.parametrize(("guess", "error"), [(41.13e-3, 10e-3), (40.5e-3, 0.1)])
+def test_the_forces_at_the_top_found_add_up_to_what_is_wanted(guess: float, error: float) -> None:
+    top = find_top(0.4, guess, 40e-3, reach(39e-3, 43e-3), UNDER, np.zeros(9), PULP, raised=True)
     force = PULP.predict_force(top - UNDER, np.zeros(9)).sum()
-    # Linear between 33 heights 0.125 mm apart.
-    assert force == pytest.approx(0.4, abs=5e-3)
+    assert force == pytest.approx(0.4, abs=error)
 
 
 @pytest.mark.parametrize(("wanted", "expected"), [(1e-6, 41e-3), (50.0, 42e-3)])
 def test_a_force_that_no_pin_can_give_leads_to_the_end_of_the_range(wanted: float, expected: float) -> None:
     lost = np.zeros(9)
-    assert find_top(wanted, 40e-3, reach(41e-3, 42e-3), UNDER, lost, PULP, raised=True) == pytest.approx(
-        expected
-    )
+    assert find_top(
+        wanted, 41.5e-3, 40e-3, reach(41e-3, 42e-3), UNDER, lost, PULP, raised=True
+    ) == pytest.approx(expected)
 
 
 def test_relaxed_pulp_asks_for_a_higher_top() -> None:
     tops = [
-        find_top(0.4, 40e-3, reach(39e-3, 43e-3), UNDER, np.full(9, lost), PULP, raised=True)
+        find_top(0.4, 41.2e-3, 40e-3, reach(39e-3, 43e-3), UNDER, np.full(9, lost), PULP, raised=True)
         for lost in (0.0, 0.1)
     ]
     assert tops[1] - tops[0] > 50e-6
@@ -76,7 +77,8 @@ def test_a_pin_ahead_stands_where_it_can_still_arrive() -> None:
 
 def test_without_a_skirt_pins_beside_and_behind_are_not_led() -> None:
     drop = LEAD.find_drop(np.array([17.5e-3, 5e-3]), np.array([-17.5e-3, 0.0]), 40e-3, raised=True)
-    assert drop.tolist() == [np.inf, 0.0]
+    assert drop[0] > 1e3
+    assert drop[1] == 0.0
 
 
 def test_a_skirt_leads_all_around_for_the_speed_it_is_made_for() -> None:

@@ -38,10 +38,10 @@ def history(depth: object, count: int) -> tuple[Floats, Floats]:
 
 def observe(forces: Floats, expected: Floats) -> Floats:
     """Return the tensions found, one a period, N."""
-    filters, tension, found = np.zeros((3, 1)), np.zeros(1), []
+    pulp, found = np.zeros((4, 1)), []
     for force, guess in zip(forces[1:], expected[1:], strict=True):
-        PULP.observe(filters, tension, np.array([force]), np.array([guess]))
-        found.append(float(tension[0]))
+        PULP.observe(pulp, np.array([force]), np.array([guess]))
+        found.append(float(pulp[-1, 0]))
     return np.array(found)
 
 
@@ -64,27 +64,31 @@ def test_pulp_relieved_faster_than_it_relaxes_keeps_the_expected_tension() -> No
 def test_a_predicted_force_is_the_one_that_comes() -> None:
     depth = lambda t: 1.0e-3 + 3e-3 * (t - 0.2)  # noqa: E731
     forces, own = history(lambda t: np.maximum(depth(t), 0.0), 42)
-    filters, tension = np.zeros((3, 1)), np.zeros(1)
+    pulp = np.zeros((4, 1))
     for force, guess in zip(forces[1:41], own[1:41], strict=True):
-        PULP.observe(filters, tension, np.array([force]), np.array([guess]))
-    lost = PULP.predict_loss(filters, tension)
+        PULP.observe(pulp, np.array([force]), np.array([guess]))
+    lost = PULP.predict_loss(pulp)
     found = PULP.predict_force(np.array([depth(42 * PERIOD)]), lost)
     assert found == pytest.approx(forces[42], rel=0.01)
 
 
-def test_the_indentation_is_the_contact_law_solved() -> None:
-    depth = np.array([0.1e-3, 1e-3, 2e-3])
-    assert PULP.find_indentation(CONTACT.tension(depth)) == pytest.approx(depth, rel=1e-12)
+@pytest.mark.parametrize("offset", [0.0, 0.2e-3])
+def test_the_underside_is_the_contact_law_solved(offset: float) -> None:
+    law, depth = Contact(offset=offset), np.array([0.3e-3, 1e-3, 2e-3])
+    pulp = PulpEstimate(Touch(Fingertip(), law, RELAXATION), PERIOD, 2.0 * PERIOD, 0.0)
+    under, _ = pulp.find_underside(np.full(3, 40e-3), law.tension(depth), 1e-3)
+    assert under == pytest.approx(40e-3 - depth, rel=1e-12)
 
 
-def test_the_stiffness_is_the_slope_of_the_force() -> None:
+def test_an_underside_is_as_uncertain_as_its_force_over_the_stiffness() -> None:
     depth, step = np.array([0.5e-3, 2e-3]), 1e-8
     slope = CONTACT.share * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step)) / (2.0 * step)
-    assert PULP.find_stiffness(CONTACT.tension(depth)) == pytest.approx(slope, rel=1e-6)
+    _, deviation = PULP.find_underside(np.zeros(2), CONTACT.tension(depth), 1e-3)
+    assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
 def test_pulp_without_contact_relaxes_for_the_periods_it_was_not_looked_at() -> None:
-    filters, tension = np.ones((3, 2)), np.ones(2)
-    PULP.age(filters, tension, np.array([4.0, 0.0]))
-    assert filters[:, 0] == pytest.approx(np.exp(-4.0 * PERIOD / np.array(RELAXATION.times)))
-    assert (filters[:, 1].tolist(), tension.tolist()) == ([1.0, 1.0, 1.0], [0.0, 1.0])
+    pulp = np.ones((4, 2))
+    PULP.age(pulp, np.array([4.0, 0.0]))
+    assert pulp[:3, 0] == pytest.approx(np.exp(-4.0 * PERIOD / np.array(RELAXATION.times)))
+    assert (pulp[:, 1].tolist(), pulp[3, 0]) == ([1.0, 1.0, 1.0, 1.0], 0.0)

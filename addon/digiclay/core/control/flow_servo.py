@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Constants
 from ..model.delay import Queue
 from ..model.physics import Cell
 from .drive import OPENINGS, find_free_speeds
@@ -73,14 +74,17 @@ class FlowServo:
         """How long a new command acts until the heights aimed at, s."""
         return self.ahead - sum(self.left)
 
-    def find_limits(self, force: Floats) -> tuple[Floats, Floats]:
-        """Return the lowest (negative) and highest speeds of pins under forces (m,), N; m/s."""
-        rise = force * (-self.rise / self.lift)
-        rise += self.rise
-        np.maximum(rise, 0.0, out=rise)
-        fall = force * (-self.fall / self.pull)
-        fall -= self.fall
-        return fall, rise
+    def find_limits(self, force: Floats) -> Floats:
+        """Return the lowest (negative) and highest speeds of pins under forces (m,), N; (2, m), m/s."""
+        limits: Floats = np.multiply.outer((-self.fall / self.pull, -self.rise / self.lift), force)
+        limits += self._free
+        np.maximum(limits[1], 0.0, out=limits[1])
+        return limits
+
+    @cached_property
+    def _free(self) -> Floats:
+        """Speeds of pins without load, (2, 1), m/s."""
+        return np.array([[-self.fall], [self.rise]])
 
     def coast(self, height: Floats, speeds: Floats) -> Floats:
         """Return the heights at which commands that still act will leave pins, (m,), m.
@@ -92,34 +96,48 @@ class FlowServo:
         speeds : ndarray (q, m)
             Asked for earlier, the newest first, m/s.
         """
-        coasted: Floats = height + np.dot(self.left, speeds)
+        coasted: Floats = self._times.dot(speeds)
+        coasted += height
         return coasted
 
-    def serve(self, error: Floats, limits: tuple[Floats, Floats], force: Floats, speeds: Floats) -> Floats:
+    @cached_property
+    def _times(self) -> Floats:
+        """How long earlier commands still act, (q,), s."""
+        return np.array(self.left)
+
+    @cached_property
+    def _numbers(self) -> Constants:
+        """What `serve` is made with: one over the span, 1/s; the dead band, m; the slowest speed, m/s; 0."""
+        return Constants((1.0 / self.span, self.dead_band, STILL * self.rise, 0.0))
+
+    def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
         """Return the valve commands (m,); the speeds asked for are put before the earlier ones, in place.
 
         Parameters
         ----------
         error : ndarray (m,)
             Commanded heights less those of `coast`, m.
-        limits : (ndarray, ndarray)
+        limits : ndarray (2, m)
             From `find_limits`, m/s.
         force : ndarray (m,)
             N.
         speeds : ndarray (q, m)
             Asked for earlier, the newest first, m/s.
         """
-        speed = error * (1.0 / self.span)
-        np.putmask(speed, np.abs(error) <= self.dead_band, 0.0)
-        np.maximum(speed, limits[0], out=speed)
-        np.minimum(speed, limits[1], out=speed)
-        np.putmask(speed, np.abs(speed) < STILL * self.rise, 0.0)
+        fall, rise = limits
+        per_span, band, slowest, none = self._numbers[error.shape]
+        speed = error * per_span
+        np.maximum(speed, fall, out=speed)
+        np.minimum(speed, rise, out=speed)
+        still = np.abs(error) <= band
+        still |= np.abs(speed) < slowest
+        np.putmask(speed, still, none)
         speeds[1:] = speeds[:-1]
         speeds[0] = speed
-        share = speed / np.where(speed > 0.0, limits[1], -limits[0])
-        command: Floats = np.interp(share, self.ratios, self.openings)
+        speed /= np.where(speed > none, rise, -fall)
+        command: Floats = np.interp(speed, self.ratios, self.openings)
         if not self.exact:
-            command = self._refine(command, speed, force)
+            command = self._refine(command, speeds[0], force)
         return command
 
     def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:

@@ -17,8 +17,8 @@ __all__ = ["Reach", "find_top", "form_heights", "lead_heights"]
 
 Floats = NDArray[np.float64]
 
-#: Heights of the top that are tried, as shares of what pins can reach: steps of 15 µm on a level bed.
-SHARES = np.linspace(0.0, 1.0, 33)
+#: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a level bed.
+SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])
 
 
 class Reach(NamedTuple):
@@ -30,14 +30,13 @@ class Reach(NamedTuple):
         Profile of the blister, 1 at its top.
     drop : ndarray (m,)
         How far they may stand below the top, above it in a valley, m; infinite: not led.
-    least, most : ndarray (m,)
+    ends : ndarray (2, m)
         Lowest and highest they can be, m.
     """
 
     part: Floats
     drop: Floats
-    least: Floats
-    most: Floats
+    ends: Floats
 
 
 def form_heights(top: Floats | float, edge: float, part: Floats, drop: Floats, *, raised: bool) -> Floats:
@@ -77,7 +76,15 @@ def lead_heights(heights: Floats, top: Floats | float, drop: Floats, *, raised: 
 
 
 def find_top(
-    wanted: float, edge: float, reach: Reach, under: Floats, lost: Floats, pulp: PulpEstimate, *, raised: bool
+    wanted: float,
+    guess: float,
+    edge: float,
+    reach: Reach,
+    under: Floats,
+    lost: Floats,
+    pulp: PulpEstimate,
+    *,
+    raised: bool,
 ) -> float:
     """Return the height of the top at which the predicted forces add up to a force, m.
 
@@ -87,6 +94,8 @@ def find_top(
     ----------
     wanted : float
         N.
+    guess : float
+        Where it is looked for most closely, m.
     edge : float
         Height of the surface around, m.
     reach : Reach
@@ -98,11 +107,15 @@ def find_top(
     raised : bool
         Whether the top is above the surface around it.
     """
-    level = reach.part >= reach.part.max()
-    low, high = float(reach.least[level].min()), float(reach.most[level].max())
-    tops = low + (high - low) * SHARES
+    (level,) = (reach.part >= reach.part.max()).nonzero()
+    lowest, highest = reach.ends.take(level, 1).tolist()
+    low, high = min(lowest), max(highest)
+    tops = (high - low) * SHARES
+    tops += min(max(guess, low), high)
+    np.maximum(tops, low, out=tops)
+    np.minimum(tops, high, out=tops)
     depths = form_heights(tops[:, None], edge, reach.part, reach.drop, raised=raised)
-    np.maximum(depths, reach.least, out=depths)
-    np.minimum(depths, reach.most, out=depths)
+    np.maximum(depths, reach.ends[0], out=depths)
+    np.minimum(depths, reach.ends[1], out=depths)
     depths -= under
-    return float(np.interp(wanted, pulp.predict_force(depths, lost).sum(axis=1), tops))
+    return float(np.interp(wanted, np.add.reduce(pulp.predict_force(depths, lost), axis=1), tops))

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .blister_cells import BlisterCells
+
 __all__ = ["OWN_ROWS", "Own", "Region", "split_rows"]
 
 Floats = NDArray[np.float64]
@@ -20,10 +22,8 @@ class Own(NamedTuple):
 
     Attributes
     ----------
-    filters : ndarray (k, m)
-        Relaxation of the pulp over it, N.
-    tension : ndarray (m,)
-        N.
+    pulp : ndarray (k + 1, m)
+        Relaxation of the pulp over it, and its tension, N.
     coming, later : ndarray (m,)
         Predicted undersides a period and two from now, m.
     residual : ndarray (m,)
@@ -36,8 +36,7 @@ class Own(NamedTuple):
         Asked for, the newest first, m/s.
     """
 
-    filters: Floats
-    tension: Floats
+    pulp: Floats
     coming: Floats
     later: Floats
     residual: Floats
@@ -55,21 +54,16 @@ class Region(NamedTuple):
         Lowest point of the finger then, m.
     speed : float
         Of the finger in the plane, m/s.
-    distance, ahead : ndarray (m,)
-        From it, and ahead of it, m.
-    inside, ring : ndarray of bool (m,)
-        In the blister, and in the ring around it.
-    part : ndarray (m,)
-        Profile of the blister.
+    cells : BlisterCells
+        About the aim.
+    drop : ndarray (m,)
+        How far they may stand from the top; see `LeadProfile.find_drop`, m.
     """
 
     aim: tuple[float, float, float]
     speed: float
-    distance: Floats
-    ahead: Floats
-    inside: NDArray[np.bool_]
-    ring: NDArray[np.bool_]
-    part: Floats
+    cells: BlisterCells
+    drop: Floats
 
 
 def split_rows(own: Floats, filters: int) -> Own:
@@ -81,5 +75,5 @@ def split_rows(own: Floats, filters: int) -> Own:
     filters : int
         Number of relaxation filters, k.
     """
-    tension, coming, later, residual, lead, stamp = own[filters : filters + OWN_ROWS]
-    return Own(own[:filters], tension, coming, later, residual, lead, stamp, own[filters + OWN_ROWS :])
+    _, coming, later, residual, lead, stamp = own[filters : filters + OWN_ROWS]
+    return Own(own[: filters + 1], coming, later, residual, lead, stamp, own[filters + OWN_ROWS :])

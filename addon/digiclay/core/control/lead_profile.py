@@ -6,7 +6,6 @@ would block it. Around a finger at rest the same holds for the speed of the drag
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,8 @@ Floats = NDArray[np.float64]
 
 #: A finger slower than this has no direction, m/s.
 SLOWEST = 1e-3
+#: Slope where pins are not led: it puts them below every surface.
+STEEP = 1e9
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,9 @@ class LeadProfile:
             Whether the top is above the surface around it.
         """
         free = self.rise if raised else self.fall
-        around = free / self.skirt if self.skirt else math.inf
-        forward = free / speed if speed >= SLOWEST else math.inf
-        slope = np.where(ahead > 0.0, min(forward, around), around)
-        beyond = distance - self.level
-        # On the level part nothing drops, not even where pins are not led and the slope is infinite.
-        return np.multiply(beyond, slope, out=np.zeros_like(beyond), where=beyond > 0.0)
+        around = free / self.skirt if self.skirt else STEEP
+        forward = free / speed if speed >= SLOWEST else STEEP
+        drop: Floats = distance - self.level
+        np.maximum(drop, 0.0, out=drop)
+        drop *= np.where(ahead > 0.0, forward, around) if forward < around else around
+        return drop

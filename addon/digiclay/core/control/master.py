@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -11,7 +12,7 @@ from ..model.actuator import Actuator
 from ..model.set_point import SetPoint
 from .blister import Blister
 from .master_cell import MasterCell
-from .master_memory import Master, Phase
+from .master_memory import LossRule, Master, Phase
 from .runs import BatchControl
 from .servo import Tracking
 from .travel import Heading, update_heading
@@ -115,7 +116,8 @@ class MasterControl(BatchControl):
         """
         known = self.parameters
         if total < known.felt_force:
-            return self.wait(master)
+            waiting: Master = self._loss.wait(master)
+            return waiting
         if master.phase is not Phase.IDLE:
             if near >= known.felt_force:
                 x, y = near_x / near, near_y / near
@@ -147,18 +149,10 @@ class MasterControl(BatchControl):
         edge = min(max(height, 0.0), self.actuator.stroke)
         return master._replace(height=height, reference=height, edge=edge, felt=height)
 
-    def wait(self, master: Master) -> Master:
-        """Count the periods without a finger; give it up after the loss time."""
-        if master.phase is Phase.IDLE:
-            return master
-        if not self.is_given_up(master):
-            return master._replace(alone=master.alone + 1)
-        lost = master.phase is Phase.SHAPING
-        return master._replace(phase=Phase.IDLE, losses=master.losses + lost)
-
-    def is_given_up(self, master: Master) -> bool:
-        """Tell whether the finger has been away for longer than the loss time."""
-        return master.alone * self.period >= self.parameters.loss_time * (1.0 - 1e-9)
+    @cached_property
+    def _loss(self) -> LossRule:
+        """When a finger is given up."""
+        return LossRule(self.period, self.parameters.loss_time)
 
     def lead(self, master: Master, force: float) -> Master:
         """VM Control and VM Model: the effort, and the height a real cell would make of it.
@@ -173,7 +167,7 @@ class MasterControl(BatchControl):
         if phase is Phase.IDLE:
             return master
         # What it rose in search of the finger is taken back, or every lift-off would leave a lump.
-        if self.is_given_up(master):
+        if self._loss.is_given_up(master.alone):
             return master._replace(height=master.felt)
         if force >= known.force_setpoint:
             phase = Phase.SHAPING

@@ -1,13 +1,14 @@
-"""Memory of the virtual master of Method I."""
+"""Memory of the virtual master of Method I, and the loss of its fingertip."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .travel import Heading
 
-__all__ = ["Master", "Phase"]
+__all__ = ["LossRule", "Master", "Phase"]
 
 
 class Phase(IntEnum):
@@ -16,6 +17,35 @@ class Phase(IntEnum):
     IDLE = 0
     SPRING = 1
     SHAPING = 2
+
+
+@dataclass(frozen=True)
+class LossRule:
+    """Rule by which a fingertip that is no longer felt is given up.
+
+    Attributes
+    ----------
+    period : float
+        Control period, s.
+    time : float
+        Time without force until a loss, s.
+    """
+
+    period: float
+    time: float
+
+    def is_given_up(self, alone: int) -> bool:
+        """Tell whether a fingertip not felt for some control periods has been away for the loss time."""
+        return alone * self.period >= self.time * (1.0 - 1e-9)
+
+    def wait(self, memory: Any) -> Any:
+        """Count a period without a fingertip in a `Master` or `Follower`; give it up after the loss time."""
+        if memory.phase is Phase.IDLE:
+            return memory
+        if not self.is_given_up(memory.alone):
+            return memory._replace(alone=memory.alone + 1)
+        lost = memory.phase is Phase.SHAPING
+        return memory._replace(phase=Phase.IDLE, losses=memory.losses + lost)
 
 
 class Master(NamedTuple):

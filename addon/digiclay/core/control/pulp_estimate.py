@@ -1,4 +1,4 @@
-"""Observer of the pulp: tensions, indentations and stiffnesses of cells from their measured forces.
+"""Observer of the pulp: tensions of cells, and undersides over them, from their measured forces.
 
 The relaxation filters ``dz_i/dt = ν_i (T - z_i)`` and ``F = f_d (T - Σ ĉ_i z_i)`` (equations 10 to 14) are
 solved for the tension T, which is taken as linear in time over a control period. The equation is linear:
@@ -22,21 +22,24 @@ Floats = NDArray[np.float64]
 
 
 class Span(NamedTuple):
-    """Change of the filters over a time, for a tension that goes linearly from T_0 to T_1.
+    """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
-    ``z_1 = decay z_0 + early T_0 + late T_1``
+    ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation.
 
     Attributes
     ----------
-    decay, early, late : ndarray (k, 1)
-    loss : float
-        Share of T_1 that is lost to relaxation, ``Σ ĉ_i late_i``.
+    kept : ndarray (k + 1, k + 1)
+        Of filters and tension before: the part of the filters after that T_1 has no share in, and the tension
+        lost of it, over the share of T_1 that is not lost.
+    late : ndarray (k + 1, 1)
+        What T_1 adds to the filters, and to the tension.
+    held : float
+        Share of T_1 that is not lost.
     """
 
-    decay: Floats
-    early: Floats
+    kept: Floats
     late: Floats
-    loss: float
+    held: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,27 +80,28 @@ class PulpEstimate:
 
     def _span(self, time: float) -> Span:
         """Return the change over a time, s."""
-        turns = self.touch.pulp.rates * time
+        pulp = self.touch.pulp
+        turns = pulp.rates[:, 0] * time
         decay = np.exp(-turns)
         late = 1.0 - (1.0 - decay) / turns
-        return Span(decay, 1.0 - decay - late, late, float(self.touch.pulp.shares @ late[:, 0]))
+        held = 1.0 - float(pulp.shares @ late)
+        kept = np.column_stack((np.diag(decay), 1.0 - decay - late))
+        return Span(np.vstack((kept, pulp.shares @ kept / held)), np.append(late, 1.0)[:, None], held)
 
-    def age(self, filters: Floats, tension: Floats, periods: Floats) -> None:
+    def age(self, pulp: Floats, periods: Floats) -> None:
         """Let the pulp over cells without contact relax, in place; cells with 0 periods stay.
 
         Parameters
         ----------
-        filters : ndarray (k, m)
-            z, N.
-        tension : ndarray (m,)
-            T, N.
+        pulp : ndarray (k + 1, m)
+            Filters z and tension T, N.
         periods : ndarray (m,)
             Control periods without contact.
         """
-        self.touch.pulp.age(filters, self.period * periods)
-        tension[periods > 0.0] = 0.0
+        self.touch.pulp.age(pulp[:-1], self.period * periods)
+        pulp[-1, periods > 0.0] = 0.0
 
-    def observe(self, filters: Floats, tension: Floats, force: Floats, expected: Floats) -> None:
+    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> None:
         """Bring filters and tensions of cells up to date, in place.
 
         Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
@@ -105,44 +109,32 @@ class PulpEstimate:
 
         Parameters
         ----------
-        filters : ndarray (k, m)
-            z a period before, N.
-        tension : ndarray (m,)
-            T a period before, N.
+        pulp : ndarray (k + 1, m)
+            Filters z and tension T a period before, N.
         force : ndarray (m,)
             Measured, N.
         expected : ndarray (m,)
             Tension under the predicted fingertip, N.
         """
         span = self.once
-        kept = self._keep(span, filters, tension)
-        lost = self.touch.pulp.shares.dot(kept)
+        kept = span.kept.dot(pulp)
         found = np.maximum(force, self.floor)
-        found *= 1.0 / self.touch.contact.share
-        found += lost
-        found *= 1.0 / (1.0 - span.loss)
-        np.copyto(found, np.minimum(found, expected), where=force <= self.floor)
-        tension[:] = found
-        np.multiply(span.late, found, out=filters)
-        filters += kept
+        found *= 1.0 / (self.touch.contact.share * span.held)
+        found += kept[-1]
+        np.minimum(found, expected, out=found, where=force <= self.floor)
+        kept[-1] = 0.0
+        np.multiply(span.late, found, out=pulp)
+        pulp += kept
 
-    def _keep(self, span: Span, filters: Floats, tension: Floats) -> Floats:
-        """Return the filters at the end of a time without the share of the last tension, (k, m), N."""
-        kept = span.decay * filters
-        kept += span.early * tension
-        return kept
-
-    def predict_loss(self, filters: Floats, tension: Floats) -> Floats:
-        """Return the tension lost at the end of the prediction, but for the share of that tension, (m,), N.
+    def predict_loss(self, pulp: Floats) -> Floats:
+        """Return the tension at which there would be no force at the end of the prediction, (m,), N.
 
         Parameters
         ----------
-        filters : ndarray (k, m)
-            N.
-        tension : ndarray (m,)
-            N.
+        pulp : ndarray (k + 1, m)
+            Filters z and tension T, N.
         """
-        lost: Floats = self.touch.pulp.shares.dot(self._keep(self.later, filters, tension))
+        lost: Floats = self.later.kept[-1].dot(pulp)
         return lost
 
     def predict_force(self, depth: Floats, lost: Floats) -> Floats:
@@ -156,21 +148,30 @@ class PulpEstimate:
             From `predict_loss`, N.
         """
         force = self.touch.contact.tension(depth)
-        force *= 1.0 - self.later.loss
         force -= lost
         np.maximum(force, 0.0, out=force)
-        force *= self.touch.contact.share
+        force *= self.later.held * self.touch.contact.share
         return force
 
-    def find_indentation(self, tension: Floats) -> Floats:
-        """Return indentations, m, at tensions (m,), N: equation 11 solved for x."""
-        contact = self.touch.contact
-        depth: Floats = np.log1p(tension * (contact.exponent / contact.stiffness))
-        depth *= 1.0 / contact.exponent
-        depth += contact.offset
-        return depth
+    def find_underside(self, height: Floats, tension: Floats, noise: float) -> tuple[Floats, Floats]:
+        """Return the undersides over cells, m, and their standard deviations for noise of the force, m.
 
-    def find_stiffness(self, tension: Floats) -> Floats:
-        """Return the stiffness of contacts, N/m, at tensions (m,), N: ``f_d dT/dx = f_d (b + m T)``."""
+        The indentation is equation 11 solved for x; the stiffness is ``f_d dT/dx = f_d (b + m T)``.
+
+        Parameters
+        ----------
+        height : ndarray (m,)
+            Measured, m.
+        tension : ndarray (m,)
+            N.
+        noise : float
+            Standard deviation of the force, N.
+        """
         contact = self.touch.contact
-        return contact.share * (contact.stiffness + contact.exponent * tension)
+        stiffening = tension * (contact.exponent / contact.stiffness)
+        depth: Floats = np.log1p(stiffening)
+        depth *= 1.0 / contact.exponent
+        if contact.offset:
+            depth += contact.offset
+        stiffening += 1.0
+        return height - depth, (noise / (contact.share * contact.stiffness)) / stiffening

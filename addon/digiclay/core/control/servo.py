@@ -18,9 +18,9 @@ __all__ = ["Tracking", "declare_dead_band", "lock_overloaded"]
 Floats = NDArray[np.float64]
 
 
-def declare_dead_band() -> Any:
+def declare_dead_band(default: float = 10e-6) -> Any:
     """Declare the parameter that every height control has."""
-    return quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
+    return quantity(default, "height error without a command", unit="m", symbol="δ", at_least=0.0)
 
 
 @dataclass(frozen=True)

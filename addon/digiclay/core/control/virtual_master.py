@@ -10,7 +10,6 @@ master is decided in plain numbers, run by run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,16 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Constants, any_true, count_true
-from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
+from .blister_cells import BlisterRule
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .ground import GROUNDS, EdgeGround, OwnGround
 from .master import Master, MasterControl, Phase, VirtualMaster
 from .master_cell import make_master_cell
 from .runs import decide_by_any, decide_by_run, gather_by_run, sum_weighted
 from .servo import lock_overloaded
-from .travel import ABEAM, measure_excess, measure_offsets
+from .travel import measure_excess
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterBatch", "VirtualMasterControl", "build"]
 
@@ -38,7 +37,6 @@ Floats = NDArray[np.float64]
 #: to 0.33 of it measured while the finger moves slowly.
 HEAVIEST = 0.25
 NONE = Constants((0.0,))
-CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,40 +113,26 @@ class VirtualMasterControl(MasterControl):
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
-        *limits, rest, band = self._limits[target.shape]
+        rest, band = self._limits[target.shape]
         off = target - rest
         np.abs(off, off)
         # Outside the blister formed cells hold, the others rest: True and False are the codes of these modes.
         mode: NDArray[np.int8] = (off > band).view(np.int8)
         if self.is_active(memory):
-            memory, target = self._create_blister(memory, seen, mode, limits)
+            memory, target = self._create_blister(memory, seen, mode)
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Commands(target, mode, command)
 
-    def _create_blister(
-        self, memory: Any, seen: Measurement, mode: NDArray[np.int8], limits: Sequence[Any]
-    ) -> tuple[Any, Floats]:
+    def _create_blister(self, memory: Any, seen: Measurement, mode: NDArray[np.int8]) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
-        abeam, radius, edge_radius, flat_radius, behind, release, noise = limits
-        edge_mode, formed, froze = CODES[mode.shape]
-        x, y, toward_x, toward_y = self.get_pose(memory)
-        distance, ahead = measure_offsets(x, y, toward_x, toward_y, seen.quadratic_basis)
-        inside = distance <= radius
-        ring = distance <= edge_radius
-        ring ^= inside
-        # While the master travels, only what lies ahead counts: the finished ridge behind is no edge.
-        facing = ahead >= abeam
-        facing &= ring
+        cells = self._rule.divide(self.get_pose(memory), seen.quadratic_basis)
+        facing = self._rule.find_edge(cells)
         level = sum_weighted(seen.height, facing).tolist()
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind, beyond = self.get_heights(memory)
         ground = self.ground.find(seen, edge)
-        profile = self.blister.interpolate(distance, ground, top)
-        frozen = ahead < behind * distance
-        frozen &= distance > flat_radius
-        frozen |= seen.mode == froze
-        frozen &= inside
-        frozen &= seen.force < release
+        profile = self.blister.interpolate(cells.distance, ground, top)
+        frozen = self._rule.find_frozen(cells, seen)
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
             kept = self.ground.find_kept(seen.target, profile, ground, top)
@@ -156,13 +140,8 @@ class VirtualMasterControl(MasterControl):
             kept &= frozen
             np.putmask(profile, kept, seen.target)
         target = seen.target.copy()
-        np.putmask(target, inside, profile)
-        touched = seen.force > noise
-        touched &= inside
-        np.putmask(mode, inside, formed)
-        np.copyto(mode, kind, "unsafe", touched)
-        np.putmask(mode, ring, edge_mode)
-        np.putmask(mode, frozen, froze)
+        np.putmask(target, cells.inside, profile)
+        self._rule.set_modes(mode, cells, seen.force, kind, frozen)
         return memory, target
 
     @cached_property
@@ -171,21 +150,16 @@ class VirtualMasterControl(MasterControl):
         return bool(np.any(self.floor))
 
     @cached_property
-    def _limits(self) -> Constants:
-        """Thresholds of the cells.
-
-        How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N; the height of a
-        pin at rest, and how far from it one counts as formed, m. Circles are widened by a billionth,
-        for the sake of cells exactly on them.
-        """
-        blister, known = self.blister, self.parameters
-        wider = (
-            radius * (1.0 + ON_THE_SIDE)
-            for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
-        )
+    def _rule(self) -> BlisterRule:
+        """Which cells of the blister are frozen, and which are touched."""
+        known = self.parameters
         release = np.maximum(known.release_force, self.floor) if self._noisy else known.release_force
-        rest, band = self.actuator.rest_height, known.dead_band
-        return Constants((-ABEAM, *wider, known.behind, release, self.floor, rest, band))
+        return BlisterRule(self.blister, known.behind, release, self.floor)
+
+    @cached_property
+    def _limits(self) -> Constants:
+        """Height of a pin at rest, and how far from it one counts as formed, m."""
+        return Constants((self.actuator.rest_height, self.parameters.dead_band))
 
 
 @dataclass(frozen=True, eq=False)

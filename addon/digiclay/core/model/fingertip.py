@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,14 +194,14 @@ def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
 
 
-def join_surfaces(inner: Floats, tangent: Floats, least: Floats, root: Floats) -> Floats:
+def join_surfaces(inner: Floats, tangent: Floats, least: Any, root: Any) -> Floats:
     """Return ``tangent + (sqrt(max(inner, least)) - root)²`` in the array of `inner`, m; see `compute_forms`.
 
     Parameters
     ----------
     inner, tangent : ndarray
         R and the tangent, m.
-    least, root : ndarray
+    least, root : float or ndarray
         c, m, and its root.
     """
     np.maximum(inner, least, out=inner)

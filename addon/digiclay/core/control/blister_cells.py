@@ -1,0 +1,145 @@
+"""Cells of a blister about a fingertip: which are inside, on the edge, ahead, touched, or frozen behind it.
+
+What holds for the cells of one run, (m,), holds for those of a stack, (m, b).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Constants
+from ..base.modes import Mode
+from ..model.control_interface import Measurement
+from ..model.layout import ON_THE_SIDE
+from .blister import Blister
+from .travel import ABEAM, measure_offsets
+
+__all__ = ["BlisterCells", "BlisterRule"]
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
+
+
+class BlisterCells(NamedTuple):
+    """Cells about the middle of a blister.
+
+    Attributes
+    ----------
+    distance, ahead : ndarray (m,) or (m, b)
+        From it, and ahead of it, m.
+    inside, ring : ndarray of bool (m,) or (m, b)
+        In the blister, and in the ring around it.
+    """
+
+    distance: Floats
+    ahead: Floats
+    inside: Flags
+    ring: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class BlisterRule:
+    """Rule by which the cells of a blister are told apart.
+
+    Attributes
+    ----------
+    blister : Blister
+    behind : float or ndarray (b,)
+        Cosine below which a cell lies behind the fingertip.
+    release : float or ndarray (b,)
+        Force that releases a frozen cell, N.
+    felt : float or ndarray (b,)
+        Force above which a cell is touched, N.
+    """
+
+    blister: Blister
+    behind: Any
+    release: Any
+    felt: Any
+
+    def divide(self, pose: tuple[Any, Any, Any, Any], basis: Floats) -> BlisterCells:
+        """Return the cells about the middle of a blister.
+
+        Parameters
+        ----------
+        pose : tuple of float or of ndarray (b,)
+            x, y of the middle, m, and the direction of travel, a unit vector.
+        basis : ndarray (6, m) or (6, m, b)
+            Rows 1, x, y, x², x y, y² of the cells.
+        """
+        distance, ahead = measure_offsets(*pose, basis)
+        _, radius, edge_radius, *_ = self._limits[distance.shape]
+        inside = distance <= radius
+        ring = distance <= edge_radius
+        ring ^= inside
+        return BlisterCells(distance, ahead, inside, ring)
+
+    def find_edge(self, cells: BlisterCells) -> Flags:
+        """Return which cells give the height of the surface: while a fingertip travels, those ahead of it.
+
+        The finished ridge behind is no edge.
+        """
+        facing: Flags = cells.ahead >= self._limits[cells.ahead.shape][0]
+        facing &= cells.ring
+        return facing
+
+    def find_frozen(self, cells: BlisterCells, seen: Measurement) -> Flags:
+        """Return which cells are left behind, and which of those left before stay so: none that is pressed.
+
+        Parameters
+        ----------
+        cells : BlisterCells
+        seen : Measurement
+            Gives the modes of the last period, and the forces.
+        """
+        *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
+        frozen: Flags = cells.ahead < behind * cells.distance
+        frozen &= cells.distance > flat_radius
+        frozen |= seen.mode == CODES[seen.mode.shape][2]
+        frozen &= cells.inside
+        frozen &= seen.force < release
+        return frozen
+
+    def set_modes(
+        self, mode: NDArray[np.int8], cells: BlisterCells, force: Floats, touched_mode: Any, frozen: Flags
+    ) -> None:
+        """Set the modes of the blister's cells, in place.
+
+        Parameters
+        ----------
+        mode : ndarray of int8 (m,) or (m, b)
+        cells : BlisterCells
+        force : ndarray (m,) or (m, b)
+            N.
+        touched_mode : int or ndarray (b,)
+            Mode of touched cells.
+        frozen : ndarray of bool (m,) or (m, b)
+        """
+        edge, formed, froze = CODES[mode.shape]
+        touched = force > self._limits[force.shape][-1]
+        touched &= cells.inside
+        np.putmask(mode, cells.inside, formed)
+        np.copyto(mode, touched_mode, "unsafe", touched)
+        np.putmask(mode, cells.ring, edge)
+        np.putmask(mode, frozen, froze)
+
+    @cached_property
+    def _limits(self) -> Constants:
+        """Thresholds of the cells.
+
+        How far ahead; radii of blister, edge and flat top, m; a cosine; forces, N. Circles are widened by a
+        billionth, for the sake of cells exactly on them.
+        """
+        blister = self.blister
+        wider = (
+            radius * (1.0 + ON_THE_SIDE)
+            for radius in (blister.radius, blister.edge_radius, blister.flat_radius)
+        )
+        return Constants((-ABEAM, *wider, self.behind, self.release, self.felt))

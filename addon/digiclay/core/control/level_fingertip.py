@@ -1,0 +1,191 @@
+"""Underside of a level fingertip of any turn and size, and its slopes.
+
+The squared reduced radius of a cell is ``q = A u² + B v²``, with u and v from the lowest point along the axes
+of the fingertip, and A and B one over their squares. The underside depends on q alone, and goes with the size
+k: ``H = z + k h(q)``, ``A, B ~ 1/k²``. So its slopes by place, turn and size follow from those of q and h'.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.fingertip import LEVEL, Fingertip, compute_forms, join_surfaces
+
+__all__ = ["LevelFingertip", "Place", "Slopes"]
+
+Floats = NDArray[np.float64]
+#: Coefficients of 1, x, y, x², x y, y².
+Form = tuple[float, float, float, float, float, float]
+
+
+class Place(NamedTuple):
+    """Place of a level fingertip.
+
+    Attributes
+    ----------
+    x, y, z : float
+        Lowest point, m.
+    turn : float
+        About the vertical, rad.
+    size : float
+        Logarithm of its size over the known one.
+    """
+
+    x: float
+    y: float
+    z: float
+    turn: float
+    size: float
+
+
+class Slopes(NamedTuple):
+    """Underside over cells, and its slopes.
+
+    Attributes
+    ----------
+    under : ndarray (m,)
+        m.
+    slopes : ndarray (5, m)
+        By size, x, y, turn and z.
+    """
+
+    under: Floats
+    slopes: Floats
+
+
+class _Profile(NamedTuple):
+    """Numbers of ``h(q) = slope q - lowest + (sqrt(max(bend (1 - q), least)) - root)²``.
+
+    They are those of `fingertip.compute_forms`.
+
+    Attributes
+    ----------
+    along, across : float
+        A and B of the known fingertip, 1/m².
+    slope, bend, lowest, least : float
+        m.
+    root : float
+        Root of `least`.
+    """
+
+    along: float
+    across: float
+    slope: float
+    bend: float
+    lowest: float
+    least: float
+    root: float
+
+    def resize(self, size: float) -> _Profile:
+        """Return the numbers of k h(q), and A and B, at the logarithm of a size."""
+        k = math.exp(size)
+        along, across, slope, bend, lowest, least, root = self
+        return _Profile(
+            along / (k * k), across / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LevelFingertip:
+    """Known fingertip, level.
+
+    Attributes
+    ----------
+    fingertip : Fingertip
+    """
+
+    fingertip: Fingertip
+
+    @cached_property
+    def _profile(self) -> _Profile:
+        """What the underside is computed with."""
+        outline = self.fingertip.outline(np.array([[0.0, 0.0, 0.0, *LEVEL]]))
+        (inner, tangent), join = compute_forms(outline)
+        along, across = outline[0, 3], outline[0, 5]
+        bend, (least, root) = inner[0], join.ravel()
+        lowest = (math.sqrt(bend) - root) ** 2
+        return _Profile(*map(float, (along, across, tangent[3] / along, bend, lowest, least, root)))
+
+    def find_underside(self, place: Place, basis: Floats) -> Floats:
+        """Return the underside over cells, (m,), m.
+
+        Parameters
+        ----------
+        place : Place
+        basis : ndarray (6, m)
+            Rows 1, x, y, x², x y, y² of the cells.
+        """
+        known = self._profile.resize(place.size)
+        inner, tangent = np.array(_list_surfaces(known, place, _find_radius(known, place))).dot(basis)
+        return join_surfaces(inner, tangent, known.least, known.root)
+
+    def measure(self, place: Place, basis: Floats) -> Slopes:
+        """Return the underside over cells, with its slopes.
+
+        Parameters
+        ----------
+        place : Place
+        basis : ndarray (6, m)
+            Rows 1, x, y, x², x y, y² of the cells.
+        """
+        known = self._profile.resize(place.size)
+        radius = _find_radius(known, place)
+        rows = np.empty((7, basis.shape[1]))
+        forms = (*_list_surfaces(known, place, radius), *_list_slopes(known, place, radius))
+        np.array(forms).dot(basis, out=rows[:6])
+        under, tangent, slopes = rows[0], rows[1], rows[2:]
+        bend = np.sqrt(np.maximum(under, known.least))
+        join_surfaces(under, tangent, known.least, known.root)
+        # h'(q) of each cell: what the slopes of q are to be multiplied with.
+        np.divide(known.bend * known.root, bend, out=bend)
+        bend += known.slope - known.bend
+        slopes[:4] *= bend
+        # With the size h grows, while q shrinks.
+        slopes[0] += under
+        slopes[0] -= place.z
+        slopes[4] = 1.0
+        return Slopes(under, slopes)
+
+
+def _find_radius(known: _Profile, place: Place) -> Form:
+    """Return q."""
+    x, y, _, turn, _ = place
+    a, b = known.along, known.across
+    c, s = math.cos(turn), math.sin(turn)
+    xx, xy, yy = a * c * c + b * s * s, (a - b) * c * s, a * s * s + b * c * c
+    return _place_form(x, y, xx, 2.0 * xy, yy)
+
+
+def _place_form(x: float, y: float, xx: float, xy: float, yy: float) -> Form:
+    """Return a quadratic form of the distance from a point."""
+    by_x, by_y = 2.0 * xx * x + xy * y, xy * x + 2.0 * yy * y
+    return (0.5 * (by_x * x + by_y * y), -by_x, -by_y, xx, xy, yy)
+
+
+def _list_surfaces(known: _Profile, place: Place, radius: Form) -> tuple[Form, Form]:
+    """Return what `fingertip.join_surfaces` joins: ``bend (1 - q)``, and ``z - lowest + slope q``."""
+    one, x, y, xx, xy, yy = radius
+    r, t = -known.bend, known.slope
+    return (
+        (r * one - r, r * x, r * y, r * xx, r * xy, r * yy),
+        (t * one + place.z - known.lowest, t * x, t * y, t * xx, t * xy, t * yy),
+    )
+
+
+def _list_slopes(known: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
+    """Return the slopes of q by size, x, y and turn."""
+    one, x, y, xx, xy, yy = radius
+    cosine, sine = math.cos(2.0 * place.turn), math.sin(2.0 * place.turn)
+    skew = known.along - known.across
+    return (
+        (-2.0 * one, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
+        (-x, -2.0 * xx, -xy, 0.0, 0.0, 0.0),
+        (-y, -xy, -2.0 * yy, 0.0, 0.0, 0.0),
+        _place_form(place.x, place.y, -skew * sine, 2.0 * skew * cosine, skew * sine),
+    )
