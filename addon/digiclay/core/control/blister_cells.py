@@ -46,7 +46,7 @@ class BlisterCells(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BlisterRule:
-    """Rule by which the cells of a blister are told apart.
+    """Rule that divides the cells of a blister into those inside, on the edge, touched and frozen.
 
     Attributes
     ----------
