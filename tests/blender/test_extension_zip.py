@@ -144,6 +144,11 @@ def test_the_commands_leave_a_run_a_mesh_and_a_picture(seen: dict[str, Any]) -> 
     assert {"a tap", "surface.stl", "still.png"} <= set(seen["files"])
 
 
+def test_a_method_of_ones_own_is_offered_runs_and_comes_back_with_the_extension(seen: dict[str, Any]) -> None:
+    assert (seen["own method"], seen["own run"]) == ("mine", 0)
+    assert seen["own methods"] == [[], ["mine"]]
+
+
 def test_disabling_leaves_nothing_behind_and_enabling_again_works(seen: dict[str, Any]) -> None:
     assert (seen["left behind"], seen["added again"]) == ([], ["FINISHED"])
 

@@ -60,6 +60,19 @@ def main() -> None:
     for outside in ("paper", "study", "tune", "benchmark"):
         with redirect_stderr(StringIO()) as told:
             seen[outside] = [command([outside]), told.getvalue()]
+    # Its code imports digiclay, which has another name here.
+    command(["new-method", "mine", "--out", str(FOLDER / "own"), "--quiet"])
+    chosen.methods_folder = str(FOLDER / "own")
+    chosen.run_own_methods = True
+    bed.digiclay.chosen_method = "mine"
+    seen["own method"] = part("settings.properties").scene_of(bed).method
+    own_run = ["run", "tap", "--method", f"{FOLDER / 'own' / 'mine.py'}:Mine", "--out", str(FOLDER / "own run")]
+    seen["own run"] = command([*own_run, "--quiet", "--no-errors"])
+    known = part("core.control.methods").list_added
+    addon_utils.disable(EXTENSION)  # the preferences stay, as at the end of Blender
+    seen["own methods"] = [list(known())]
+    addon_utils.enable(EXTENSION)
+    seen["own methods"] += [list(known())]
     addon_utils.disable(EXTENSION, default_set=True)
     names = [name for name in dir(bpy.types) if "digi" in name.lower()]
     seen["left behind"] = names + ["Object.digiclay"] * hasattr(bpy.types.Object, "digiclay")
