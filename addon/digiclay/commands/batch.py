@@ -15,7 +15,8 @@ from typing import Any
 from ..core.base.errors import DigiclayError, one_line
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
 from ..core.studies.series import finish
-from .arguments import add_command
+from ..plugins.method_copy import find_word
+from .arguments import add_command, load_by_option
 from .batch_folder import Folder, open_batch
 from .evaluation_pool import read_count
 from .exit_codes import FAILED, STOPPED
@@ -32,6 +33,7 @@ EXAMPLES = """\
 examples:
   digiclay batch first                    the sample batch, into ./first
   digiclay batch my.toml --jobs 4         four processes; results in index.html
+  digiclay batch my.toml --method mine.py:Mine      with a method of your own, too
   digiclay batch my.toml --prepare        files of the jobs only, for another machine: see 'digiclay job'
   digiclay batch my.toml --submit openjd  a job for a render farm: tasks, their order, ranges of frames
 
@@ -81,6 +83,10 @@ def add(commands: Any) -> None:
         "--out", metavar="DIR", type=Path, help="folder; default: the file's name in the working folder"
     )
     parser.add_argument(
+        "--method", metavar="M", action="append", default=[],
+        help="one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
         "--jobs", metavar="N", type=read_count, help="number of processes; default: one a core"
     )
     instead = parser.add_mutually_exclusive_group()
@@ -93,7 +99,8 @@ def add(commands: Any) -> None:
 def carry_out(arguments: argparse.Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
     refuse_alone(arguments)
-    made = read_jobs(find_jobs_file(arguments.file))
+    methods = [load_by_option(word, "--method") for word in arguments.method]
+    made = read_jobs(find_jobs_file(arguments.file), list(dict.fromkeys(methods)))
     sound = next((job.scene for job in made.jobs if job.scene is not None), None)
     if sound is not None:  # outputs that cannot be had here at all are refused before any work
         check_outputs(sound, made.outputs)
@@ -200,6 +207,8 @@ def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder
         "job", str(folder.find_job(job).resolve()), "--out", str(folder.find_run(job).resolve()),
         "--follow", "--since", repr(time.time()),
     ]  # fmt: skip
+    if job.scene is not None and (word := find_word(job.scene)):
+        arguments += ["--method", word]
     process = processes.start(partial(JobProcess, arguments, folder.find_log(job)))
     if process is None:
         return

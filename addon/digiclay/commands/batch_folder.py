@@ -19,6 +19,7 @@ from ..core.scene.toml_table import format_scene
 from ..core.studies.job_outputs import Outputs
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries
 from ..core.studies.series import Kind, open_series
+from ..plugins.method_copy import write_code
 from .gallery import Card, page
 from .job_log import ERROR, find_error, read_tail
 from .progress import format_duration
@@ -79,6 +80,7 @@ class Folder:
         except OSError as error:
             raise OutputError(f"{self.find_job(job)} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(self.find_job(job))
+        write_code(job.scene, self.find_job(job))
         write_whole(self.find_job(job) / SCENE, format_scene(job.scene).encode())
         write_whole(self.find_job(job) / JOB, self.batch.outputs.format().encode())
 

@@ -20,7 +20,8 @@ from ..core.base.whole_files import format_json, write_whole
 from ..core.scene.scene_source import load
 from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
-from .arguments import add_command
+from ..plugins.method_copy import CODE, resolve_word
+from .arguments import add_command, load_by_option
 from .batch_folder import note_failure, refresh_page
 from .exit_codes import STOPPED, WRONG
 from .job_films import make_film, make_frames
@@ -58,6 +59,10 @@ def add(commands: Any) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, help="default: ../../runs/JOB, as in a series")
     parser.add_argument("--only", choices=("run", *MOVING), help="a part: all but the films, or one film")
     parser.add_argument("--frames", metavar="A-B", help="with --only: these frames of the film, from 0")
+    parser.add_argument(
+        "--method", metavar="M",
+        help="a control method of your own, from the job's folder (method.py:Mine) or elsewhere",
+    )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace a run, a finished one too")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     # How a batch starts it: at what time, and that it is to stop when its standard input ends.
@@ -123,6 +128,8 @@ def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Te
         raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
     if frames is not None and only not in MOVING:
         raise OutputError("--frames must be given with --only film or --only turntable.")
+    if arguments.method is not None:
+        load_by_option(resolve_word(arguments.method, folder), "--method")
     outputs = read_outputs(folder / JOB)
     out: Path = arguments.out or _find_place(folder)
     if only not in MOVING:
@@ -172,7 +179,8 @@ def _write_run(
             print(f"The run in {out} is {state.value}: it is done again.", flush=True)
         with claim.write() as staged:
             make_outputs(scene, outputs, staged, timing, stopped, tell)
-            for file in (SCENE, JOB):  # as they were given: by them a batch knows what this is the run of
+            # As they were given: by them a batch knows what this is the run of.
+            for file in (SCENE, JOB, *([CODE] if (folder / CODE).is_file() else [])):
                 shutil.copyfile(folder / file, staged / file)
             timing[FILES] = {path.name: path.stat().st_size for path in sorted(staged.iterdir())}
             write_whole(staged / TIMING, format_json(timing))

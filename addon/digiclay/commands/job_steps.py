@@ -15,6 +15,7 @@ from ..core.scene.schema import Scene
 from ..core.session.accuracy import estimate_errors, has_every_command
 from ..core.session.run_scene import run, save
 from ..core.studies.job_outputs import Outputs
+from ..plugins.method_copy import describe_origin
 from .export import exported, formats
 from .refusals import refuse_what_has_no_surface, refuse_without_blender
 from .render import draw_film, draw_still, draw_turntable
@@ -97,7 +98,8 @@ def make_outputs(
         timing[name] = time.perf_counter() - began
 
     with step("run") as progress:
-        result = run(scene, progress=progress, stopped=stopped, versions={"digiclay": __version__})
+        versions = {"digiclay": __version__, **describe_origin(scene)}
+        result = run(scene, progress=progress, stopped=stopped, versions=versions)
         if result.incomplete:
             raise KeyboardInterrupt
     if outputs.errors:

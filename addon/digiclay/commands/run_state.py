@@ -14,6 +14,7 @@ from ..core.scene.scene_source import load, load_recorded
 from ..core.session.finished_run import has_files, is_whole
 from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
+from ..plugins.method_copy import CODE
 
 __all__ = [
     "FILES", "PATIENCE", "RUNS", "TIMING", "RunState", "is_done", "judge_run", "list_lacking", "note_film",
@@ -50,12 +51,22 @@ def judge_run(job: Path, run: Path) -> RunState:
         return RunState.INCOMPLETE
     if not (_is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)):
         return RunState.CHANGED
+    if _read_code(job) != _read_code(run):
+        return RunState.CHANGED
     timing = read_json(run / TIMING)
     if timing is None:
         return RunState.INCOMPLETE
     sizes = timing.get(FILES)
     whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load_recorded(run / SCENE))
     return RunState.WHOLE if whole else RunState.INCOMPLETE
+
+
+def _read_code(folder: Path) -> bytes | None:
+    """Return the code of a method of one's own in a folder; None without one."""
+    try:
+        return (folder / CODE).read_bytes()
+    except FileNotFoundError:
+        return None
 
 
 def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:

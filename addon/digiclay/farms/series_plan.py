@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import Job, JobSeries
+from ..plugins.method_copy import find_word
 
 __all__ = ["FRAME_OPTION", "Frames", "Task", "plan_series", "split_frames"]
 
@@ -97,14 +98,16 @@ def _plan_job(job: Job, outputs: Outputs, chunk: int) -> list[Task]:
     time = (0.0, job.scene.periods * job.scene.simulation.control_period)
     kinds = [kind for kind in MOVING if getattr(outputs, kind)]
     folder, first = f"jobs/{job.name}", f"{job.name}: run"
-    part = ("--only", "run") if kinds else ()
+    word = find_word(job.scene)
+    own = ("--method", word) if word else ()
+    part = (*own, "--only", "run") if kinds else own
     tasks = [Task(first, "runs", "job", folder, part, blender=outputs.still is not None)]
     for kind in kinds:
         try:
             count = getattr(outputs, kind).count(time)
         except DigiclayError as error:
             raise OutputError(f"{job.name}: {error}") from None
-        only, frames = ("--only", kind), f"{job.name}: frames of {kind}"
+        only, frames = (*own, "--only", kind), f"{job.name}: frames of {kind}"
         tasks += [
             Task(frames, "frames", "job", folder, only, (first,), True, Frames(count, chunk)),
             Task(f"{job.name}: {kind}", "films", "job", folder, only, (frames,), True),

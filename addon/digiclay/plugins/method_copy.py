@@ -10,7 +10,7 @@ from ..core.scene.schema import Scene
 from .method_loader import OwnRow
 from .method_source import MethodSource
 
-__all__ = ["CODE", "describe_origin", "find_code", "write_code"]
+__all__ = ["CODE", "describe_origin", "find_code", "find_word", "resolve_word", "write_code"]
 
 #: The file of a method's code beside a scene file.
 CODE = "method.py"
@@ -30,23 +30,39 @@ def describe_origin(scene: Scene) -> dict[str, str]:
     return {"method": f"{source.package or source.label} sha256:{source.digest}"}
 
 
-def write_code(scene: Scene, folder: Path) -> str:
-    """Write the code of a scene's method of one's own; return the word that names it, from the folder.
+def write_code(scene: Scene, folder: Path) -> None:
+    """Write the code of a scene's method, where it is a file of one's own; else remove a former one.
 
     Parameters
     ----------
     scene : Scene
     folder : Path
+    """
+    source = find_code(scene)
+    if source is not None and not source.module:
+        write_whole(folder / CODE, source.text.encode())
+    else:
+        (folder / CODE).unlink(missing_ok=True)
 
-    Returns
-    -------
-    str
-        For --method; the method's name where it is installed, empty for a built-in one.
+
+def find_word(scene: Scene) -> str:
+    """Return what --method takes for a scene's method of one's own in a folder with its code.
+
+    The name of an installed one; empty for a built-in one.
     """
     source = find_code(scene)
     if source is None:
         return ""
-    if source.module:
-        return scene.method
-    write_whole(folder / CODE, source.text.encode())
-    return f"{CODE}:{source.attribute}"
+    return scene.method if source.module else f"{CODE}:{source.attribute}"
+
+
+def resolve_word(word: str, folder: Path) -> str:
+    """Return a word of --method from the working folder, where it names a file of another folder.
+
+    Parameters
+    ----------
+    word : str
+    folder : Path
+        Where the file may be.
+    """
+    return str(folder / word) if (folder / word.rpartition(":")[0]).is_file() else word

@@ -65,11 +65,17 @@ class JobSeries:
     outputs: Outputs
 
 
-def read_jobs(path: Path) -> JobSeries:
+def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     """Read a JOBS file.
 
     Every scene is combined with every method and every setting. A combination whose values do
     not go together makes a job with an error; what no job could have is refused.
+
+    Parameters
+    ----------
+    path : Path
+    more : sequence of str, optional
+        Names of methods besides those of the file.
 
     Raises
     ------
@@ -80,7 +86,7 @@ def read_jobs(path: Path) -> JobSeries:
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
         made = make_outputs({key: table[key] for key in table if key not in WHICH})
-        words, methods, changes = _read_scenes(table), _read_methods(table), _read_settings(table)
+        words, methods, changes = _read_scenes(table), _read_methods(table, more), _read_settings(table)
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
@@ -125,16 +131,16 @@ def _read_scenes(table: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _read_methods(table: Mapping[str, Any]) -> list[str]:
+def _read_methods(table: Mapping[str, Any], more: Sequence[str]) -> list[str]:
     """Return the methods every scene is run with; an empty one is the scene's own."""
     if "methods" not in table:
-        return [""]
+        return list(more) or [""]
     methods = table["methods"]
     if not isinstance(methods, list) or not methods:
         raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', show_value(methods))
     for method in methods:
         find_method(method, "methods")
-    return methods
+    return [*methods, *(name for name in more if name not in methods)]
 
 
 def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
