@@ -23,6 +23,7 @@ SOURCES = (
     "pyproject.toml",
     "README.md",
     "LICENSE",
+    "LICENSES",
 )
 
 

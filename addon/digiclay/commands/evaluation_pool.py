@@ -15,7 +15,6 @@ from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record, evaluate_bundle
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
-from .evaluator import Evaluator, evaluate_elsewhere
 from .progress import Counted
 from .refusals import refuse_without
 from .worker import Processes, count_cores, in_blender
@@ -143,6 +142,9 @@ def open_pool(
         if count == 1:
             task = partial(evaluate_bundle, stopped=processes.stopping, errors=errors)
         else:
+            # Not part of the extension's zip, where there is one process.
+            from .evaluator import Evaluator, evaluate_elsewhere
+
             task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
         yield Pool(threads, task, processes.stopped)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -24,10 +23,7 @@ class Stop:
         return self.requested
 
     def __enter__(self) -> Stop:
-        # Python takes signals in its main thread only; elsewhere nobody can ask.
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._former[number] = signal.signal(number, self._note)
+        self._former = _handle(self._note)
         return self
 
     def _note(self, number: int, frame: FrameType | None) -> None:
@@ -36,27 +32,38 @@ class Stop:
         self.requested = True
 
     def __exit__(self, *raised: object) -> None:
-        for number, former in self._former.items():
-            # Python does not know a handler that Blender itself has set, and cannot set it again.
-            signal.signal(number, signal.SIG_DFL if former is None else former)
+        _restore(self._former)
+
+
+def _handle(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
+    """Handle Ctrl-C and SIGTERM; return the former handlers, none where signals cannot be handled."""
+    former: dict[int, Any] = {}
+    # Python takes signals in its main thread only; elsewhere nobody can ask.
+    with suppress(ValueError):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            former[number] = signal.signal(number, handler)
+    return former
+
+
+def _restore(former: dict[int, Any]) -> None:
+    """Handle signals again as before."""
+    for number, handler in former.items():
+        # Python does not know a handler that Blender itself has set, and cannot set it again.
+        signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 @contextmanager
 def allow_interrupt() -> Iterator[None]:
     """Let a first signal interrupt at once, SIGTERM as Ctrl-C does: where there is nothing to be kept."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    former = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    former = _handle(interrupt)
     try:
         yield
     finally:
-        for number, handler in former.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        _restore(former)
 
 
 @contextmanager

@@ -1,0 +1,168 @@
+"""Rules of Blender's extensions platform that the sources alone can break; docs/release.md lists them.
+
+What only the built zip shows is in tests/release and tests/blender.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "addon" / "digiclay"
+MANIFEST: dict[str, Any] = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
+PAGE = (ROOT / "docs" / "release.md").read_text(encoding="utf-8")
+#: Longest tagline and reason of a permission.
+LONGEST = 64
+#: Tags that the platform has for add-ons, of those that could ever fit.
+TAGS = {"3D View", "Add Mesh", "Animation", "Import-Export", "Mesh", "Modeling", "Physics", "Sculpt"}
+#: Licenses that the platform accepts for code and, CC0, for assets.
+LICENSES = {"GPL-2.0-or-later", "GPL-3.0-or-later", "LGPL-2.1-or-later", "LGPL-3.0-or-later", "CC0-1.0"} | {
+    "BSD-1-Clause", "BSD-2-Clause", "BSD-3-Clause", "BSL-1.0", "MIT", "MIT-0", "MPL-2.0", "Pixar", "Zlib",
+}  # fmt: skip
+#: Blender crashes where threads run beside it, so each module that may start or meet one states its need.
+THREADS = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
+NEEDS = {
+    "core/studies/series.py": "types of the executors that commands hand to it; starts none",
+    "commands/batch.py": "waits for several processes",
+    "commands/evaluation_pool.py": "waits for several processes",
+    "commands/job.py": "a process without a window: reads the end of its input while it works",
+    "commands/worker.py": "a lock around processes that several threads start",
+}
+#: What reaches other machines needs the permission `network`.
+NETWORK = {"asyncio", "distributed", "ftplib", "http", "pythonosc", "requests", "socket", "socketserver"} | {
+    "ssl", "telnetlib", "urllib.request", "websockets", "xmlrpc",
+}  # fmt: skip
+#: What an extension must never do: install, update itself, write into its own folder, patch others.
+FORBIDDEN = re.compile(
+    r"\bpip\b.*\binstall\b.*subprocess|ensurepip|sys\.path\.(append|insert|extend)|sys\.modules\[|sys\.path\[:0\]"
+    r"|extension_sync|package_install|addon_utils\.|keyconfigs\.(default|user)\.keymaps\.(new|remove)"
+)
+
+
+def modules() -> Iterator[tuple[str, str]]:
+    """Yield path within the package and text of every module of the zip."""
+    left_out = set(MANIFEST["build"]["paths_exclude_pattern"])
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name = path.relative_to(PACKAGE).as_posix()
+        if f"/{name}" not in left_out:
+            yield name, path.read_text(encoding="utf-8")
+
+
+@functools.cache
+def imported(text: str) -> frozenset[str]:
+    """Return the modules, not those of ours, that a module imports anywhere in it, and their packages."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    # urllib.parse reads text, urllib.request reaches others.
+    return frozenset(found | {name.split(".")[0] for name in found if not name.startswith("urllib")})
+
+
+def is_short(text: str) -> bool:
+    """Return whether a tagline or reason is one that Blender's tool and the platform take."""
+    return 0 < len(text) <= LONGEST and text == text.strip() and text[-1].isalnum() and text.isprintable()
+
+
+@pytest.mark.parametrize("text", ["", "x" * (LONGEST + 1), "Ends with a point.", " blank", "two\nlines"])
+def test_a_text_that_the_platform_refuses_is_found(text: str) -> None:
+    assert not is_short(text)
+
+
+def test_what_the_zip_leaves_out_exists_and_no_module_of_it_imports_that_at_once() -> None:
+    patterns = MANIFEST["build"]["paths_exclude_pattern"]
+    left_out = [name for name in patterns if re.fullmatch(r"/[\w/]+\.py", name)]
+    assert left_out
+    assert [name for name in left_out if not (PACKAGE / name[1:]).is_file()] == []
+    stems = "|".join(Path(name).stem for name in left_out)
+    at_once = re.compile(rf"^(from|import) .*\b({stems})\b", re.MULTILINE)
+    assert [name for name, text in modules() if at_once.search(text)] == []
+
+
+def test_tagline_and_reasons_are_short_and_end_without_a_period() -> None:
+    texts = [MANIFEST["tagline"], *MANIFEST["permissions"].values()]
+    assert [text for text in texts if not is_short(text)] == []
+    assert "Blender" not in MANIFEST["name"]
+
+
+def test_the_tags_are_those_of_the_platform() -> None:
+    assert {"Sculpt", "Physics"} <= set(MANIFEST["tags"]) <= TAGS
+
+
+def test_the_website_is_the_page_of_this_id() -> None:
+    assert MANIFEST["website"] == f"https://extensions.blender.org/add-ons/{MANIFEST['id']}/"
+
+
+def test_every_license_is_one_of_the_platform_and_has_its_text() -> None:
+    named = [license.removeprefix("SPDX:") for license in MANIFEST["license"]]
+    assert named[0] == "GPL-3.0-or-later"
+    assert set(named) <= LICENSES
+    assert "Creative Commons Legal Code\n\nCC0 1.0 Universal" in (ROOT / "LICENSES/CC0-1.0.txt").read_text()
+    assert "GNU GENERAL PUBLIC LICENSE\n                       Version 3" in (ROOT / "LICENSE").read_text()
+
+
+def test_manifest_package_and_samples_name_the_same_licenses() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    # The wheel on a package index has no trimesh in it, the extension has.
+    assert project["license"].split(" AND ") == [one.removeprefix("SPDX:") for one in MANIFEST["license"][:2]]
+    pages = [PACKAGE / "sample_shapes" / name / "README.md" for name in ("", "shapes", "sessions")]
+    assert all("CC0-1.0" in page.read_text(encoding="utf-8") for page in pages)
+    assert not any("License:\nGPL" in page.read_text(encoding="utf-8") for page in pages)
+
+
+def test_every_holder_of_a_copyright_has_a_year_and_a_name() -> None:
+    lines = MANIFEST["copyright"]
+    assert [line for line in lines if not re.fullmatch(r"\d{4}(-\d{4})? \S.*", line)] == []
+    # The bundled wheel is of others: the platform asks that they are named.
+    bundled = (ROOT / "requirements" / "extension.txt").read_text(encoding="utf-8")
+    assert re.findall(r"^([\w-]+)==", bundled, re.MULTILINE) == ["trimesh"]
+    assert any("Michael Dawson-Haggerty" in line for line in lines)
+
+
+def test_every_module_with_threads_states_its_need() -> None:
+    found = {path for path, text in modules() if imported(text) & THREADS}
+    assert found == set(NEEDS)
+
+
+def test_no_module_of_blenders_window_has_a_thread() -> None:
+    """Threads are for commands, which run in a process without a window."""
+    assert [path for path in NEEDS if not path.startswith(("commands/", "core/studies/"))] == []
+    lazily = {"cli.py", "__main__.py"}
+    importing = re.compile(r"^\s*from \.+(digiclay\.)?commands\b|^\s*import .*\bcommands\b", re.MULTILINE)
+    inside = [path for path, text in modules() if not path.startswith("commands/") and importing.search(text)]
+    assert set(inside) <= lazily
+
+
+def test_the_page_lists_the_modules_with_threads() -> None:
+    assert [path for path in NEEDS if f"`{path}`" not in PAGE] == []
+
+
+def test_the_permissions_are_those_that_are_used() -> None:
+    texts = dict(modules())
+    used = {"files"}  # runs, meshes and pictures are written wherever the user names a folder
+    if any(imported(text) & NETWORK for text in texts.values()):
+        used.add("network")
+    if any("window_manager.clipboard" in text for text in texts.values()):
+        used.add("clipboard")
+    assert set(MANIFEST["permissions"]) == used
+
+
+def test_blenders_setting_for_online_access_is_followed_where_other_machines_are_reached() -> None:
+    reaching = [path for path, text in modules() if imported(text) & NETWORK]
+    following = [path for path, text in modules() if "online_access" in text]
+    assert (not reaching) or following
+
+
+def test_nothing_installs_updates_or_patches() -> None:
+    found = [(path, match.group()) for path, text in modules() for match in FORBIDDEN.finditer(text)]
+    assert found == []
