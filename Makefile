@@ -1,7 +1,7 @@
 # Needs git, make and Python 3.11; everything else is set up in .venv and .matrix here.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo extension test test-convergence lint mutants test-matrix test-window test-proof docs guide-pictures clean
+.PHONY: help demo extension test test-convergence lint mutants test-matrix test-window test-proof test-release release docs guide-pictures clean
 
 # An interpreter to use instead of the one that is found: make demo PYTHON=/path/to/python3.11
 PYTHON ?=
@@ -15,7 +15,7 @@ IN_311 := 3.11 PYTHON "$(PYTHON)"
 PART := .venv/bin/python tools/run_part.py
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: ## run the paper's session and leave its results and pictures in demo/
 	@$(ENVIRONMENT) requirements/demo.txt $(IN_311)
@@ -28,7 +28,7 @@ extension: ## build the Blender extension and leave its zip in dist/
 test: ## run all tests but those of convergence, of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/site --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/release --ignore=tests/site --ignore=tests/window || status=1; \
 	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
 	awk '/ s of processor time/ { sub(/.*; /, ""); total += $$1 } \
 	  END { printf "processor time of make test: %d s, to be kept below 600 s\n", total }' .reports/test.txt >.reports/time.txt; \
@@ -84,6 +84,17 @@ docs: ## build the site in site/, without a warning, and check it: links, search
 	@tools/programs .reports/docs.log "chromium chromedriver" "chromium chromium-driver"
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --quiet
 	@rm -f .reports/docs.txt; $(PART) .reports/docs.txt "the site: links, search, commands of all pages" 1500 -- tests/site
+
+test-release: ## release a copy, and run its wheel in bare Pythons 3.11, 3.12, 3.13 with lowest and highest libraries
+	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
+	@rm -f .reports/release.txt; $(PART) .reports/release.txt "release, and its wheel in bare Pythons" 600 -- -n 2 --dist loadfile tests/release
+
+# The version in the files and in the changelog: make release VERSION=0.1.0
+VERSION ?=
+release: ## check, build twice, tag: zip, wheel, source archive and checksums in dist/digiclay-VERSION
+	@[ -n "$(VERSION)" ] || { echo "VERSION must be named: make release VERSION=0.1.0" >&2; exit 1; }
+	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
+	@.venv/bin/python tools/release.py "$(VERSION)"
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist site addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -4,13 +4,15 @@ usage: python tools/extension.py [--out FOLDER]
 
 The Python must have Blender's module, which brings the tool along, and pip. The folder addon/digiclay is
 copied as git knows it; the wheels of requirements/extension.txt are fetched once, put beside it and listed
-in the copy's manifest. The zip stands in the folder only when it is valid.
+in the copy's manifest. The zip stands in the folder only when it is valid. Its bytes depend on the files
+alone, and on the time in SOURCE_DATE_EPOCH or else of the last commit.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import re
 import shutil
 import subprocess
@@ -20,6 +22,10 @@ from pathlib import Path
 from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "tools")]
+
+from repacking import EARLIEST, LATEST, repack_zip  # noqa: E402
+
 SOURCE = ROOT / "addon" / "digiclay"
 PINS = ROOT / "requirements" / "extension.txt"
 #: Wheels fetched before, for all builds to come.
@@ -27,6 +33,8 @@ FETCHED = ROOT / "build" / "wheels"
 TOOL = "addons_core/bl_pkg/cli/blender_ext.py"
 TAGS = "modules/_bpy_internal/extensions/tags.py"
 LIMIT = 300
+#: Git, also in a checkout of another user.
+GIT = ("git", "-c", "safe.directory=*")
 
 
 def stop(reason: str) -> NoReturn:
@@ -74,7 +82,7 @@ def wheels(listed: Path = PINS) -> list[Path]:
 
 def stage(folder: Path) -> None:
     """Copy the package as git knows it, with the wheels and a manifest that lists them."""
-    git = ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "-z", "--", SOURCE]
+    git = [*GIT, "ls-files", "-co", "--exclude-standard", "-z", "--", SOURCE]
     for name in filter(None, carry_out(git, "Listing the files").split("\0")):
         file = ROOT / name.strip()
         if file.is_file():
@@ -82,6 +90,7 @@ def stage(folder: Path) -> None:
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, copy)
     shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")
+    shutil.copytree(ROOT / "LICENSES", folder / "LICENSES")
     bundled = folder / "wheels"
     bundled.mkdir()
     for wheel in wheels():
@@ -92,6 +101,20 @@ def stage(folder: Path) -> None:
     # A key of the whole manifest: it must stand before the first table.
     before, table, after = words.partition("\n[")
     manifest.write_text(f"{before}\nwheels = [{listed}]\n{table}{after}", encoding="utf-8")
+
+
+def read_instant() -> int:
+    """Return the time that the files of the zip have, s since 1970 UTC."""
+    named = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if named and not (named.isdecimal() and int(named) < LATEST):
+        stop(f"SOURCE_DATE_EPOCH must be a number of seconds from 1970 to 2107 (got {named[:40]!r}).")
+    if named:
+        return int(named)
+    done = subprocess.run(
+        [*GIT, "log", "-1", "--format=%ct"], capture_output=True, text=True, timeout=LIMIT, cwd=ROOT
+    )
+    # Without a commit there is no time of one.
+    return int(done.stdout) if done.returncode == 0 and done.stdout.strip() else EARLIEST
 
 
 def build(out: Path) -> Path:
@@ -110,6 +133,7 @@ def build(out: Path) -> Path:
             "Blender's tool for building",
         )
         (archive,) = made.glob("*.zip")
+        repack_zip(archive, read_instant())
         said = carry_out([*tool, "validate", *tags, archive], "Blender's tool for validating")
         if re.search(r"\b(warning|error)\b", said, re.IGNORECASE):
             stop(f"Blender's tool does not find it valid: {said}")
