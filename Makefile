@@ -94,7 +94,7 @@ VERSION ?=
 release: ## check, build twice, tag: zip, wheel, source archive and checksums in dist/digiclay-VERSION
 	@[ -n "$(VERSION)" ] || { echo "VERSION must be named: make release VERSION=0.1.0" >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
-	@.venv/bin/python tools/release.py "$(VERSION)"
+	@.venv/bin/python tools/make_release.py "$(VERSION)"
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist site addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -69,7 +69,7 @@ def copy_checkout(folder: Path) -> Path:
 
 def release_command(folder: Path, version: str = __version__) -> list[str]:
     """Return the command that makes a release in a checkout."""
-    return [sys.executable, str(folder / "tools" / "release.py"), version]
+    return [sys.executable, str(folder / "tools" / "make_release.py"), version]
 
 
 def run_release(

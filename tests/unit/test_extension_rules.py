@@ -42,7 +42,7 @@ NETWORK = {"asyncio", "distributed", "ftplib", "http", "pythonosc", "requests", 
 }  # fmt: skip
 #: What an extension must never do: install, update itself, write into its own folder, patch others.
 FORBIDDEN = re.compile(
-    r"\bpip\b.*\binstall\b.*subprocess|ensurepip|sys\.path\.(append|insert|extend)|sys\.modules\[|sys\.path\[:0\]"
+    r"\bpip\b.*\binstall\b.*subprocess|ensurepip|sys\.path\.(append|insert|extend)|sys\.path\[:0\]"
     r"|extension_sync|package_install|addon_utils\.|keyconfigs\.(default|user)\.keymaps\.(new|remove)"
 )
 

@@ -1,6 +1,6 @@
 """A release: conditions, two builds that must be equal, the files with checksums and notes, the tag.
 
-usage: python tools/release.py VERSION
+usage: python tools/make_release.py VERSION
 
 Leaves dist/digiclay-VERSION with the extension's zip, the wheel, the source archive, SHA256SUMS and
 release-notes.md, and the tag vVERSION of the current commit. A failure at any point leaves neither.
