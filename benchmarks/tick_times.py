@@ -137,7 +137,17 @@ def _draw_on(bed: Any, number: int, count: int) -> None:
 
 
 class _Clock(dict[str, float]):
-    """Processor's time by part, s; nothing counts as 0."""
+    """Processor's time by part, s; nothing counts as 0.
+
+    Attributes
+    ----------
+    running : set of str
+        Parts that are in progress.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.running: set[str] = set()
 
     def __missing__(self, name: str) -> float:
         return 0.0
@@ -148,8 +158,9 @@ def _time_parts() -> Iterator[_Clock]:
     """Time the parts of ticks, on the session's own functions, until the context is left."""
     clock = _Clock()
     places = [
-        (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "follow", "monitor"),
-        (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
+        (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"), (accuracy, "note", "monitor"),
+        (accuracy, "catch_up", "monitor"), (accuracy, "begin_stretch", "monitor"),
+        (snapshot, "dump", "pack"), (tick, "_move_finger", "finger"),
         (tick, "_evaluate", "evaluate"), (bed_state, "write", "store"), (view, "show_state", "show"),
     ]  # fmt: skip
     former: list[tuple[Any, str, Any]] = [(module, name, getattr(module, name)) for module, name, _ in places]
@@ -171,18 +182,17 @@ def _time_parts() -> Iterator[_Clock]:
 
 def _timed(clock: _Clock, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that adds its time to a part; the outermost call of the part counts."""
-    depth = 0
 
     def timed(*arguments: Any, **named: Any) -> Any:
-        nonlocal depth
-        depth += 1
+        if part in clock.running:
+            return function(*arguments, **named)
+        clock.running.add(part)
         began = time.process_time()
         try:
             return function(*arguments, **named)
         finally:
-            depth -= 1
-            if not depth:
-                clock[part] += time.process_time() - began
+            clock.running.discard(part)
+            clock[part] += time.process_time() - began
 
     return timed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ def monitored(count: int, finger: Floats, step: str = "1 ms") -> list[Errors]:
     start = begin(system)
     monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(simulate_path(system, start, finger)):
-        monitor, errors = accuracy.follow(monitor, state, finger[index : index + 2])
+        monitor = accuracy.note(monitor, state, finger[index : index + 2])
+        monitor, errors = accuracy.catch_up(monitor, state, 1)
         found += [errors] if errors else []
     assert index == count - 1
     return found
@@ -46,24 +48,36 @@ def go_on(finger: Floats) -> Floats:
     return np.concatenate([finger, interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)])
 
 
+@pytest.mark.parametrize("ticks", [(3, 3, 4), (1,), (2, 1), (9,)])
 def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(
-    monkeypatch: pytest.MonkeyPatch,
+    ticks: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[int] = []
     repeat = accuracy.repeat_period
 
     def counted(*arguments: Any) -> State:
-        done.append(period)
+        done.append(tick)
         return repeat(*arguments)
 
     monkeypatch.setattr(accuracy, "repeat_period", counted)
     monitor, start = accuracy.start(SCENE), begin(SYSTEM)
     assert monitor is not None
-    monitor, finger = accuracy.begin_stretch(monitor, start), interpolate_path(pose(), pose(z=0.038), 400)
-    for period, state in enumerate(simulate_path(SYSTEM, start, finger)):
-        monitor, _ = accuracy.follow(monitor, state, finger[period : period + 2])
-    assert len(done) == 2 * STRETCH
-    assert np.diff(done).min() >= SPREAD
+    finger = interpolate_path(pose(), pose(z=0.038), STRETCH + PAUSE)
+    monitor, counts = accuracy.begin_stretch(monitor, start), cycle(ticks)
+    states = enumerate(simulate_path(SYSTEM, start, finger))
+    sizes: list[int] = []
+    while (period := sum(sizes)) < STRETCH + PAUSE - max(ticks):
+        tick = len(sizes)
+        sizes.append(next(counts))
+        for period, state in islice(states, sizes[-1]):
+            monitor = accuracy.note(monitor, state, finger[period : period + 2])
+        monitor, _ = accuracy.catch_up(monitor, state, sizes[-1])
+    assert len(done) == STRETCH
+    for tick, size in enumerate(sizes):
+        assert done.count(tick) <= max(1, size // SPREAD)
+        # A tick of more periods than the one before takes the longest already.
+        assert not (tick and size > sizes[tick - 1] and done.count(tick))
+        assert SPREAD * sum(number <= tick for number in done) <= sum(sizes[: tick + 1])
 
 
 def test_a_monitor_follows_for_a_stretch_now_and_then() -> None:
@@ -104,7 +118,8 @@ def test_a_monitor_leaves_the_session_alone() -> None:
     assert monitor is not None
     monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(simulate_path(SYSTEM, start, finger)):
-        monitor, _ = accuracy.follow(monitor, state, finger[index : index + 2])
+        monitor = accuracy.note(monitor, state, finger[index : index + 2])
+        monitor, _ = accuracy.catch_up(monitor, state, 1)
     assert snapshot.dump(SYSTEM, state) == snapshot.dump(SYSTEM, alone)
     assert recent_trace.measure_total_force(SYSTEM, state) > 0.0
 

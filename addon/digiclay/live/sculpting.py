@@ -164,11 +164,12 @@ def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     with np.errstate(over="ignore", invalid="ignore"):
         monitor = monitor and accuracy.begin_stretch(monitor, state)
         for index, state in enumerate(simulate_path(system, running.state, paths, smoothing)):
-            if monitor:
-                monitor, found = accuracy.follow(monitor, state, paths[index : index + 2])
-                errors = found or errors
+            monitor = monitor and accuracy.note(monitor, state, paths[index : index + 2])
             if state.period % running.trace.every == 0:
                 rows.append(recent_trace.sample(system, state, running.scene.set_point, running.trace.pins))
+        if monitor:
+            monitor, found = accuracy.catch_up(monitor, state, len(path) - 1)
+            errors = found or errors
     clock = update_cost(running.clock, len(path) - 1, time.perf_counter() - started)
     gone = replace(
         running, state=state, snapshot=snapshot.dump(system, state), pose=path[-1],

@@ -31,25 +31,27 @@ __all__ = [
     "ErrorMonitor",
     "Errors",
     "begin_stretch",
+    "catch_up",
     "compare",
     "estimate_errors",
-    "follow",
     "has_every_command",
     "make_reference",
+    "note",
     "reference_settings",
     "reset",
     "start",
 ]
 
 Floats = NDArray[np.float64]
+#: Control periods of a session: the state after each, and the finger at both ends of it, (2, f, 7).
+Noted = tuple[tuple[State, Floats], ...]
 
 #: The reference's own error is taken to be a quarter of that of the run: halving the step leaves so much of
 #: an error of second order, which is what remains of a higher one across a kink. What comes out is an
 #: estimate, no bound, and is said as "about".
 SHARE = 4.0 / 3.0
 #: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
-#: the reference costs three of the session: only one is done in so many of the session's, so that no tick is
-#: slow.
+#: the reference takes three times one of the session: one is done in so many, so that no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
 
 
@@ -89,7 +91,11 @@ class ErrorMonitor:
         The reference's; None between two stretches.
     age : int
         Control periods of the session since the stretch began.
-    waiting : tuple of (State, ndarray (2, f, 7))
+    done : int
+        Control periods of the reference since then.
+    before : int
+        Control periods of the session in the tick before.
+    waiting : tuple of (State, ndarray)
         Periods of the stretch that the reference has still to do: the session after each, of which only the
         active cells are as they were then, and the finger at both ends of it.
     reached : ndarray (2, n) or None
@@ -99,7 +105,9 @@ class ErrorMonitor:
     system: System
     state: State | None = None
     age: int = 0
-    waiting: tuple[tuple[State, Floats], ...] = ()
+    done: int = 0
+    before: int = 0
+    waiting: Noted = ()
     reached: Floats | None = None
 
 
@@ -198,14 +206,11 @@ def begin_stretch(monitor: ErrorMonitor, state: State) -> ErrorMonitor:
     """
     if monitor.state is not None or 0 < monitor.age < STRETCH + PAUSE:
         return monitor
-    return ErrorMonitor(monitor.system, state.copy())
+    return ErrorMonitor(monitor.system, state.copy(), before=monitor.before)
 
 
-def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMonitor, Errors | None]:
-    """Note the control period a session has just done; return the errors where the reference ends a stretch.
-
-    The reference integrates one of the noted periods in every `SPREAD` of the session's. One that diverges
-    tells nothing, and the monitor starts anew.
+def note(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
+    """Return the monitor with the control period that a session has just done.
 
     Parameters
     ----------
@@ -217,23 +222,45 @@ def follow(monitor: ErrorMonitor, after: State, path: Floats) -> tuple[ErrorMoni
         The finger at both ends of the period; see `live_periods.simulate_path`.
     """
     monitor = replace(monitor, age=monitor.age + 1)
-    before = monitor.state
-    if before is None:
-        return begin_stretch(monitor, after), None
-    if monitor.age <= STRETCH:
-        monitor = _note_period(monitor, after, path)
-    if monitor.age % SPREAD:
-        return monitor, None
-    (leader, way), *waiting = monitor.waiting
-    system, force = monitor.system, monitor.system.rows.force
+    if monitor.state is None:
+        return begin_stretch(monitor, after)
+    return _note_period(monitor, after, path) if monitor.age <= STRETCH else monitor
+
+
+def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
+    """Integrate noted periods at the end of a tick; return the errors where the reference ends a stretch.
+
+    One is done in every `SPREAD` of the session's at most, and none in a tick of more periods than the one
+    before: such ticks take the longest already. After a reference that diverges the monitor starts anew.
+
+    Parameters
+    ----------
+    monitor : ErrorMonitor
+    after : State
+        The session's, at the end of the tick.
+    count : int
+        Control periods of the session in this tick.
+    """
+    longer, monitor = count > monitor.before, replace(monitor, before=count)
+    due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))
+    state, force = monitor.state, monitor.system.rows.force
+    while state is not None and due > 0:
+        due -= 1
+        state, waiting = _integrate(monitor.system, state, monitor.waiting)
+        if not np.isfinite(state.active.block).all():
+            return begin_stretch(reset(monitor), after), None
+        if not waiting and monitor.reached is not None:
+            found = compare(state.row(0), state.row(force), *monitor.reached)
+            return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(found)
+        monitor = replace(monitor, state=state, waiting=waiting, done=monitor.done + 1)
+    return monitor, None
+
+
+def _integrate(system: System, before: State, waiting: Noted) -> tuple[State, Noted]:
+    """Return the reference after one more period, and the periods that wait after that."""
+    (leader, way), *rest = waiting
     finger = trace_fingers(system, interpolate_poses(way, system.instants / system.period))[0]
-    state = repeat_period(system, before, finger, leader)
-    if not np.isfinite(state.active.block).all():
-        return begin_stretch(reset(monitor), after), None
-    if waiting or monitor.reached is None:
-        return replace(monitor, state=state, waiting=tuple(waiting)), None
-    found = compare(state.row(0), state.row(force), *monitor.reached)
-    return replace(monitor, state=None, waiting=(), reached=None), Errors.estimate(found)
+    return repeat_period(system, before, finger, leader), tuple(rest)
 
 
 def _note_period(monitor: ErrorMonitor, after: State, path: Floats) -> ErrorMonitor:
