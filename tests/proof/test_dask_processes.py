@@ -17,6 +17,7 @@ from digiclay.core.base.whole_files import read_json
 from digiclay.core.studies.series import finish
 from distributed import Client
 
+from tests.own_methods import forgotten, write_method
 from tests.package_copy import copy_package
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
 from tests.timeouts import TIMEOUT, wait_until
@@ -164,3 +165,18 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Pa
     assert sweep.returncode == 2
     assert " has digiclay 9." in said
     assert said.endswith("Install the same there.\n")
+
+
+def test_a_worker_elsewhere_gets_the_code_of_a_method_with_its_points(here: Path, start: Start) -> None:
+    own = write_method(here)
+    axes = ["--vary", "control.step=1e-5,3e-5", "--vary", "control.yield_force=0.01,0.02,0.03"]
+    sweep = ["sweep", "tap", "--method", f"{own}:SoftPad", *axes, "--metric", "lowest", "--quiet"]
+    _, address = start_scheduler(start, here)
+    (here / "elsewhere").mkdir()
+    start_worker(start, address, "--no-nanny", "--local-directory", "elsewhere")
+    with forgotten():
+        assert main([*sweep, "--workers", "1", "--out", "near"]) == 0
+        assert main([*sweep, "--scheduler", address, "--out", "far"]) == 0
+    near, far = ((here / name / "sweep.csv").read_bytes() for name in ("near", "far"))
+    assert near == far
+    assert len({line.split(b",")[2] for line in near.splitlines()[1:]}) > 2
