@@ -82,6 +82,17 @@ def take_methods(preferences: Any, context: Any) -> None:
         own_folder.clear()
 
 
+def take_folder(preferences: Any, context: Any) -> None:
+    """Take the permission back: it was given for another folder.
+
+    Parameters
+    ----------
+    preferences : bpy.types.AddonPreferences
+    context : bpy.types.Context
+    """
+    preferences.run_own_methods = False
+
+
 class Preferences(bpy.types.AddonPreferences):
     """Edit > Preferences > Add-ons > Digital Clay."""
 
@@ -137,11 +148,11 @@ class Preferences(bpy.types.AddonPreferences):
         update=take_methods,
     )
     methods_folder: bpy.props.StringProperty(
-        name="Folder",
-        description="Folder with Python files of control methods",
+        name="Own Methods",
+        description="Folder with Python files of control methods; a change turns Run Own Methods off",
         default=Choices.methods_folder,
         subtype="DIR_PATH",
-        update=take_methods,
+        update=take_folder,
     )
 
     def draw(self, context: Any) -> None:
@@ -154,19 +165,20 @@ class Preferences(bpy.types.AddonPreferences):
         column.prop(self, "take_press_tool")
         column.prop(self, "overlay_corner")
         column.separator()
-        column.prop(self, "run_own_methods")
-        if self.run_own_methods:
-            self._draw_methods(column)
-
-    def _draw_methods(self, column: Any) -> None:
-        """Draw the folder of own methods, a warning, what was loaded, and what was refused."""
-        warning = column.column()
-        warning.alert = True
-        warning.label(text="Every Python file in this folder is run with all your rights:", icon="ERROR")
-        warning.label(text="choose a folder that only you can write to, with code that you have read.")
         row = column.row(align=True)
         row.prop(self, "methods_folder")
         row.operator("digiclay.methods_reload", text="", icon="FILE_REFRESH")
+        if self.methods_folder:
+            self._draw_methods(column)
+
+    def _draw_methods(self, column: Any) -> None:
+        """Draw a warning, the permission, what was loaded, and what was refused."""
+        warning = column.column()
+        warning.alert = True
+        warning.label(text="Every Python file in this folder is run with all your rights:", icon="ERROR")
+        said = "choose a folder that only you can write to, with code that you have read."
+        warning.label(text=said, icon="BLANK1")
+        column.prop(self, "run_own_methods")
         found = own_folder.read_present()
         for name in found.names:
             column.label(text=title(name), icon="CHECKMARK", translate=False)

@@ -68,7 +68,9 @@ def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Pa
     write_method(tmp_path, PAD.replace("SoftPad", "HardPad"), "hard.py")
     assert bpy.ops.digiclay.methods_reload() == {"FINISHED"}
     assert list(list_added()) == ["faulty", "hard_pad", "soft_pad"]
-    chosen.methods_folder = str(tmp_path / "absent")
+    chosen.methods_folder = str(tmp_path / "absent")  # nobody has allowed the code of that one
+    assert (chosen.run_own_methods, list_added()) == (False, {})
+    chosen.run_own_methods = True
     assert (list_added(), own_folder.read_present().refused) == (
         {},
         (f"{tmp_path / 'absent'} must be a folder.",),
