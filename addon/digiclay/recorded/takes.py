@@ -14,6 +14,7 @@ from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
 from ..core.session.live_periods import simulate_path
+from ..core.session.recorded_path import make_take
 from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 from ..ui_text import localize
@@ -82,10 +83,7 @@ def find(bed: Any, number: str = "") -> Entry:
 def read_recording(session: Running) -> Take | None:
     """Return what a session has recorded, or None when that is nothing yet."""
     keep = session.recording
-    if keep is None or len(keep.path) < 2:
-        return None
-    smoothing = None if keep.smoothing is None else keep.smoothing.copy()
-    return Take(session.scene, keep.start, keep.path.copy(), session.snapshot, smoothing)
+    return None if keep is None else make_take(session.scene, keep, session.snapshot)
 
 
 def add(bed: Any, take: Take, name: str = "") -> Entry:
