@@ -1,8 +1,8 @@
-"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune`` and ``benchmark``.
+"""Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve`` and ``benchmark``.
 
-The paper's reproduction and the studies are packages of their own beside this one, which add their
-commands themselves where they are installed. Here stands what is said where they are not, and where the
-benchmarks are.
+The paper's reproduction, the studies and the server are packages of their own beside this one, which add
+their commands themselves where they are installed. Here stands what is said where they are not, and where
+the benchmarks are.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ COMMANDS = {
     "paper": ("digiclay_paper", "reproduce", "plots", "reproduce the paper's results"),
     "study": ("digiclay_study", "study_command", "study", "find which parameters matter for which metric"),
     "tune": ("digiclay_study", "tune_command", "study", "find the best trade-off of two metrics"),
+    "serve": ("digiclay_serve", "serve_command", "serve", "run a session for other programs"),
 }
 NO_BENCHMARK = "The benchmarks are run from a checkout: 'python -m benchmarks --help' lists them."
 

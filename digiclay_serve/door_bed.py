@@ -1,0 +1,56 @@
+"""Bed of a session, as its clients are told of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from digiclay.core.engine.system import System
+from digiclay.core.scene.schema import Scene
+
+__all__ = ["Bed", "describe_bed"]
+
+#: Most pins whose positions are told: libraries refuse messages of a megabyte.
+MOST_POSITIONS = 10_000
+
+
+@dataclass(frozen=True)
+class Bed:
+    """What a client is told of the session once.
+
+    Attributes
+    ----------
+    name : str
+        Of the scene.
+    rows, columns : int
+    pitch, stroke : float
+        m.
+    period : float
+        Control period, s.
+    positions : tuple of (float, float)
+        Of the pins, m; none of a bed of more than 10,000.
+    """
+
+    name: str
+    rows: int
+    columns: int
+    pitch: float
+    stroke: float
+    period: float
+    positions: tuple[tuple[float, float], ...]
+
+
+def describe_bed(scene: Scene, system: System) -> Bed:
+    """Return what clients are told of a bed.
+
+    Parameters
+    ----------
+    scene : Scene
+    system : System
+        Of the scene.
+    """
+    layout, grid = scene.layout, system.grid
+    told = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
+    return Bed(
+        scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
+        tuple((float(x), float(y)) for x, y in told),
+    )  # fmt: skip

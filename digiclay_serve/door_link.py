@@ -1,0 +1,95 @@
+"""Link of the doors to the session: newest frame, orders, lease of the fingertip, counts."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+from .door_bed import Bed
+from .finger_lease import HeldError, Lease, claim, release
+from .latest_slot import LatestSlot
+from .order_slot import Order, pack_order
+from .protocol import Frame, Pose, Reset, Status, unpack_frame
+
+__all__ = ["DoorLink"]
+
+
+class DoorLink:
+    """Link of all doors of a process to the session.
+
+    Parameters
+    ----------
+    bed : Bed
+    orders, frames : LatestSlot
+        To the session, and from it.
+    token : str
+    """
+
+    def __init__(self, bed: Bed, orders: LatestSlot, frames: LatestSlot, token: str) -> None:
+        self.bed, self.token = bed, token
+        self.counts: Counter[str] = Counter()
+        self.packed: bytes = b""
+        self._orders, self._frames = orders, frames
+        self._order, self._lease = Order(), Lease()
+        self._changed = asyncio.Event()
+        self._frame: Frame | None = None
+
+    def take_frame(self) -> None:
+        """Take the newest frame from the session, and wake those who wait for it."""
+        packed = self._frames.read()
+        if packed is None:
+            return
+        self.packed, self._frame = packed, None
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+    async def next_frame(self) -> None:
+        """Wait for a newer frame; whoever is busy misses some."""
+        await self._changed.wait()
+
+    def read_frame(self) -> Frame | None:
+        """Return the newest frame; None before the first."""
+        if self._frame is None and self.packed:
+            self._frame = unpack_frame(self.packed)
+        return self._frame
+
+    def order(self, request: Pose | Reset | Status, client: object) -> dict[str, Any] | None:
+        """Carry out a request; return the answer, if it has one.
+
+        Parameters
+        ----------
+        request : Pose, Reset or Status
+        client : object
+            Anything that is equal for one client only.
+
+        Raises
+        ------
+        HeldError
+            When another client moves the fingertip.
+        """
+        if isinstance(request, Status):
+            return dict(self.counts)
+        now = asyncio.get_running_loop().time()
+        granted, self._lease = claim(self._lease, client, now)
+        if not granted:
+            self.counts["poses while held"] += 1
+            raise HeldError
+        if isinstance(request, Pose):
+            self.counts["poses"] += 1
+            self._order = replace(self._order, pose=request.pose, number=request.number)
+        else:
+            self.counts["resets"] += 1
+            self._order = Order(None, 0, self._order.resets + 1)
+        self._orders.write(pack_order(self._order))
+        return None
+
+    def leave(self, client: object) -> None:
+        """Note that a client has gone: another one may move the fingertip.
+
+        Parameters
+        ----------
+        client : object
+        """
+        self._lease = release(self._lease, client)

@@ -1,0 +1,123 @@
+"""Process of the doors: ``python -m digiclay_serve.door_process``, started by `doors`.
+
+A process of its own: whatever clients do costs its time and its memory, not those of the session. Its
+standard input has the settings, then a byte a frame; it ends when that input ends.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from digiclay.core.base.errors import DigiclayError, OutputError
+
+from .display_line import Display, open_display
+from .door_bed import Bed
+from .door_link import DoorLink
+from .doors import LENGTH
+from .latest_slot import open_slot
+from .osc_door import open_osc
+from .websocket_door import open_websocket
+
+__all__ = ["main"]
+
+#: How much more readily the system is to give the processor to the session.
+NICE = 5
+
+
+def main() -> None:
+    """Serve until the standard input ends."""
+    with suppress(OSError):
+        os.nice(NICE)
+    _allow_many_files()
+    settings = json.loads(_read_exactly(int.from_bytes(_read_exactly(LENGTH), "little")))
+    try:
+        told = asyncio.run(_serve(settings))
+    except DigiclayError as error:
+        told = {"error": str(error)}
+    _tell(told)
+
+
+def _allow_many_files() -> None:
+    """Raise the limit of open files as far as the system lets it: each connection is one."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
+
+
+def _read_exactly(count: int) -> bytes:
+    """Read bytes of the standard input."""
+    read = b""
+    while len(read) < count:
+        part = os.read(0, count - len(read))
+        if not part:
+            sys.exit(0)  # whoever started this has ended
+        read += part
+    return read
+
+
+def _tell(value: dict[str, Any]) -> None:
+    """Write a line of JSON for whoever started this."""
+    with suppress(BrokenPipeError):
+        sys.stdout.write(json.dumps(value) + "\n")
+        sys.stdout.flush()
+
+
+async def _serve(settings: dict[str, Any]) -> dict[str, Any]:
+    """Open the doors and serve; return the counts."""
+    orders, frames = (open_slot(Path(name)) for name in settings["slots"])
+    link = DoorLink(Bed(**settings["bed"]), orders, frames, settings["token"])
+    host = settings["host"]
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_reader(0, _take_wake, link, ended)
+    server = await _opened(open_websocket(link, host, settings["port"]), host, settings["port"])
+    osc, sending = await _opened(open_osc(link, host, settings["osc_port"]), host, settings["osc_port"])
+    display: Display | None = None
+    if settings["display"] is not None:
+        display = open_display(link, **settings["display"])
+    _tell({"port": server.sockets[0].getsockname()[1], "osc_port": osc.get_extra_info("sockname")[1]})
+    await ended.wait()
+    sending.cancel()
+    counts: dict[str, Any] = dict(link.counts)
+    if display is not None:
+        counts["display"] = display.close()
+    osc.close()
+    server.close()
+    with suppress(asyncio.TimeoutError):
+        await asyncio.wait_for(server.wait_closed(), 3.0)
+    return {"counts": counts}
+
+
+async def _opened(opening: Any, host: str, port: int) -> Any:
+    """Return what has been opened.
+
+    Raises
+    ------
+    OutputError
+        When the address cannot be used.
+    """
+    try:
+        return await opening
+    except (OSError, OverflowError) as error:
+        said = getattr(error, "strerror", None) or error
+        raise OutputError(f"Port {port} of {host} cannot be opened: {said}.") from None
+
+
+def _take_wake(link: DoorLink, ended: asyncio.Event) -> None:
+    """Take the newest frame, or end."""
+    if os.read(0, 65536):
+        link.take_frame()
+    else:
+        asyncio.get_running_loop().remove_reader(0)
+        ended.set()
+
+
+if __name__ == "__main__":
+    main()

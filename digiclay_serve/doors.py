@@ -1,0 +1,157 @@
+"""Doors of a session: the process that serves clients, and the two slots it shares with the session."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from contextlib import AbstractContextManager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import digiclay
+from digiclay.core.base.errors import OutputError
+
+from .door_bed import Bed
+from .latest_slot import make_slot
+from .order_slot import ORDER_SIZE, Order, unpack_order
+
+__all__ = ["LENGTH", "DoorSettings", "Doors"]
+
+#: Bytes of the length in front of the settings.
+LENGTH = 8
+#: Time for the process to say how many clients and errors there were, s.
+ENDING = 10.0
+
+
+@dataclass(frozen=True)
+class DoorSettings:
+    """Where the doors are, and who may enter.
+
+    Attributes
+    ----------
+    host : str
+    port, osc_port : int
+        0: chosen by the system.
+    token : str
+    display : dict or None
+        Serial line of a pin display: path, rate in Hz, baud.
+    """
+
+    host: str
+    port: int
+    osc_port: int
+    token: str
+    display: dict[str, Any] | None = None
+
+
+class Doors(AbstractContextManager["Doors"]):
+    """Process of the doors, from the start of the block to its end.
+
+    Parameters
+    ----------
+    settings : DoorSettings
+    bed : Bed
+    frame_size : int
+        Bytes of a packed frame.
+
+    Raises
+    ------
+    OutputError
+        On entry, when an address or the serial line cannot be used.
+    """
+
+    def __init__(self, settings: DoorSettings, bed: Bed, frame_size: int) -> None:
+        self.settings, self._bed = settings, bed
+        self._orders, orders = make_slot(ORDER_SIZE)
+        self._frames, frames = make_slot(-(-frame_size // 8) * 8)
+        self._files = [orders, frames]
+        self._order = Order()
+
+    def __enter__(self) -> Doors:
+        try:
+            self._start()
+        finally:
+            for path in self._files:
+                path.unlink(missing_ok=True)
+        return self
+
+    def _start(self) -> None:
+        """Start the process, and wait until its doors are open."""
+        import digiclay_serve
+
+        folders = {str(Path(str(package.__file__)).parents[1]) for package in (digiclay, digiclay_serve)}
+        path = os.pathsep.join(filter(None, [*sorted(folders), os.environ.get("PYTHONPATH", "")]))
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "digiclay_serve.door_process"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path},
+            start_new_session=True,  # Ctrl-C on a terminal is for the session
+        )  # fmt: skip
+        assert self._process.stdin is not None
+        settings = {**asdict(self.settings), "slots": [str(path) for path in self._files]}
+        said = json.dumps({**settings, "bed": asdict(self._bed)}).encode()
+        with suppress(BrokenPipeError):  # its answer says why
+            self._process.stdin.write(len(said).to_bytes(LENGTH, "little") + said)
+            self._process.stdin.flush()
+        answer = self._read_line()
+        if "port" not in answer:
+            self._end()
+            raise OutputError(answer.get("error", "The process of the doors has ended: see above."))
+        self.port, self.osc_port = int(answer["port"]), int(answer["osc_port"])
+        self._wake = self._process.stdin.fileno()
+        os.set_blocking(self._wake, False)
+
+    def read_order(self) -> Order:
+        """Return the newest order."""
+        read = self._orders.read()
+        if read is not None:
+            self._order = unpack_order(read)
+        return self._order
+
+    def show(self, frame: bytes) -> None:
+        """Show a packed frame to the clients.
+
+        Raises
+        ------
+        OutputError
+            When the process of the doors has ended.
+        """
+        self._frames.write(frame)
+        try:
+            os.write(self._wake, b".")
+        except BlockingIOError:  # it has been told of earlier ones, and will look at the newest
+            pass
+        except OSError:
+            raise OutputError("The process of the doors has ended.") from None
+
+    def close(self) -> dict[str, Any]:
+        """Close the doors, and return what they have counted."""
+        counts: dict[str, Any] = {}
+        if self._process.poll() is None and self._process.stdin and not self._process.stdin.closed:
+            self._process.stdin.close()
+            counts = self._read_line().get("counts", {})
+        self._end()
+        return counts
+
+    def __exit__(self, *raised: object) -> None:
+        self._end()
+
+    def _read_line(self) -> dict[str, Any]:
+        """Read a line of JSON; an empty answer when there is none."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        return dict(json.loads(line)) if line else {}
+
+    def _end(self) -> None:
+        """Have the process end."""
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream:
+                with suppress(OSError):
+                    stream.close()
+        try:
+            self._process.wait(ENDING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

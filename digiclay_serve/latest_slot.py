@@ -1,0 +1,94 @@
+"""Latest-value slot in memory that two processes share: one writes, one reads, and neither ever waits.
+
+A reader that stalls misses values; a writer that stalls leaves the last one. Nothing is queued, so neither
+can fill the memory of the other.
+"""
+
+from __future__ import annotations
+
+import mmap
+import tempfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+__all__ = ["LatestSlot", "make_slot", "open_slot"]
+
+#: Bytes before the value: number of the value, twice that and one more while it is written; its checksum.
+HEAD = 16
+#: Times that a value overwritten during reading is read again; later ones are read at the next look.
+TRIES = 3
+#: Memory that is no disk, where there is one.
+MEMORY = Path("/dev/shm")
+
+
+class LatestSlot:
+    """Slot for values of one size.
+
+    Parameters
+    ----------
+    memory : mmap
+        `HEAD` bytes and those of a value; zero before the first value.
+    """
+
+    def __init__(self, memory: mmap.mmap) -> None:
+        self._memory = memory
+        # One aligned machine word: it is written and read as a whole.
+        self._head = np.frombuffer(memory, np.uint64, 2)
+        self._seen = 0
+
+    @property
+    def size(self) -> int:
+        """Bytes of a value."""
+        return len(self._memory) - HEAD
+
+    def write(self, value: bytes) -> None:
+        """Put a value in the place of the last one.
+
+        Raises
+        ------
+        ValueError
+            When it has another size.
+        """
+        if len(value) != self.size:
+            raise ValueError(f"a value must have {self.size} bytes (got {len(value)})")
+        number = int(self._head[0])
+        self._head[0] = number + 1
+        self._memory[HEAD:] = value
+        self._head[1] = zlib.crc32(value)
+        self._head[0] = number + 2
+
+    def read(self) -> bytes | None:
+        """Return the newest value; None when there is none that was not read already."""
+        for _ in range(TRIES):
+            number = int(self._head[0])
+            if number == self._seen:
+                return None
+            value, check = self._memory[HEAD:], int(self._head[1])
+            # The checksum holds on processors that reorder writes, too.
+            if number % 2 == 0 and number == int(self._head[0]) and zlib.crc32(value) == check:
+                self._seen = number
+                return value
+        return None
+
+
+def make_slot(size: int) -> tuple[LatestSlot, Path]:
+    """Return a new slot, and the file by which another process opens it; remove that file then.
+
+    Parameters
+    ----------
+    size : int
+        Bytes of a value, a multiple of 8.
+    """
+    place = MEMORY if MEMORY.is_dir() else None
+    with tempfile.NamedTemporaryFile(prefix="digiclay_", dir=place, delete=False) as file:
+        file.write(bytes(HEAD + size))
+        file.flush()
+        return LatestSlot(mmap.mmap(file.fileno(), HEAD + size)), Path(file.name)
+
+
+def open_slot(path: Path) -> LatestSlot:
+    """Return the slot of another process."""
+    with path.open("r+b") as file:
+        return LatestSlot(mmap.mmap(file.fileno(), 0))

@@ -1,0 +1,239 @@
+"""Messages of the server, version 1: JSON and binary, little-endian; docs/serve.md is their table.
+
+A request is a pose of the fingertip, or a reset. A frame is the state after a control period.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.fingertip import LEVEL
+from numpy.typing import NDArray
+
+__all__ = [
+    "LARGEST_REQUEST", "VERSION", "Frame", "Pose", "Reset", "Status", "check_pose", "format_error",
+    "format_frame", "pack_frame", "pack_pose", "read_binary", "read_json", "unpack_frame",
+]  # fmt: skip
+
+Floats = NDArray[np.float64]
+
+VERSION = 1
+MARK = b"DC"
+STATE, POSE, RESET = 1, 2, 3
+#: Mark, version, kind, and the pins of a frame or the number of a request.
+HEAD = struct.Struct("<2sBBI")
+#: Period, number of the last pose taken up, flags (0), time, total force, pose.
+BODY = struct.Struct("<QII9d")
+POSITION = struct.Struct("<7d")
+#: No request is larger, bytes.
+LARGEST_REQUEST = 4096
+#: Shortest quaternion whose direction counts.
+SHORTEST = 1e-6
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Request: where the fingertip is to be.
+
+    Attributes
+    ----------
+    pose : tuple of 7 floats
+        Lowest point, m, and unit quaternion w, x, y, z.
+    number : int
+        The client's own, which the frames name once the pose has been taken up.
+    """
+
+    pose: tuple[float, ...]
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Request: the bed at rest."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """Request: counts of connections, refusals and frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """State after a control period.
+
+    Attributes
+    ----------
+    period : int
+        Control periods since the start of the server or the last reset.
+    number : int
+        Of the last pose taken up; 0 before the first.
+    time : float
+        Simulated, s.
+    total_force : float
+        N.
+    pose : ndarray (7,)
+        The fingertip's.
+    heights, forces : ndarray (n,), float32
+        Of the pins, m and N.
+    """
+
+    period: int
+    number: int
+    time: float
+    total_force: float
+    pose: Floats
+    heights: NDArray[np.float32]
+    forces: NDArray[np.float32]
+
+
+def check_pose(values: Sequence[object]) -> tuple[float, ...]:
+    """Return a pose of 7 numbers, its quaternion of length 1; a level finger where only 3 are given.
+
+    Parameters
+    ----------
+    values : sequence
+        3 or 7 numbers.
+
+    Raises
+    ------
+    ParameterError
+        When they are not finite numbers, or the quaternion has no direction.
+    """
+    if len(values) not in (3, 7):
+        rule = "must be 3 numbers, the lowest point in m, or 7 with a quaternion w, x, y, z"
+        raise ParameterError("pose", "", rule, f"{len(values)} values")
+    numbers = []
+    for value in values:
+        try:
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ValueError
+            numbers.append(float(value))
+        except (ValueError, OverflowError):
+            raise ParameterError("pose", "", "must be numbers", repr(value)[:40]) from None
+    place, turn = numbers[:3], numbers[3:] or list(LEVEL)
+    length = math.hypot(*turn)
+    if not all(map(math.isfinite, numbers)) or not math.isfinite(length):
+        raise ParameterError("pose", "", "must be finite numbers, in m and 1", str(numbers)[:80])
+    if length < SHORTEST:
+        raise ParameterError("pose", "", "must have a quaternion of length 1", str(turn))
+    return (*place, *(part / length for part in turn))
+
+
+def read_json(text: str) -> Pose | Reset | Status:
+    """Read a request in JSON.
+
+    Raises
+    ------
+    ParameterError
+        When it is none.
+    """
+    try:
+        found: Any = json.loads(text)
+    except (ValueError, RecursionError):
+        raise ParameterError("message", "", "must be JSON", repr(text[:40])) from None
+    if not isinstance(found, dict):
+        raise ParameterError("message", "", 'must be an object, such as {"type": "reset"}', repr(text[:40]))
+    _check_version(found.get("version", VERSION))
+    kind, allowed = found.get("type"), {"type", "version"}
+    if kind == "pose":
+        allowed |= {"position", "orientation", "number"}
+    elif kind not in ("reset", "status"):
+        raise ParameterError("message", "type", "must be pose, reset or status", repr(kind)[:40])
+    unknown = sorted(set(found) - allowed)
+    if unknown:
+        raise ParameterError("message", "", f"must have no other keys than {', '.join(sorted(allowed))}",
+                             repr(unknown[0])[:40])  # fmt: skip
+    if kind != "pose":
+        return Reset() if kind == "reset" else Status()
+    place: Any = found.get("position")
+    turn: Any = found.get("orientation", list(LEVEL))
+    for name, value, count in (("position", place, 3), ("orientation", turn, 4)):
+        if not isinstance(value, list) or len(value) != count:
+            raise ParameterError("pose", name, f"must be {count} numbers", repr(value)[:40])
+    return Pose(check_pose([*place, *turn]), _check_number(found.get("number", 0)))
+
+
+def read_binary(data: bytes) -> Pose | Reset:
+    """Read a request in binary.
+
+    Raises
+    ------
+    ParameterError
+        When it is none.
+    """
+    if len(data) < HEAD.size or data[:2] != MARK:
+        raise ParameterError("message", "", f"must begin with {MARK.decode()}", repr(data[:8]))
+    _, version, kind, number = HEAD.unpack_from(data)
+    _check_version(version)
+    if kind == RESET and len(data) == HEAD.size:
+        return Reset()
+    if kind != POSE or len(data) != HEAD.size + POSITION.size:
+        rule = f"must be a pose, kind {POSE} of {HEAD.size + POSITION.size} bytes, or a reset, kind {RESET}"
+        raise ParameterError("message", "", rule, f"kind {kind} of {len(data)} bytes")
+    return Pose(check_pose(POSITION.unpack_from(data, HEAD.size)), number)
+
+
+def pack_pose(request: Pose) -> bytes:
+    """Write a pose in binary."""
+    return HEAD.pack(MARK, VERSION, POSE, request.number) + POSITION.pack(*request.pose)
+
+
+def pack_frame(frame: Frame) -> bytes:
+    """Write a frame in binary."""
+    body = BODY.pack(frame.period, frame.number, 0, frame.time, frame.total_force, *frame.pose.tolist())
+    pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
+    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins])
+
+
+def unpack_frame(data: bytes) -> Frame:
+    """Read a frame in binary.
+
+    Raises
+    ------
+    ParameterError
+        When it is none.
+    """
+    start = HEAD.size + BODY.size
+    mark, version, kind, pins = HEAD.unpack_from(data) if len(data) >= start else (b"", 0, 0, 0)
+    if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) != start + 8 * pins:
+        rule = f"must be a state, kind {STATE} of version {VERSION}"
+        raise ParameterError("frame", "", rule, f"kind {kind} of {len(data)} bytes")
+    period, number, _, time, force, *pose = BODY.unpack_from(data, HEAD.size)
+    heights, forces = np.frombuffer(data, "<f4", offset=start).reshape(2, pins)
+    return Frame(period, number, time, force, np.array(pose), heights, forces)
+
+
+def format_frame(frame: Frame) -> str:
+    """Write a frame in JSON."""
+    said = {
+        "version": VERSION, "type": "state", "period": frame.period, "number": frame.number,
+        "time": frame.time, "total_force": frame.total_force, "position": frame.pose[:3].tolist(),
+        "orientation": frame.pose[3:].tolist(), "heights": frame.heights.tolist(),
+        "forces": frame.forces.tolist(),
+    }  # fmt: skip
+    return json.dumps(said, allow_nan=False)
+
+
+def format_error(message: str) -> str:
+    """Write an error in JSON."""
+    return json.dumps({"version": VERSION, "type": "error", "message": message})
+
+
+def _check_version(version: object) -> None:
+    """Refuse another version."""
+    if type(version) is not int or version != VERSION:
+        raise ParameterError("message", "version", f"must be {VERSION}", repr(version)[:40])
+
+
+def _check_number(number: object) -> int:
+    """Return the number of a request."""
+    if type(number) is not int or not 0 <= number < 2**32:
+        raise ParameterError("pose", "number", "must be a whole number of 32 bits", repr(number)[:40])
+    return number

@@ -1,0 +1,194 @@
+"""``digiclay serve``: a session for other programs, in real time."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from digiclay.commands.arguments import add_command, add_scene, scene_of
+from digiclay.commands.refusals import refuse_unwritable, refuse_without
+from digiclay.commands.stop import Stop
+from digiclay.core.base.errors import OutputError
+from digiclay.core.base.whole_files import format_json, write_whole
+from digiclay.core.scene.scene_source import Setting
+
+from .access_token import VARIABLE, choose_token
+from .door_bed import describe_bed
+from .doors import Doors, DoorSettings
+from .protocol import pack_frame
+from .real_time_loop import run_session
+from .served_session import begin_session, make_frame
+from .take_parts import PartWriter
+
+__all__ = ["add"]
+
+EXAMPLES = f"""\
+examples:
+  digiclay serve ridge_mound_valley
+  digiclay serve --rate 1000 --out recorded
+  digiclay serve my.toml --display /dev/ttyUSB0 --display-rate 30 --display-baud 1000000
+
+Ctrl-C stops. Other programs send poses of the fingertip and receive forces and heights, by WebSocket and
+OSC; both need the token, which is printed once, or given by --token or {VARIABLE}.
+"""
+#: Addresses of this machine alone.
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+HOST, PORT, OSC_PORT = "127.0.0.1", 8765, 8766
+SCENE = "ridge_mound_valley"
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    said = "Run a session in real time for other programs: poses in, forces and heights out."
+    parser = add_command(commands, "serve", "run a session for other programs", EXAMPLES, said)
+    add_scene(parser, SCENE, positional=True)
+    parser.add_argument(
+        "--rate",
+        metavar="HZ",
+        type=_rate,
+        help="control periods a second, 1 to 1000; default: the scene's",
+    )
+    parser.add_argument("--host", default=HOST, help=f"address of this machine to serve at; default: {HOST}")
+    parser.add_argument(
+        "--port", metavar="N", type=_port, default=PORT, help=f"of the WebSocket, 0: any; default: {PORT}"
+    )
+    parser.add_argument(
+        "--osc-port", metavar="N", type=_port, default=OSC_PORT, help=f"of OSC, 0: any; default: {OSC_PORT}"
+    )
+    parser.add_argument(
+        "--token", metavar="T", help=f"token of the clients; default: {VARIABLE}, or one at random"
+    )
+    parser.add_argument("--out", metavar="DIR", type=Path, help="record a take into this folder")
+    parser.add_argument(
+        "--report", metavar="FILE", type=Path, help="write times and counts as JSON in the end"
+    )
+    parser.add_argument("--display", metavar="TTY", help="serial line of a pin display")
+    parser.add_argument(
+        "--display-rate", metavar="HZ", type=_rate, default=30.0, help="its frames a second; default: 30"
+    )
+    parser.add_argument(
+        "--display-baud", metavar="B", type=int, default=115200, help="its speed; default: 115200"
+    )
+    parser.add_argument("--seconds", metavar="S", type=_seconds, help="stop after this time; default: Ctrl-C")
+    parser.add_argument("--quiet", action="store_true", help="print addresses, errors and a random token")
+    parser.set_defaults(carry_out=carry_out)
+
+
+def carry_out(arguments: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    for module in ("websockets", "pythonosc"):
+        refuse_without(module, "digiclay serve", "pip install digiclay[serve]")
+    if sys.platform == "win32":
+        raise OutputError("digiclay serve runs on Linux and macOS: it needs pipes that do not wait.")
+    if arguments.report is not None:
+        refuse_unwritable(arguments.report.resolve().parent)
+    token, made = choose_token(arguments.token)
+    if arguments.rate is not None:
+        arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
+    scene, _ = scene_of(arguments)
+    session = begin_session(scene)
+    display = None
+    if arguments.display is not None:
+        display = {
+            "path": arguments.display, "rate": arguments.display_rate, "baud": arguments.display_baud
+        }  # fmt: skip
+    settings = DoorSettings(arguments.host, arguments.port, arguments.osc_port, token, display)
+    bed, size = describe_bed(scene, session.system), len(pack_frame(make_frame(session)))
+    with (
+        PartWriter(arguments.out) if arguments.out is not None else nullcontext() as writer,
+        Stop() as stop,
+        Doors(settings, bed, size) as doors,
+    ):
+        rate = 1.0 / session.system.period
+        _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods a second")
+        _tell(f"WebSocket ws://{_bracket(arguments.host)}:{doors.port}")
+        _tell(f"OSC       {_bracket(arguments.host)}:{doors.osc_port} (UDP)")
+        if made:
+            _tell(f"token     {token}")
+        if arguments.host not in LOOPBACK:
+            _tell("Other machines can reach this address, and the token is sent without encryption.")
+        stopped = _until(stop, arguments.seconds)
+        try:
+            session, figures = run_session(session, doors, writer, stopped, _tell)
+        finally:
+            written = writer.finish() if writer else []
+        figures["counts"] = doors.close()
+    if arguments.report is not None:
+        write_whole(arguments.report, format_json({**figures, "diverged": session.diverged}))
+    if not arguments.quiet:
+        for line in _summary(figures):
+            _tell(line)
+    for path in written:
+        _tell(f"take written to {path}")
+    if writer and writer.failure:
+        raise OutputError(writer.failure)
+    return 0
+
+
+def _rate(text: str) -> float:
+    """Read a rate in Hz."""
+    return _number(text, 1.0, 1000.0, "Hz")
+
+
+def _seconds(text: str) -> float:
+    """Read how long to serve, s."""
+    return _number(text, 0.0, 1e9, "s")
+
+
+def _number(text: str, least: float, most: float, unit: str) -> float:
+    """Read a number between two bounds."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not least <= number <= most:
+        raise argparse.ArgumentTypeError(f"must be from {least:g} to {most:g} {unit} (got {text!r})")
+    return number
+
+
+def _port(text: str) -> int:
+    """Read the number of a port."""
+    if not text.isdecimal() or len(text) > 5 or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"must be a port from 0 to 65535 (got {text!r})")
+    return int(text)
+
+
+def _bracket(host: str) -> str:
+    """Return a host as it stands in an address."""
+    return f"[{host}]" if ":" in host else host
+
+
+def _tell(line: str) -> None:
+    """Print a line at once: other programs wait for the addresses."""
+    print(line, flush=True)
+
+
+def _until(stop: Callable[[], bool], seconds: float | None) -> Callable[[], bool]:
+    """Return a function that says whether to stop: on request, or after some time."""
+    if seconds is None:
+        return stop
+    end = time.monotonic() + seconds
+    return lambda: stop() or time.monotonic() >= end
+
+
+def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Give the lines about a session that has ended."""
+    elapsed, period, periods = figures["elapsed"], figures["period"], figures["periods"]
+    shares = ", ".join(f"{name} {1e3 * elapsed[name]:.2f} ms" for name in ("p50", "p99", "p99.9", "longest"))
+    missed = 100.0 * figures["missed"] / max(1, periods)
+    yield (
+        f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.2g} %), "
+        f"{figures['left_out']} of them left out; {shares}"
+    )
+    counts = {name: count for name, count in sorted(figures["counts"].items()) if name != "display"}
+    if counts:
+        yield ", ".join(f"{name}: {count}" for name, count in counts.items())
+    ended = figures["counts"].get("display", {}).get("ended")
+    if ended:
+        yield f"The line of the pin display ended: {ended}."

@@ -1,0 +1,170 @@
+"""Session of a server as a value: it follows the newest pose, control period by control period."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from digiclay.core.base.errors import DivergenceError
+from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.state import State
+from digiclay.core.engine.system import System
+from digiclay.core.model.trajectory import sample_poses
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.schema import Scene
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_periods import clamp_pose, interpolate_path, simulate_path
+from digiclay.core.session.recent_trace import measure_total_force
+from digiclay.core.session.recorded_path import Recording
+from numpy.typing import NDArray
+
+from .protocol import Frame
+
+__all__ = ["Kept", "Session", "begin_session", "follow", "make_frame", "record", "reset"]
+
+Floats = NDArray[np.float64]
+
+#: Time between two states that are kept for a session that diverges, s.
+KEEP = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """State to go back to: period, snapshot, and pose of the fingertip (7,)."""
+
+    period: int
+    snapshot: bytes
+    pose: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """Session at one instant.
+
+    Attributes
+    ----------
+    scene : Scene
+    system : System
+    state : State
+        Used up by the next step.
+    pose : ndarray (7,)
+        The fingertip's.
+    number : int
+        Of the last pose taken up.
+    kept : Kept
+    recording : Recording or None
+    diverged : int
+        How often it went back to `kept`.
+    refused : ndarray (7,) or None
+        Pose on the way to which it diverged: it is not gone to again.
+    """
+
+    scene: Scene
+    system: System
+    state: State
+    pose: Floats
+    kept: Kept
+    number: int = 0
+    recording: Recording | None = None
+    diverged: int = 0
+    refused: Floats | None = None
+
+
+def begin_session(scene: Scene) -> Session:
+    """Begin a session at rest, its fingertip where the path of the scene begins.
+
+    Raises
+    ------
+    DigiclayError
+        When the scene's parts do not go together.
+    """
+    return _begin_at_rest(scene, assemble(scene))
+
+
+def _begin_at_rest(scene: Scene, system: System) -> Session:
+    """Return the session of a bed at rest."""
+    state = begin(system)
+    first = sample_poses(scene.trajectories(), np.zeros(1))[0, 0]
+    pose = clamp_pose(first, system.cell.actuator.stroke)
+    return Session(scene, system, state, pose, Kept(0, snapshot.dump(system, state), pose))
+
+
+def follow(session: Session, target: Floats, number: int, count: int) -> Session:
+    """Simulate control periods in which the fingertip goes straight to a pose.
+
+    A session that diverges goes back to a state it has kept, with the fingertip there; its recording too.
+
+    Parameters
+    ----------
+    session : Session
+        Used up.
+    target : ndarray (7,)
+        Lowest point, m, and unit quaternion, finite.
+    number : int
+        Of the pose.
+    count : int
+        Control periods, at least 1.
+    """
+    system = session.system
+    if session.refused is not None and np.array_equal(target, session.refused):
+        target = session.pose
+    end = clamp_pose(target, system.cell.actuator.stroke)
+    path = interpolate_path(session.pose[None], end[None], count)
+    try:
+        # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
+        with np.errstate(over="ignore", invalid="ignore"):
+            (state,) = deque(simulate_path(system, session.state, path), maxlen=1)
+    except DivergenceError:
+        return replace(_go_back(session), refused=target)
+    recording = session.recording and session.recording.extend(path[1:], 0)
+    after = replace(session, state=state, pose=end, number=number, recording=recording)
+    if state.period - session.kept.period >= KEEP / system.period:
+        after = replace(after, kept=Kept(state.period, snapshot.dump(system, state), end))
+    return after
+
+
+def _go_back(session: Session) -> Session:
+    """Return the session at its kept state."""
+    kept, recording = session.kept, session.recording
+    # What was recorded since is cut off: the recording began at the kept state, or before it.
+    recording = recording and recording.cut_at_period(kept.period)
+    return replace(
+        session, state=snapshot.load(session.system, kept.snapshot), pose=kept.pose,
+        recording=recording, diverged=session.diverged + 1,
+    )  # fmt: skip
+
+
+def reset(session: Session) -> Session:
+    """Return the session with its bed at rest and its fingertip where it began; a recording ends."""
+    fresh = _begin_at_rest(session.scene, session.system)
+    return replace(fresh, number=session.number, diverged=session.diverged)
+
+
+def record(session: Session, room: int) -> Session:
+    """Begin to record.
+
+    Parameters
+    ----------
+    session : Session
+    room : int
+        Control periods for which there is room at once.
+    """
+    now = snapshot.dump(session.system, session.state)
+    period = session.state.period
+    started = Recording.begin(now, period, session.pose[None], 0, room + 1)
+    return replace(session, recording=started, kept=Kept(period, now, session.pose))
+
+
+def make_frame(session: Session) -> Frame:
+    """Return the state for other programs."""
+    state, system = session.state, session.system
+    return Frame(
+        state.period,
+        session.number,
+        state.period * system.period,
+        measure_total_force(system, state),
+        session.pose,
+        state.row(0).astype(np.float32),
+        state.row(system.rows.force).astype(np.float32),
+    )

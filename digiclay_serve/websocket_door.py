@@ -1,0 +1,246 @@
+"""WebSocket door: requests in, frames out, for a bounded number of clients."""
+
+from __future__ import annotations
+
+import asyncio
+import http
+import json
+import math
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from digiclay.core.base.errors import DigiclayError, ParameterError
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from .access_token import is_token
+from .door_link import DoorLink
+from .finger_lease import HeldError
+from .protocol import (
+    LARGEST_REQUEST,
+    VERSION,
+    format_error,
+    format_frame,
+    read_binary,
+    read_json,
+)
+
+__all__ = ["Wishes", "open_websocket", "read_wishes"]
+
+#: Most connections, those included that have not said yet who they are.
+MOST_CONNECTIONS = 64
+#: Time for a client to say who it is, s; and to answer a ping.
+OPENING, PING = 5.0, 10.0
+#: Most messages of a client in a second, and most wrong ones, before it is closed.
+FLOOD, WRONG = 4000, 20
+#: Bytes that wait for a slow reader; then frames pass it by.
+UNSENT = 64 * 1024
+#: Bytes that wait for one at most, and some frames; websockets answers pings without regard to a limit.
+MOST_UNSENT = 4 * 1024 * 1024
+#: Frames a second of a client that names no rate.
+USUAL_RATE = 60.0
+POLICY = 1008
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a client asks for in its address.
+
+    Attributes
+    ----------
+    binary : bool
+        Frames in binary.
+    rate : float
+        Frames a second at most; 0: none.
+    token : str
+        Empty where the header has it.
+    """
+
+    binary: bool = False
+    rate: float = USUAL_RATE
+    token: str = ""
+
+
+def read_wishes(path: str) -> Wishes:
+    """Read the address of a request, ``/?format=binary&rate=1000``.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        address = urlsplit(path)
+        given = dict(parse_qsl(address.query, keep_blank_values=True, max_num_fields=8))
+    except ValueError:
+        raise ParameterError("address", "", "must be an address", repr(path[:40])) from None
+    unknown = sorted(set(given) - {"format", "rate", "token"})
+    if unknown or address.path not in ("", "/"):
+        said = repr(unknown[0] if unknown else address.path)[:40]
+        raise ParameterError("address", "", "must be / with format, rate and token alone", said)
+    if given.get("format", "json") not in ("json", "binary"):
+        raise ParameterError("address", "format", "must be json or binary", repr(given["format"])[:40])
+    try:
+        rate = float(given.get("rate", USUAL_RATE))
+    except ValueError:
+        rate = math.nan
+    if not 0.0 <= rate <= 1000.0:
+        raise ParameterError("address", "rate", "must be from 0 to 1000 Hz", repr(given["rate"])[:40])
+    return Wishes(given.get("format") == "binary", rate, given.get("token", ""))
+
+
+async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
+    """Open the door.
+
+    Parameters
+    ----------
+    link : DoorLink
+    host : str
+    port : int
+        0: chosen by the system.
+
+    Raises
+    ------
+    OSError
+        When the address cannot be used.
+    """
+    door = _WebSocketDoor(link)
+    return await serve(
+        door.handle, host, port, process_request=door.admit, create_connection=door.connect,  # type: ignore[arg-type]  # any function will do
+        compression=None,
+        max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
+        ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None,
+    )  # fmt: skip
+
+
+class _Connection(ServerConnection):
+    """Connection that is cut at once when there are too many."""
+
+    door: _WebSocketDoor
+    cut = False
+
+    def connection_made(self, transport: Any) -> None:
+        """Begin, or cut the connection before anything is read."""
+        if len(self.door.connections) >= MOST_CONNECTIONS:
+            self.cut = True
+            self.door.link.counts["connections beyond the limit"] += 1
+            transport.abort()
+            return
+        self.door.connections.add(self)
+        super().connection_made(transport)
+
+    def data_received(self, data: bytes) -> None:
+        """Take in what has come; cut a client whose pings are answered faster than it reads."""
+        if self.cut:
+            return
+        super().data_received(data)
+        if self.transport.get_write_buffer_size() > MOST_UNSENT + 4 * len(self.door.link.packed):
+            self.transport.abort()
+
+    def eof_received(self) -> None:
+        """Note the end of what comes."""
+        if not self.cut:
+            super().eof_received()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End."""
+        self.door.connections.discard(self)
+        if not self.cut:
+            super().connection_lost(exc)
+
+
+class _WebSocketDoor:
+    """Handlers of the connections."""
+
+    def __init__(self, link: DoorLink) -> None:
+        self.link = link
+        self.connections: set[_Connection] = set()
+
+    def connect(self, *arguments: Any, **options: Any) -> ServerConnection:
+        """Make a connection of this door."""
+        made = _Connection(*arguments, **options)
+        made.door = self
+        return made
+
+    def admit(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Refuse a client without the token, or with an address that makes no sense."""
+        try:
+            wishes = read_wishes(request.path)
+            header = request.headers.get("Authorization", "")
+        except DigiclayError as error:
+            self.link.counts["requests refused"] += 1
+            return connection.respond(http.HTTPStatus.BAD_REQUEST, f"{error}\n")
+        except Exception:  # two headers of one name: websockets raises an error of its own
+            header, wishes = "", Wishes()
+        scheme, _, given = header.partition(" ")
+        given = given.strip() if scheme.lower() == "bearer" else wishes.token
+        if is_token(given, self.link.token):
+            return None
+        self.link.counts["wrong tokens"] += 1
+        return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is missing or wrong.\n")
+
+    async def handle(self, connection: ServerConnection) -> None:
+        """Serve a client until it goes."""
+        assert connection.request is not None
+        wishes = read_wishes(connection.request.path)
+        self.link.counts["clients"] += 1
+        sender = asyncio.ensure_future(self._send_frames(connection, wishes))
+        try:
+            await self._take_requests(connection)
+        except ConnectionClosed:
+            pass
+        finally:
+            self.link.leave(connection)
+            sender.cancel()
+            with suppress(asyncio.CancelledError, ConnectionClosed):
+                await sender
+
+    async def _send_frames(self, connection: ServerConnection, wishes: Wishes) -> None:
+        """Send what the bed is, then frames at the rate of the client, as far as it reads them."""
+        bed = {"version": VERSION, "type": "bed", **asdict(self.link.bed)}
+        await connection.send(json.dumps(bed))
+        if wishes.rate == 0.0:
+            return
+        every, due = max(1, round(1.0 / (self.link.bed.period * wishes.rate))), 0
+        while True:
+            await self.link.next_frame()
+            frame = self.link.read_frame()
+            if frame is None or due - every < frame.period < due:
+                continue
+            due = frame.period + every
+            await connection.send(self.link.packed if wishes.binary else format_frame(frame))
+            self.link.counts["frames sent"] += 1
+
+    async def _take_requests(self, connection: ServerConnection) -> None:
+        """Carry out requests; a client that floods, or sends many wrong ones, is closed."""
+        clock = asyncio.get_running_loop().time
+        second, count, wrong, told = clock(), 0, 0, -math.inf
+        async for message in connection:
+            count += 1
+            if clock() - second >= 1.0:
+                second, count = clock(), 1
+            if count > FLOOD:
+                self.link.counts["floods"] += 1
+                await connection.close(POLICY, f"more than {FLOOD} messages a second")
+                return
+            try:
+                request = read_json(message) if isinstance(message, str) else read_binary(message)
+                answer = self.link.order(request, connection)
+            except HeldError as error:
+                # Said once a second: poses come a thousand times as often.
+                if clock() - told >= 1.0:
+                    told = clock()
+                    await connection.send(format_error(str(error)))
+            except DigiclayError as error:
+                wrong += 1
+                self.link.counts["messages refused"] += 1
+                await connection.send(format_error(str(error)))
+                if wrong >= WRONG:
+                    await connection.close(POLICY, "too many wrong messages")
+                    return
+            else:
+                if answer is not None:
+                    said = {"version": VERSION, "type": "status", "counts": answer}
+                    await connection.send(json.dumps(said))
