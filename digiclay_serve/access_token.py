@@ -1,4 +1,4 @@
-"""Token by which the server knows its clients."""
+"""Token of the clients of a server."""
 
 from __future__ import annotations
 

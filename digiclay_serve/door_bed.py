@@ -1,4 +1,4 @@
-"""Bed of a session, as its clients are told of it."""
+"""Bed of a session as a message to its clients."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_POSITIONS = 10_000
 
 @dataclass(frozen=True)
 class Bed:
-    """What a client is told of the session once.
+    """Bed of the session, sent to a client once.
 
     Attributes
     ----------

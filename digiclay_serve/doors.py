@@ -28,7 +28,7 @@ ENDING = 10.0
 
 @dataclass(frozen=True)
 class DoorSettings:
-    """Where the doors are, and who may enter.
+    """Addresses of the doors, and the token of their clients.
 
     Attributes
     ----------
@@ -80,12 +80,10 @@ class Doors(AbstractContextManager["Doors"]):
 
     def _start(self) -> None:
         """Start the process, and wait until its doors are open."""
-        import digiclay_serve
-
-        folders = {str(Path(str(package.__file__)).parents[1]) for package in (digiclay, digiclay_serve)}
+        folders = {str(Path(file).parents[1]) for file in (str(digiclay.__file__), __file__)}
         path = os.pathsep.join(filter(None, [*sorted(folders), os.environ.get("PYTHONPATH", "")]))
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "digiclay_serve.door_process"],
+            [sys.executable, "-m", f"{__package__}.door_process"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,  # Ctrl-C on a terminal is for the session
         )  # fmt: skip

@@ -28,8 +28,6 @@ Floats = NDArray[np.float64]
 CATCH_UP = 0.05
 #: Width of a bin of the histograms, s.
 BIN = 1e-5
-#: Duration of a part of a take, s.
-PART = 10.0
 #: Longest time without a look at whether to stop, s.
 LOOK = 0.1
 #: Time after which another thread of this process gets the interpreter, s; by default it is five periods.
@@ -72,6 +70,7 @@ def run_session(
     session: Session,
     doors: Doors,
     writer: PartWriter | None,
+    part: float,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
 ) -> tuple[Session, dict[str, Any]]:
@@ -84,13 +83,15 @@ def run_session(
     doors : Doors
     writer : PartWriter or None
         Of a take.
+    part : float
+        Duration of a part of it, s.
     stopped : callable
         Whether to stop.
     tell : callable
         Told what a person has to know, a line at a time.
     """
     sys.setswitchinterval(SWITCH)
-    room = max(1, round(PART / session.system.period))
+    room = max(1, round(part / session.system.period))
     if writer:
         session = record(session, room)
     frame = pack_frame(make_frame(session))

@@ -30,7 +30,7 @@ __all__ = ["add"]
 
 EXAMPLES = f"""\
 examples:
-  digiclay serve ridge_mound_valley
+  digiclay serve                                    the device of the paper, 200 control periods a second
   digiclay serve --rate 1000 --out recorded
   digiclay serve my.toml --display /dev/ttyUSB0 --display-rate 30 --display-baud 1000000
 
@@ -47,7 +47,7 @@ def add(commands: Any) -> None:
     """Add the command."""
     said = "Run a session in real time for other programs: poses in, forces and heights out."
     parser = add_command(commands, "serve", "run a session for other programs", EXAMPLES, said)
-    add_scene(parser, SCENE, positional=True)
+    add_scene(parser, optional=True)
     parser.add_argument(
         "--rate",
         metavar="HZ",
@@ -65,6 +65,10 @@ def add(commands: Any) -> None:
         "--token", metavar="T", help=f"token of the clients; default: {VARIABLE}, or one at random"
     )
     parser.add_argument("--out", metavar="DIR", type=Path, help="record a take into this folder")
+    parser.add_argument(
+        "--part", metavar="S", type=_part, default=10.0,
+        help="seconds of a take that a killed process loses at most; default: 10",
+    )  # fmt: skip
     parser.add_argument(
         "--report", metavar="FILE", type=Path, help="write times and counts as JSON in the end"
     )
@@ -91,6 +95,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     token, made = choose_token(arguments.token)
     if arguments.rate is not None:
         arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
+    arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
     session = begin_session(scene)
     display = None
@@ -115,7 +120,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             _tell("Other machines can reach this address, and the token is sent without encryption.")
         stopped = _until(stop, arguments.seconds)
         try:
-            session, figures = run_session(session, doors, writer, stopped, _tell)
+            session, figures = run_session(session, doors, writer, arguments.part, stopped, _tell)
         finally:
             written = writer.finish() if writer else []
         figures["counts"] = doors.close()
@@ -134,6 +139,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
 def _rate(text: str) -> float:
     """Read a rate in Hz."""
     return _number(text, 1.0, 1000.0, "Hz")
+
+
+def _part(text: str) -> float:
+    """Read the duration of a part of a take, s."""
+    return _number(text, 0.1, 600.0, "s")
 
 
 def _seconds(text: str) -> float:

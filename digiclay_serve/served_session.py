@@ -110,7 +110,8 @@ def follow(session: Session, target: Floats, number: int, count: int) -> Session
     if session.refused is not None and np.array_equal(target, session.refused):
         target = session.pose
     end = clamp_pose(target, system.cell.actuator.stroke)
-    path = interpolate_path(session.pose[None], end[None], count)
+    start, stop = session.pose[None], end[None]
+    path = np.array([start, stop]) if count == 1 else interpolate_path(start, stop, count)
     try:
         # A pressed pin's force grows exponentially; beyond all floats the session says so itself.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -28,7 +28,7 @@ from .protocol import (
     read_json,
 )
 
-__all__ = ["Wishes", "open_websocket", "read_wishes"]
+__all__ = ["FLOOD", "Pace", "Wishes", "count_message", "open_websocket", "read_wishes"]
 
 #: Most connections, those included that have not said yet who they are.
 MOST_CONNECTIONS = 64
@@ -47,7 +47,7 @@ POLICY = 1008
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a client asks for in its address.
+    """Options of a client in its address.
 
     Attributes
     ----------
@@ -91,6 +91,27 @@ def read_wishes(path: str) -> Wishes:
     return Wishes(given.get("format") == "binary", rate, given.get("token", ""))
 
 
+@dataclass(frozen=True)
+class Pace:
+    """Messages of a client in a second that began at an instant, s."""
+
+    began: float
+    count: int = 0
+
+
+def count_message(pace: Pace, now: float) -> tuple[bool, Pace]:
+    """Return whether one more message is one of too many in a second, and the count with it.
+
+    Parameters
+    ----------
+    pace : Pace
+    now : float
+        By a clock that never goes back, s.
+    """
+    after = Pace(pace.began, pace.count + 1) if now - pace.began < 1.0 else Pace(now, 1)
+    return after.count > FLOOD, after
+
+
 async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
     """Open the door.
 
@@ -111,7 +132,7 @@ async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
         door.handle, host, port, process_request=door.admit, create_connection=door.connect,  # type: ignore[arg-type]  # any function will do
         compression=None,
         max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
-        ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None,
+        ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None, backlog=1024,
     )  # fmt: skip
 
 
@@ -216,13 +237,12 @@ class _WebSocketDoor:
     async def _take_requests(self, connection: ServerConnection) -> None:
         """Carry out requests; a client that floods, or sends many wrong ones, is closed."""
         clock = asyncio.get_running_loop().time
-        second, count, wrong, told = clock(), 0, 0, -math.inf
+        pace, wrong, told = Pace(clock()), 0, -math.inf
         async for message in connection:
-            count += 1
-            if clock() - second >= 1.0:
-                second, count = clock(), 1
-            if count > FLOOD:
+            flood, pace = count_message(pace, clock())
+            if flood:
                 self.link.counts["floods"] += 1
+                self.link.leave(connection)
                 await connection.close(POLICY, f"more than {FLOOD} messages a second")
                 return
             try:

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("addon/digiclay", "benchmarks", "digiclay_paper", "digiclay_study")
+PACKAGES = ("addon/digiclay", "benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")
 #: Methods that Blender calls, with the parameters it gives them.
 BLENDERS = dict.fromkeys(("invoke", "modal"), ("context", "event"))
 

@@ -20,7 +20,7 @@ from tests.timeouts import TIMEOUT
 HERE = Path(__file__).parent
 TOOL = HERE.parents[1] / "tools" / "extension.py"
 #: Packages that stand beside the extension.
-BESIDE = ("benchmarks", "digiclay_paper", "digiclay_study")
+BESIDE = ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ PAGES = sorted(
         *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
     ]
 )
-PACKAGES = ("addon", "benchmarks", "digiclay_paper", "digiclay_study", "tools")
+PACKAGES = ("addon", "benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study", "tools")
 SOURCES = (*PACKAGES, "tests")
 #: Words that make a heading a sentence or a question.
 SENTENCE = re.compile(

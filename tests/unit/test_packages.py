@@ -1,4 +1,4 @@
-"""The packages: the extension, and beside it benchmarks, the paper and studies, which import it."""
+"""The packages: the extension, and those that stand beside it and import it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from tests.unit.test_architecture import PACKAGE, ROOT, find_circle, find_own_name, imports
 
 #: Packages beside the extension: they import it, and it never imports them.
-BESIDE = {name: ROOT / name for name in ("benchmarks", "digiclay_paper", "digiclay_study")}
+BESIDE = {name: ROOT / name for name in ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")}
 #: The one file of the extension that looks for the others by their names, to hand them the command line.
 DOOR = PACKAGE / "commands" / "outside.py"
 
@@ -33,7 +33,7 @@ def test_the_extension_never_imports_what_stands_beside_it() -> None:
         for line, target, _ in imports(path)
         if target.split(".")[0] in BESIDE
     ]
-    installed = ("digiclay_paper", "digiclay_study")
+    installed = ("digiclay_paper", "digiclay_serve", "digiclay_study")
     texts = {path.name: path.read_text(encoding="utf-8") for path in files}
     named = [name for name, text in texts.items() if any(package in text for package in installed)]
     assert (wrong, named) == ([], [])

@@ -8,7 +8,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PLACES = ("addon", "benchmarks", "digiclay_paper", "digiclay_study", "docs", "tests", "tools")
+PLACES = (
+    "addon",
+    "benchmarks",
+    "digiclay_paper",
+    "digiclay_serve",
+    "digiclay_study",
+    "docs",
+    "tests",
+    "tools",
+)
 FILES = sorted(
     path
     for path in (

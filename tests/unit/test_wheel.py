@@ -19,6 +19,7 @@ SOURCES = (
     "addon",
     "benchmarks",
     "digiclay_paper",
+    "digiclay_serve",
     "digiclay_study",
     "pyproject.toml",
     "README.md",
@@ -49,8 +50,12 @@ def test_the_wheel_has_the_package_the_paper_and_the_studies_and_no_benchmark(wh
     with zipfile.ZipFile(wheel) as zipped:
         names = set(zipped.namelist())
     packages = {name.split("/")[0] for name in names if ".dist-info/" not in name}
-    assert packages == {"digiclay", "digiclay_paper", "digiclay_study"}
-    beside = [path for name in ("digiclay_paper", "digiclay_study") for path in (ROOT / name).glob("*.py")]
+    assert packages == {"digiclay", "digiclay_paper", "digiclay_serve", "digiclay_study"}
+    beside = [
+        path
+        for name in ("digiclay_paper", "digiclay_serve", "digiclay_study")
+        for path in (ROOT / name).glob("*.py")
+    ]
     assert len(beside) > 25
     assert {f"{path.parent.name}/{path.name}" for path in beside} - names == set()
     shipped = {"digiclay/manual/guide.html", "digiclay/sample_shapes/sessions/tap.toml"}

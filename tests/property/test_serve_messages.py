@@ -1,0 +1,146 @@
+"""Messages of the server are read as they were written, and anything else is refused in one line."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import DigiclayError
+from hypothesis import given
+from hypothesis import strategies as st
+from pythonosc.osc_message import OscMessage
+
+from digiclay_serve.osc_messages import format_osc_frame, read_osc
+from digiclay_serve.pin_frames import (
+    pack_acknowledgement,
+    pack_heights,
+    read_acknowledgement,
+    read_heights,
+    split_frames,
+)
+from digiclay_serve.protocol import (
+    Frame,
+    Pose,
+    check_pose,
+    format_frame,
+    pack_frame,
+    pack_pose,
+    read_binary,
+    read_json,
+    unpack_frame,
+)
+from digiclay_serve.websocket_door import read_wishes
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+poses = st.lists(numbers, min_size=7, max_size=7).filter(lambda one: 1e-6 < math.hypot(*one[3:]) < math.inf)
+whole = st.integers(0, 2**32 - 1)
+heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
+
+
+def frame_of(pose: list[float], values: list[float]) -> Frame:
+    """Return a frame of some pins."""
+    pins = np.array(values, np.float32)
+    return Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins)
+
+
+def refusal(read: Callable[[Any], Any], data: Any) -> str:
+    """Return the words by which something is refused; none where it is read."""
+    try:
+        read(data)
+    except DigiclayError as error:
+        return str(error)
+    return ""
+
+
+@given(poses, whole)
+def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], number: int) -> None:
+    wanted = Pose(check_pose(values), number)
+    said = {"type": "pose", "position": values[:3], "orientation": values[3:], "number": number}
+    assert read_json(json.dumps(said)) == wanted
+    assert read_binary(pack_pose(Pose(tuple(values), number))) == wanted
+    assert math.hypot(*wanted.pose[3:]) == pytest.approx(1.0)
+
+
+@given(poses, heights)
+def test_a_frame_is_read_as_it_was_written_in_all_formats(pose: list[float], values: list[float]) -> None:
+    frame = frame_of(pose, values)
+    read = unpack_frame(pack_frame(frame))
+    said = json.loads(format_frame(frame))
+    state = OscMessage(format_osc_frame(frame, "pins")[0]).params
+    for found in (
+        (read.period, read.number, read.time, read.total_force, *read.pose),
+        (
+            *(said[name] for name in ("period", "number", "time", "total_force")),
+            *said["position"],
+            *said["orientation"],
+        ),
+        tuple(state),
+    ):
+        assert found == (2**40, 2**32 - 1, 12.5, 0.75, *pose)
+    np.testing.assert_array_equal(read.heights, frame.heights)
+    np.testing.assert_array_equal(read.forces, frame.forces)
+    np.testing.assert_array_equal(np.array(said["heights"], np.float32), frame.heights)
+    blob = OscMessage(format_osc_frame(frame, "pins")[2]).params[1]
+    np.testing.assert_array_equal(np.frombuffer(blob, ">f4"), frame.forces)
+
+
+@given(st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)))
+def test_any_bytes_are_a_request_or_refused_in_one_line(data: bytes) -> None:
+    said = [refusal(read, data) for read in (read_binary, read_osc, unpack_frame)]
+    assert not any("\n" in one for one in said)
+
+
+scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+anything: Any = st.recursive(
+    scalars, lambda some: st.lists(some, max_size=8) | st.dictionaries(st.text(max_size=5), some, max_size=3)
+)
+keys = st.sampled_from(["type", "version", "position", "orientation", "number", "x"])
+
+
+@given(st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)))
+def test_any_text_is_a_request_or_refused_in_one_line(text: str) -> None:
+    assert "\n" not in refusal(read_json, text)
+
+
+@given(st.text(max_size=20))
+def test_any_address_is_read_or_refused_in_one_line(query: str) -> None:
+    for address in (query, f"/?{query}", f"/?rate={query}"):
+        try:
+            wishes = read_wishes(address)
+        except DigiclayError as error:
+            said = str(error)
+        else:
+            said = ""
+            assert 0.0 <= wishes.rate <= 1000.0
+        assert "\n" not in said
+
+
+@given(st.integers(0, 65535), heights, st.binary(max_size=20))
+def test_heights_survive_the_line_to_within_half_a_count(
+    sequence: int, values: list[float], noise: bytes
+) -> None:
+    sent = pack_heights(sequence, 9, 0.1, np.array(values)) + pack_acknowledgement(sequence)
+    assert sent.count(b"\xc0") == 2
+    bodies, rest = split_frames(noise.replace(b"\xc0", b"") + b"\xc0" + sent + sent[:5])
+    assert rest == sent[:5]
+    first, second = bodies[-2:]
+    assert first is not None
+    assert second is not None
+    read = read_heights(first)
+    assert read is not None
+    assert (read[:2], read_acknowledgement(second)) == ((sequence, 9), sequence)
+    # Half a count of the stroke, and what 32 bits round.
+    np.testing.assert_allclose(read[2], values, rtol=0, atol=0.1 / 65535 / 2 + 1e-8)
+
+
+@given(st.integers(0, 65535), st.data())
+def test_a_frame_with_one_wrong_byte_is_never_taken_for_another(sequence: int, data: st.DataObject) -> None:
+    sent = bytearray(pack_heights(sequence, 9, 0.1, np.array([0.04, 0.05, 0.06])))
+    place = data.draw(st.integers(0, len(sent) - 2))
+    sent[place] ^= data.draw(st.integers(1, 255))
+    bodies, _ = split_frames(bytes(sent))
+    assert all(body is None for body in bodies)

@@ -1,0 +1,258 @@
+"""The WebSocket of a server that runs: poses in, frames out, a take, and clients that mean no good."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from digiclay.core.session.take import from_bytes, replay
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
+
+from digiclay_serve.protocol import Frame, Pose, pack_pose, unpack_frame
+from digiclay_serve.websocket_door import FLOOD, Pace, count_message
+from tests.served import TOKEN, Server, serve
+from tests.timeouts import TIMEOUT
+
+pytestmark = pytest.mark.skipif("sys.platform == 'win32'", reason="the server runs on Linux and macOS")
+PRESS = (0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One server for all clients; it must be alive in the end, and have its take whole."""
+    folder = tmp_path_factory.mktemp("served")
+    with serve(folder, "--out", "recorded") as one:
+        yield one
+        report = one.stop()
+        take = from_bytes((folder / "recorded" / "take_002.npz").read_bytes())
+        assert [path.name for path in sorted((folder / "recorded").iterdir())] == [
+            "take_001.npz", "take_002.npz",
+        ]  # fmt: skip
+        first = from_bytes((folder / "recorded" / "take_001.npz").read_bytes())
+        assert first.periods + take.periods + report["left_out"] == report["periods"]
+
+
+def frames(client: ClientConnection) -> Iterator[Frame]:
+    """Yield the frames that a client receives in binary."""
+    while True:
+        message = client.recv(TIMEOUT)
+        if isinstance(message, bytes):
+            yield unpack_frame(message)
+
+
+def frame_after(client: ClientConnection, number: int) -> Frame:
+    """Return the first frame that names a pose."""
+    return next(frame for frame in frames(client) if frame.number == number)
+
+
+def is_well(server: Server, number: int) -> None:
+    """Check that a client is served as ever; the fingertip may be another's for 2 s."""
+    with server.connect("?format=binary&rate=200") as client:
+        client.send(pack_pose(Pose(PRESS, number)))
+        for frame in frames(client):
+            if frame.number == number:
+                assert frame.pose.tolist() == list(PRESS)
+                return
+            client.send(pack_pose(Pose(PRESS, number)))
+
+
+def refused(server: Server, *, token: str = "", wishes: str = "") -> int:
+    """Return the HTTP status by which a client is refused."""
+    with pytest.raises(InvalidStatus) as caught:
+        server.connect(wishes, token)
+    return caught.value.response.status_code
+
+
+def test_a_pose_comes_back_as_forces_and_heights(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as client:
+        bed = json.loads(client.recv(TIMEOUT))
+        assert (bed["type"], bed["rows"], bed["columns"], len(bed["positions"])) == ("bed", 9, 9, 81)
+        client.send(pack_pose(Pose(PRESS, 7)))
+        frame = frame_after(client, 7)
+        while frame.total_force == 0.0 or frame.heights.min() > 0.0399:
+            frame = next(frames(client))
+    assert frame.pose.tolist() == list(PRESS)
+    assert frame.forces.sum() == pytest.approx(frame.total_force, rel=1e-5)
+    assert np.argmin(frame.heights) == 40  # the pin in the middle of 9 x 9
+
+
+def test_json_says_the_same(server: Server) -> None:
+    with server.connect("?rate=200") as client:
+        client.recv(TIMEOUT)
+        said = {"type": "pose", "position": [0.0, 0.0, 0.039], "number": 8}
+        client.send(json.dumps(said))
+        frame: dict[str, Any] = {}
+        while frame.get("number") != 8:
+            frame = json.loads(client.recv(TIMEOUT))
+    assert (frame["type"], frame["version"]) == ("state", 1)
+    assert (frame["position"], frame["orientation"]) == ([0.0, 0.0, 0.039], [1.0, 0.0, 0.0, 0.0])
+    assert len(frame["heights"]) == len(frame["forces"]) == 81
+
+
+def test_a_reset_brings_the_bed_to_rest(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as client:
+        client.send(pack_pose(Pose(PRESS, 9)))
+        before = frame_after(client, 9)
+        client.send(json.dumps({"type": "reset"}))
+        frame = next(frame for frame in frames(client) if frame.period < before.period)
+    np.testing.assert_array_equal(frame.heights, np.float32(0.04))
+    assert frame.total_force == 0.0
+
+
+def test_a_client_names_the_token_in_its_header_or_in_the_address(server: Server) -> None:
+    with server.connect(f"?token={TOKEN}", token="") as client:
+        assert json.loads(client.recv(TIMEOUT))["type"] == "bed"
+
+
+@pytest.mark.parametrize("token", ["", "another-token", TOKEN[:-1], TOKEN + "x"])
+def test_a_missing_or_wrong_token_is_refused(server: Server, token: str) -> None:
+    assert refused(server, token=token) == 401
+
+
+def test_an_address_that_makes_no_sense_is_refused(server: Server) -> None:
+    assert refused(server, token=TOKEN, wishes="?format=xml") == 400
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "garbage",
+        "[" * 3000,
+        '{"type": "pose", "position": [0, 0, NaN]}',
+        '{"type": "pose", "position": [0, 0]}',
+        '{"type": "pose", "position": [0, 0, 1e999]}',
+        '{"type": "posse"}',
+        '{"type": "pose", "position": [0, 0, 0], "orientation": [0, 0, 0, 0]}',
+        b"\x00\xff" * 100,
+        b"DC",
+        pack_pose(Pose((float("nan"), *PRESS[1:]))),
+        pack_pose(Pose((*PRESS[:3], 1.7e308, 1.7e308, 1.7e308, 1.7e308))),
+    ],
+)
+def test_a_wrong_message_is_answered_in_one_line(server: Server, message: str | bytes) -> None:
+    with server.connect("?rate=0") as client:
+        client.recv(TIMEOUT)
+        client.send(message)
+        answer = json.loads(client.recv(TIMEOUT))
+    assert answer["type"] == "error"
+    assert "must" in answer["message"]
+    assert "\n" not in answer["message"]
+    is_well(server, 10)
+
+
+def test_a_pose_of_1e300_m_is_where_a_finger_can_be(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as client:
+        client.send(pack_pose(Pose((1e300, -1e300, 1e300, 1.0, 0.0, 0.0, 0.0), 11)))
+        frame = frame_after(client, 11)
+    assert np.isfinite(frame.pose).all()
+    is_well(server, 12)
+
+
+def test_a_huge_message_closes_its_client_alone(server: Server) -> None:
+    with server.connect("?rate=0") as client:
+        client.recv(TIMEOUT)
+        client.send(b"x" * 5_000_000)
+        with pytest.raises(ConnectionClosed) as caught:
+            client.recv(TIMEOUT)
+    assert caught.value.rcvd is not None
+    assert caught.value.rcvd.code == 1009
+    is_well(server, 13)
+
+
+def test_a_flood_harms_nobody(server: Server) -> None:
+    pose = pack_pose(Pose(PRESS, 14))
+    framed = bytes([0x82, 0x80 | len(pose), 0, 0, 0, 0]) + pose  # as RFC 6455 has it, masked by zeros
+    with (
+        server.connect("?format=binary&rate=200") as other,
+        server.connect("?rate=0", close_timeout=0) as client,
+    ):
+        with suppress(OSError):  # a machine that takes them within a second closes the client
+            client.socket.sendall(framed * 10_000)
+        period = next(frames(other)).period
+        assert next(frames(other)).period > period
+    is_well(server, 15)
+
+
+def test_too_many_messages_in_a_second_are_a_flood() -> None:
+    pace, floods = Pace(10.0), []
+    for index in range(2 * FLOOD):
+        flood, pace = count_message(pace, 10.0 + index / (1.5 * FLOOD))
+        floods.append(flood)
+    # One and a half times the limit in the first second, a third of that in the next.
+    assert (floods.index(True), sum(floods)) == (FLOOD, FLOOD // 2)
+
+
+def test_the_fingertip_has_one_client_at_a_time(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as first, server.connect("?rate=0") as second:
+        first.send(pack_pose(Pose(PRESS, 16)))
+        frame_after(first, 16)
+        second.recv(TIMEOUT)
+        second.send(pack_pose(Pose(PRESS, 17)))
+        assert "Another client moves the fingertip" in json.loads(second.recv(TIMEOUT))["message"]
+    is_well(server, 18)  # it has gone, so that the fingertip is free
+
+
+def counts_of(client: ClientConnection) -> dict[str, int]:
+    """Return the counts of the doors."""
+    client.send(json.dumps({"type": "status"}))
+    while True:
+        message = client.recv(TIMEOUT)
+        if isinstance(message, str):
+            counts: dict[str, int] = json.loads(message)["counts"]
+            return counts
+
+
+def test_a_thousand_connections_shut_out_nobody_who_is_in(server: Server) -> None:
+    with server.connect("?format=binary&rate=200") as client:
+        client.recv(TIMEOUT)
+        client.send(pack_pose(Pose(PRESS, 19)))
+        frame_after(client, 19)
+        silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(1000)]
+        try:
+            client.send(pack_pose(Pose(PRESS, 20)))
+            frame_after(client, 20)
+            # All but 64 are cut.
+            while counts_of(client)["connections beyond the limit"] < 936:
+                frame_after(client, 20)
+        finally:
+            for one in silent:
+                one.close()
+    is_well(server, 21)
+
+
+def test_a_slow_reader_misses_frames_and_delays_nobody(server: Server) -> None:
+    with server.connect("?rate=200", max_queue=1, close_timeout=0) as slow:  # reads nothing from here on
+        slow.recv(TIMEOUT)
+        with server.connect("?format=binary&rate=200") as client:
+            periods = [next(frames(client)).period for _ in range(50)]
+        assert periods == sorted(set(periods))
+    is_well(server, 22)
+
+
+def test_a_client_that_goes_without_a_word_leaves_the_fingertip(server: Server) -> None:
+    with server.connect("?rate=0") as client:
+        client.send(pack_pose(Pose(PRESS, 23)))
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        client.socket.close()
+    is_well(server, 24)
+
+
+def test_a_killed_server_leaves_takes_that_can_be_replayed(tmp_path: Path) -> None:
+    with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
+        with one.connect("?format=binary&rate=200") as client:
+            client.send(pack_pose(Pose(PRESS, 1)))
+            while not list((tmp_path / "recorded").glob("take_001_part_00001.npz")):
+                next(frames(client))
+        one.process.kill()
+        one.process.wait(TIMEOUT)
+    take = from_bytes((tmp_path / "recorded" / "take_001_part_00001.npz").read_bytes())
+    assert take.periods >= 40
+    assert sum(1 for _ in replay(take)) == take.periods

@@ -1,0 +1,74 @@
+"""A server of a small bed in a process of its own, for tests of its doors."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+from tests.timeouts import TIMEOUT
+
+__all__ = ["TOKEN", "Server", "serve"]
+
+ROOT = Path(__file__).parents[1]
+TOKEN = "a-token-of-tests"
+#: A bed of a few pins, and a blister that fits it.
+SMALL = ("layout.rows=9", "layout.columns=9", "blister.radius=5e-3", "blister.edge_radius=8e-3",
+         "blister.flat_radius=2e-3")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Server:
+    """Server that runs: its process, its ports, and where its report will be."""
+
+    process: subprocess.Popen[str]
+    port: int
+    osc_port: int
+    report: Path
+
+    def connect(self, wishes: str = "", token: str = TOKEN, **options: Any) -> ClientConnection:
+        """Return a client's connection."""
+        header = {"Authorization": f"Bearer {token}"} if token else {}
+        address = f"ws://127.0.0.1:{self.port}/{wishes}"
+        return connect(address, additional_headers=header, compression=None, **options)
+
+    def stop(self, number: int = signal.SIGINT) -> dict[str, Any]:
+        """Stop the server; return its report."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=TIMEOUT)
+        assert self.process.returncode == 0, out + err
+        assert err == ""
+        report: dict[str, Any] = json.loads(self.report.read_text(encoding="utf-8"))
+        return report
+
+
+@contextmanager
+def serve(folder: Path, *options: str, rate: int = 200) -> Iterator[Server]:
+    """Run a server of a small bed, and end it with the block."""
+    settings = [word for one in SMALL for word in ("--set", one)]
+    command = [sys.executable, "-m", "digiclay", "serve", *settings, "--rate", str(rate), "--port", "0"]
+    command += ["--osc-port", "0", "--token", TOKEN, "--report", "report.json", *options]
+    path = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
+    process = subprocess.Popen(
+        command, cwd=folder, env={**os.environ, "PYTHONPATH": path}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        said = "".join(process.stdout.readline() for _ in range(3))
+        ports = re.findall(r"127\.0\.0\.1:(\d+)", said)
+        assert len(ports) == 2, said + process.communicate(timeout=TIMEOUT)[1]
+        yield Server(process, int(ports[0]), int(ports[1]), folder / "report.json")
+    finally:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,276 @@
+"""Parts of the server without a process: deadlines, session, take, token, lease, account of a line."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import OutputError
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session import snapshot
+from digiclay.core.session.recorded_path import make_take
+from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
+
+from digiclay_serve.access_token import VARIABLE, choose_token, is_token
+from digiclay_serve.deadlines import Schedule, TimeCounts, plan_periods
+from digiclay_serve.finger_lease import LEASE, Lease, claim, release
+from digiclay_serve.latest_slot import make_slot, open_slot
+from digiclay_serve.order_slot import Order, pack_order, unpack_order
+from digiclay_serve.pin_frames import LOST, WINDOW, Ledger, acknowledge, expire, send, split_frames
+from digiclay_serve.pin_frames import pack_acknowledgement as acknowledged
+from digiclay_serve.served_session import Session, begin_session, follow, make_frame, record, reset
+from digiclay_serve.take_parts import PartWriter, join_parts
+
+PERIOD = 1e-3
+SMALL = {
+    "layout": {"rows": 7, "columns": 7},
+    "blister": {"radius": 5e-3, "edge_radius": 8e-3, "flat_radius": 2e-3},
+}
+SCENE = resolve(
+    {
+        **SMALL,
+        "trajectory": {
+            "waypoints": [{"time": 0.0, "position": [0, 0, 0.05]}, {"time": 1.0, "position": [0, 0, 0.05]}]
+        },
+    }
+)
+DOWN = np.array([0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0])
+
+
+def test_a_period_is_due_from_its_beginning_once() -> None:
+    schedule, counts = Schedule(10.0, PERIOD, 5), []
+    for now in (9.9995, 10.0, 10.0004, 10.001, 10.0035):
+        due, schedule = plan_periods(schedule, now)
+        counts.append(due.count)
+    assert counts == [0, 1, 0, 1, 2]
+    assert schedule.begins == pytest.approx(10.004)
+
+
+def test_late_periods_are_made_up_for_and_the_oldest_left_out() -> None:
+    due, schedule = plan_periods(Schedule(10.0, PERIOD, 5), 10.0085)
+    assert (due.count, schedule.planned, schedule.left_out) == (5, 9, 4)
+    # All that have begun are judged, those left out as well.
+    assert due.begins == pytest.approx(10.0 + PERIOD * np.arange(9))
+
+
+def test_shares_of_times_are_those_of_the_sorted_times() -> None:
+    times = np.random.default_rng(3).exponential(3e-4, 5000)
+    counts = TimeCounts(1e-5)
+    for time in times:
+        counts.count(time)
+    for share in (0.5, 0.99, 0.999):
+        assert counts.find_share(share) == pytest.approx(
+            np.quantile(times, share, method="inverted_cdf"), abs=1e-5
+        )
+    assert counts.count_above(PERIOD) == np.count_nonzero(times >= PERIOD)
+    told = counts.describe()
+    assert told["longest"] == times.max()
+    assert sum(count for _, count in told["bins"]) == 5000
+
+
+def test_a_time_longer_than_all_bins_is_the_longest() -> None:
+    counts = TimeCounts(1e-5)
+    counts.count(7.0)
+    assert (counts.find_share(0.5), counts.count_above(PERIOD)) == (7.0, 1)
+    assert TimeCounts(1e-5).find_share(0.5) == 0.0
+
+
+def pressed(session: Session, count: int = 20) -> Session:
+    """Press the fingertip down, a period at a time."""
+    for _ in range(count):
+        session = follow(session, DOWN, 3, 1)
+    return session
+
+
+def test_the_session_follows_a_pose_and_tells_its_number() -> None:
+    frame = make_frame(pressed(begin_session(SCENE)))
+    assert (frame.period, frame.number, frame.pose.tolist()) == (20, 3, DOWN.tolist())
+    assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-6)
+    assert frame.total_force > 0.0
+    assert frame.heights.min() < 0.04
+
+
+def test_a_reset_session_is_the_one_that_began() -> None:
+    again, first = reset(pressed(begin_session(SCENE))), begin_session(SCENE)
+    assert snapshot.dump(again.system, again.state) == snapshot.dump(first.system, first.state)
+    assert (again.pose.tolist(), again.state.period) == (first.pose.tolist(), 0)
+
+
+def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None:
+    words = {"simulation.stepper": "euler", "simulation.control_period": "0.05", "layout.rows": "11"}
+    words |= {"simulation.physics_step": "0.05", "layout.columns": "11"}
+    scene = load(find("slow_press"), [Setting(key, word) for key, word in words.items()])
+    session = record(begin_session(scene), 1000)
+    high = session.pose
+    for _ in range(15):  # a state is kept in between
+        session = follow(session, high, 1, 1)
+    deep = np.array([0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0])
+    for _ in range(100):
+        session = session if session.diverged else follow(session, deep, 2, 1)
+    assert session.diverged == 1
+    assert session.state.period == session.kept.period == 10
+    assert session.recording is not None
+    assert session.recording.count == 11
+    after = follow(session, deep, 2, 1)
+    assert (after.diverged, after.pose.tolist(), after.state.period) == (1, high.tolist(), 11)
+    assert follow(after, high + DOWN / 1e3, 3, 1).pose.tolist() != high.tolist()
+
+
+def taken(session: Session) -> Take:
+    """Return what a session has recorded."""
+    assert session.recording is not None
+    take = make_take(session.scene, session.recording, snapshot.dump(session.system, session.state))
+    assert take is not None
+    return take
+
+
+def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+    session = record(begin_session(SCENE), 10)
+    with PartWriter(tmp_path / "out") as writer:
+        for _ in range(3):
+            session = pressed(session, 10)
+            writer.put(taken(session))
+            session = record(session, 10)
+        end = snapshot.dump(session.system, session.state)
+        writer.end_session()
+        writer.put(taken(pressed(record(reset(session), 10), 5)))
+        written = writer.finish()
+    assert [path.name for path in written] == ["take_001.npz", "take_002.npz"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["take_001.npz", "take_002.npz"]
+    take = from_bytes(written[0].read_bytes())
+    assert (take.periods, take.end) == (30, end)
+    *_, last = replay(take)
+    assert snapshot.dump(session.system, last) == end
+
+
+def test_parts_that_do_not_follow_each_other_are_refused() -> None:
+    session = pressed(record(begin_session(SCENE), 10), 3)
+    take = taken(session)
+    with pytest.raises(OutputError, match="must follow each other"):
+        join_parts([take, take])
+
+
+def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -> None:
+    session = pressed(record(begin_session(SCENE), 10), 3)
+    with PartWriter(tmp_path / "out") as writer:
+        writer.put(taken(session))
+        while not list((tmp_path / "out").glob("*_part_00001.npz")):
+            threading.Event().wait(0.001)
+        (tmp_path / "out" / "take_001_part_00002.npz").mkdir()
+        writer.put(taken(session))
+        while not writer.failure:
+            threading.Event().wait(0.001)
+        writer.put(taken(session))
+        (tmp_path / "out" / "take_001_part_00002.npz").rmdir()
+        (path,) = writer.finish()
+    assert "take ends here: Cannot write" in writer.failure
+    assert from_bytes(path.read_bytes()).periods == 3
+
+
+def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other").write_text("mine", encoding="utf-8")
+    with pytest.raises(OutputError, match="other things"), PartWriter(tmp_path):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["other"]
+
+
+def test_a_take_of_parts_is_the_format_of_old_takes() -> None:
+    take = taken(pressed(record(begin_session(SCENE), 10), 3))
+    assert from_bytes(to_bytes(take)).poses.shape == (4, 1, 7)
+
+
+def test_a_slot_gives_the_newest_value_once() -> None:
+    slot, path = make_slot(16)
+    other = open_slot(path)
+    path.unlink()
+    assert other.read() is None
+    for value in (b"a" * 16, b"b" * 16):
+        slot.write(value)
+    assert (other.read(), other.read()) == (b"b" * 16, None)
+    with pytest.raises(ValueError, match="must have 16 bytes"):
+        slot.write(b"c")
+
+
+def test_a_value_that_is_being_written_is_not_read() -> None:
+    slot, path = make_slot(16)
+    other = open_slot(path)
+    slot.write(b"a" * 16)
+    content = bytearray(path.read_bytes())
+    for place, changed in ((0, 1), (16, 1)):  # the number is odd; the value is another one
+        torn = content.copy()
+        torn[place] ^= changed
+        with path.open("r+b") as file:
+            file.write(torn)
+        assert other.read() is None
+    path.unlink()
+
+
+def test_an_order_is_read_as_it_was_written() -> None:
+    for order in (Order(), Order((1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0), 2**32 - 1, 5)):
+        assert unpack_order(pack_order(order)) == order
+
+
+def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    first, made = choose_token(None)
+    assert made
+    assert first != choose_token(None)[0]
+    monkeypatch.setenv(VARIABLE, "from-the-environment")
+    assert choose_token(None) == ("from-the-environment", False)
+    assert choose_token("from-the-option") == ("from-the-option", False)
+
+
+@pytest.mark.parametrize("token", ["", "short", "with a space", "x" * 129, "umlaut-ä-ä-ä"])
+def test_a_token_that_is_none_is_refused_and_not_shown(token: str) -> None:
+    with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
+        choose_token(token)
+    assert not token or token not in str(caught.value)
+
+
+def test_only_the_same_token_is_the_right_one() -> None:
+    wrong = ("", "a-token-of-test", "a-token-of-testss", None, 7, b"a-token-of-tests", "\ud800")
+    assert [is_token(one, "a-token-of-tests") for one in ("a-token-of-tests", *wrong)] == [True] + [False] * 7
+
+
+def test_the_fingertip_is_anothers_when_its_client_is_silent_or_gone() -> None:
+    granted, lease = claim(Lease(), "one", 10.0)
+    assert granted
+    assert not claim(lease, "two", 10.0 + 0.9 * LEASE)[0]
+    assert claim(lease, "one", 10.0 + 0.9 * LEASE)[0]
+    assert claim(lease, "two", 10.0 + LEASE)[0]
+    assert claim(release(lease, "one"), "two", 10.1)[0]
+    assert not claim(release(lease, "two"), "two", 10.1)[0]
+
+
+def body_of(sequence: int) -> bytes | None:
+    """Return the body of an acknowledgement."""
+    return split_frames(acknowledged(sequence))[0][0]
+
+
+def test_an_account_has_every_frame_once() -> None:
+    ledger = Ledger(late_after=0.02)
+    for now in (0.0, 0.01):
+        _, ledger = send(ledger, now, busy=False)
+    number, ledger = send(ledger, 0.02, busy=True)
+    assert (number, ledger.sent, ledger.skipped) == (None, 2, 1)
+    ledger = acknowledge(acknowledge(ledger, body_of(0), 0.019), body_of(1), 0.05)
+    assert (ledger.acknowledged, ledger.late) == (2, 1)
+    for wrong in (body_of(1), None, b"\x01\x02"):
+        ledger = acknowledge(ledger, wrong, 0.06)
+    assert ledger.damaged == 3
+    _, ledger = send(ledger, 1.0, busy=False)
+    assert expire(ledger, 1.0 + 0.99 * LOST).dropped == 0
+    assert expire(ledger, 1.0 + LOST).dropped == 1
+
+
+def test_only_so_many_frames_are_on_their_way_and_their_numbers_go_round() -> None:
+    ledger, numbers = replace(Ledger(0.02), next=65534), []
+    for _ in range(WINDOW + 2):
+        number, ledger = send(ledger, 0.0, busy=False)
+        numbers.append(number)
+    assert numbers == [65534, 65535, 0, 1, None, None]
+    assert (ledger.sent, ledger.skipped) == (4, 2)
