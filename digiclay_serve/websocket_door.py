@@ -129,7 +129,7 @@ async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
     """
     door = _WebSocketDoor(link)
     return await serve(
-        door.handle, host, port, process_request=door.admit, create_connection=door.connect,  # type: ignore[arg-type]  # any function will do
+        door.handle, host, port, process_request=door.admit, create_connection=door.connect,
         compression=None,
         max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
         ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None, backlog=1024,

@@ -36,6 +36,7 @@ ELSEWHERE = {
 CODE = {
     "digiclay": ROOT / "addon" / "digiclay",
     "digiclay_paper": ROOT / "digiclay_paper",
+    "digiclay_serve": ROOT / "digiclay_serve",
     "digiclay_study": ROOT / "digiclay_study",
 }
 COMMANDS = """\
