@@ -10,7 +10,7 @@ from digiclay.core.session.run_scene import Result
 from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 
 from .results import Results
-from .scenes import METHODS, NAMES
+from .scenes import COMPARED, NAMES
 
 __all__ = ["blisters", "freezing"]
 
@@ -21,11 +21,13 @@ INSTANTS = 5
 
 
 def blisters(results: Results) -> Any:
-    """Draw sections through raised and sunken blisters, both profiles, both methods."""
-    with canvas(12.5, 7.6, "Blisters in section, the finger in place") as (figure, place):
-        for row, method in enumerate(METHODS):
+    """Draw sections through raised and sunken blisters, both profiles, all methods."""
+    methods = [method for method in COMPARED if (method, "convex", "cone") in results.blisters]
+    height = 0.8 + 3.4 * len(methods)
+    with canvas(12.5, height, "Blisters in section, the finger in place") as (figure, place):
+        for row, method in enumerate(methods):
             for column, shape in enumerate(("convex", "concave")):
-                axes = place(f"{method} {shape}", 0.85 + 6.15 * column, 4.1 - 3.4 * row, 5.25, 2.55)
+                axes = place(f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55)
                 for profile, look in PROFILES.items():
                     done = results.blisters[method, shape, profile]
                     _section(axes, done, look, profile)
@@ -34,7 +36,7 @@ def blisters(results: Results) -> Any:
                 axes.axhline(rest, color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
                 axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
                 axes.set_ylim((36, 64) if shape == "convex" else (28, 43))
-                if row == 1:
+                if row == len(methods) - 1:
                     axes.set_xlabel("distance from the middle (mm)")
         first = figure.axes[0]
         first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="bed at rest")
@@ -68,12 +70,14 @@ def _finger(axes: Any, done: Result, row: int) -> None:
 
 def freezing(results: Results) -> Any:
     """Draw sections along a drag at several times; frozen cells are marked."""
-    with canvas(12.5, 8.2, "Freezing: what the finger has left keeps its height") as (figure, place):
+    methods = [method for method in COMPARED if method in results.drags]
+    height = 0.8 + 3.7 * len(methods)
+    with canvas(12.5, height, "Freezing: what the finger has left keeps its height") as (figure, place):
         from matplotlib import colormaps
 
-        for panel, method in enumerate(METHODS):
+        for panel, method in enumerate(methods):
             done, start, end = results.drags[method]
-            axes = place(method, 0.85, 4.35 - 3.7 * panel, 11.3, 2.8)
+            axes = place(method, 0.85, height - 3.85 - 3.7 * panel, 11.3, 2.8)
             moments = done.history["time"]
             ridge = np.abs(done.history["position"][:, 1]) < 1e-6
             across = done.history["position"][ridge, 0] * MM

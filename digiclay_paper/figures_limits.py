@@ -7,12 +7,12 @@ from typing import Any
 from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 
 from .results import PAPER_SPEED, SUSTAINED, Results
-from .scenes import METHODS, NAMES, PRESSED
+from .scenes import COMPARED, NAMES, PRESSED, THIRD
 
 __all__ = ["oscillation", "tracking"]
 
 #: Told apart with any color vision; markers say the same once more.
-METHOD_COLORS = {"virtual_master": LINES[0], "cell_states": LINES[1]}
+METHOD_COLORS = {"virtual_master": LINES[0], "cell_states": LINES[1], THIRD: LINES[2]}
 MARKERS = "os^D"
 
 
@@ -78,7 +78,7 @@ def _details(axes: Any, results: Results, position_gain: float) -> float:
 
 
 def tracking(results: Results) -> Any:
-    """Draw RFD and lag against the speed of a level drag, both methods."""
+    """Draw RFD and lag against the speed of a level drag, all methods."""
     limits = results.criterion
     with canvas(12.5, 5.2, "A ridge 15 mm high, drawn straight and level") as (figure, place):
         panels = (
@@ -86,11 +86,11 @@ def tracking(results: Results) -> Any:
             ("lag", "largest lag (mm)", MM, limits.lag, place("lag", 7.0, 0.75, 5.1, 3.5)),
         )
         for name, label, factor, limit, axes in panels:
-            for marker, method in zip(MARKERS, METHODS, strict=False):
-                row, color = results.tracks[method], METHOD_COLORS[method]
+            for marker, method in zip(MARKERS, COMPARED, strict=False):
+                row, color = results.tracks.get(method, []), METHOD_COLORS[method]
                 speed = [one.speed * MM for one in row]
                 value = [getattr(one, name) * factor for one in row]
-                axes.plot(speed, value, color=color, alpha=0.9, label=NAMES[method])
+                axes.plot(speed, value, color=color, alpha=0.9, label=NAMES[method] if row else None)
                 for one, x, y in zip(row, speed, value, strict=True):
                     fill = color if one.losses == 0 and one.loss_share == 0.0 else "white"
                     axes.plot(x, y, marker, color=color, markerfacecolor=fill, markersize=7)
@@ -103,6 +103,6 @@ def tracking(results: Results) -> Any:
         first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="criterion")
         first.plot([], [], color=INK, linewidth=1.0, linestyle=(0, (1, 2)), label="the paper's 15 mm/s")
         handles, labels = first.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper left", ncols=5, bbox_to_anchor=(0.015, 0.93),
-                      fontsize=11, handlelength=1.4, columnspacing=1.0)  # fmt: skip
+        figure.legend(handles, labels, loc="upper left", ncols=6, bbox_to_anchor=(0.005, 0.93),
+                      fontsize=10, handlelength=1.2, columnspacing=0.8)  # fmt: skip
     return figure

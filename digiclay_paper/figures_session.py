@@ -13,7 +13,7 @@ from digiclay.plots.run import LETTERS, session_cells
 
 from .relief_sections import sections
 from .results import Results, Session
-from .scenes import METHODS, NAMES
+from .scenes import COMPARED, METHODS, NAMES, THIRD
 
 __all__ = ["details", "heights_and_force", "profiles", "surface_rows", "surfaces"]
 
@@ -22,7 +22,7 @@ PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 
 
 def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the heights of the same cells, and the total force, side by side for both methods.
+    """Draw the heights of the same cells, and the total force, side by side for all methods.
 
     Parameters
     ----------
@@ -36,8 +36,10 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
     lowest = min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
     highest = max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
     strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
-    with canvas(13.5, 7.4, title) as (figure, place):
-        for column, method in enumerate(METHODS):
+    methods = _list(sessions)
+    across = 0.5 + 6.5 * len(methods)
+    with canvas(across, 7.4, title) as (figure, place):
+        for column, method in enumerate(methods):
             history = sessions[method].history
             left = 0.85 + 6.5 * column
             heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
@@ -63,9 +65,16 @@ def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
                 heights.set_ylabel("height (mm)")
                 force.set_ylabel("force (N)")
                 handles, _ = heights.get_legend_handles_labels()
-        figure.text(0.85 / 13.5, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
-        figure.legend(handles, names, loc="upper left", ncols=6, bbox_to_anchor=(0.205, 1.0 - 0.5 / 7.4))
+        figure.text(0.85 / across, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
+        figure.legend(
+            handles, names, loc="upper left", ncols=6, bbox_to_anchor=(2.77 / across, 1.0 - 0.5 / 7.4)
+        )
     return figure
+
+
+def _list(sessions: Mapping[str, Session]) -> list[str]:
+    """Return the methods of sessions in their order."""
+    return [method for method in COMPARED if method in sessions]
 
 
 def details(results: Results, title: str) -> Any:
@@ -77,8 +86,8 @@ def details(results: Results, title: str) -> Any:
     title : str
     """
     shown = _detailed(results)
-    with canvas(13.5, 7.6, title) as (figure, place):
-        wide = 13.5 / len(shown)
+    with canvas(4.5 * max(len(shown), 3), 7.6, title) as (figure, place):
+        wide = 4.5 * max(len(shown), 3) / len(shown)
         for column, (name, session) in enumerate(shown):
             left, across = 0.95 + (wide - 0.08) * column, wide - 1.05
             cells = _under(session)
@@ -109,7 +118,8 @@ def _detailed(results: Results) -> list[tuple[str, Session]]:
     if results.wild is not None:
         gain = getattr(results.wild.scene.control, "force_gain", 0.0)
         shown.append((f"Method I, $K_f$ = {gain:g} 1/N", results.wild))
-    return [*shown, ("Method II", two)]
+    third = [("Method III", results.printed[THIRD])] if THIRD in results.printed else []
+    return [*shown, ("Method II", two), *third]
 
 
 def _under(session: Session) -> list[int]:
@@ -130,7 +140,7 @@ def _swinging(time: Any, height: Any) -> Any:
 
 
 def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
-    """Draw the final surfaces in relief and from above, side by side for both methods.
+    """Draw the final surfaces in relief and from above, side by side for all methods.
 
     Parameters
     ----------
@@ -138,17 +148,19 @@ def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
         By method.
     title : str
     """
-    with canvas(13.5, 9.6, title) as (figure, place):
-        for column, method in enumerate(METHODS):
+    methods = _list(sessions)
+    across = 0.3 + 6.6 * len(methods)
+    with canvas(across, 9.6, title) as (figure, place):
+        for column, method in enumerate(methods):
             history, left = sessions[method].history, 6.6 * column
             relief = place(
                 f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
             )
             draw_relief(relief, history)
             # Its own title would lie far above the picture.
-            figure.text((left + 0.3) / 13.5, 8.85 / 9.6, f"({'ac'[column]}) {NAMES[method]}")
+            figure.text((left + 0.3) / across, 8.85 / 9.6, f"({'ace'[column]}) {NAMES[method]}")
             plan = place(f"{method} map", left + 1.1, 0.7, 4.2, 3.6)
-            draw_map(plan, history, f"({'bd'[column]})")
+            draw_map(plan, history, f"({'bdf'[column]})")
             draw_path(plan, history)
             for axes in (relief, plan):
                 for artist in (*axes.collections, *axes.images):
@@ -158,7 +170,7 @@ def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
 
 def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, float, float]]:
     """Give the final surfaces as rows of method, x, y and height in mm."""
-    for method in METHODS:
+    for method in _list(sessions):
         history = sessions[method].history
         for (x, y), height in zip(history["position"], history["height"][-1], strict=True):
             yield method, float(x) * MM, float(y) * MM, float(height) * MM
@@ -173,13 +185,13 @@ def profiles(sessions: Mapping[str, Session], title: str) -> Any:
         By method.
     title : str
     """
-    found = {method: list(sections(sessions[method])) for method in METHODS}
+    found = {method: list(sections(sessions[method])) for method in _list(sessions)}
     count = len(found[METHODS[0]])
     with canvas(13.5, 8.6, title) as (figure, place):
         for number in range(count):
             row, column = divmod(number, 3)
             axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
-            for method, color, marker in zip(METHODS, LINES, "os", strict=False):
+            for method, color, marker in zip(found, LINES, "os^", strict=False):
                 one = found[method][number]
                 name = NAMES[method].split(",")[0]
                 asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": (0, (4, 2))}
@@ -190,5 +202,5 @@ def profiles(sessions: Mapping[str, Session], title: str) -> Any:
             axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
             axes.set_ylabel("height over rest (mm)")
         handles, names = axes.get_legend_handles_labels()
-        figure.legend(handles, names, loc="upper right", ncols=4, bbox_to_anchor=(0.99, 0.955))
+        figure.legend(handles, names, loc="upper right", ncols=6, bbox_to_anchor=(0.99, 0.955))
     return figure

@@ -8,6 +8,7 @@ from digiclay.core.base.modes import MEANINGS, Mode
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
 
 from .claim import Claim
+from .method_three import compare_methods
 from .results import Results
 
 __all__ = ["page"]
@@ -64,6 +65,16 @@ def _lines(
         yield f"![{caption}]({name}.svg)\n"
         yield f"*{caption}.* [Data]({name}.csv)\n"
     yield "Fig. 7, pins, forces and modes in motion, is the view in Blender.\n"
+    if results.third is not None:
+        yield "## Method III\n"
+        yield (
+            "The paper's conclusion asks for regional height *and* force commands; docs/hybrid.md derives "
+            "this method. The session is the one of Fig. 10, and the figures above show it beside the other "
+            "two. At rest its blister is as wide as its skirt, for drags to come; what stays behind is the "
+            "nominal blister (Fig. 6). JND: just noticeable differences, docs/perception.md.\n"
+        )
+        yield from compare_methods(results.compared())
+        yield ""
     yield "## Fig. 3: Method I, the virtual master\n"
     yield "| Stage | What it does |"
     yield "| --- | --- |"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 from digiclay.core.scene.schema import Scene
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from .scenes import SINK, TALL
 
 __all__ = [
-    "AHEAD", "AS_IT_IS", "FULL", "PAPER_SPEED", "QUICK", "SESSION", "WAYS", "Dragged", "Extent", "Located",
-    "Results", "Session", "Swing", "onset_among",
+    "AHEAD", "AS_IT_IS", "BEYOND", "FULL", "PAPER_SPEED", "QUICK", "SESSION", "WAYS", "Dragged", "Extent",
+    "Located", "Results", "Session", "Swing", "onset_among",
 ]  # fmt: skip
 
 #: The speed up to which the paper says both methods track, m/s, and its session.
@@ -53,6 +53,8 @@ class Extent:
         Which of the simple trajectories the variants of the scene are tried on.
     noises : tuple of float
         Standard deviations of the force sensors with which the finger is located, N.
+    third : tuple of str
+        What Method III is run on besides the session: blisters, tracks.
     """
 
     resolution: float
@@ -64,6 +66,7 @@ class Extent:
     cell_gains: tuple[float, ...]
     ways: tuple[str, ...]
     noises: tuple[float, ...]
+    third: tuple[str, ...] = ()
 
 
 FULL = Extent(
@@ -76,11 +79,16 @@ FULL = Extent(
     (15.0, 25.0, 50.0, 70.0, 100.0, 200.0, 400.0),
     tuple(WAYS),
     (0.5e-3, 1e-3, 2e-3),
+    ("blisters", "tracks"),
 )
 QUICK = Extent(
     15e-3, (15e-3, 30e-3), (15e-3, 30e-3), (), (5.0, 80.0), (500.0, 1000.0), (15.0, 100.0),
     ("in the surface",), (2e-3,),
 )  # fmt: skip
+
+
+#: Largest speed of a drag that is looked for with Method III, m/s, and more speeds of its drags.
+BEYOND = 80e-3, (40e-3, 60e-3)
 
 
 class Swing(NamedTuple):
@@ -204,6 +212,7 @@ class Results:
     cell_swings : Method II pressed quickly and held, by K_FF
     dragged : drags by variant of the scene, method and name of the trajectory
     located : a finger held still under noise, with the search radius and without
+    third : blisters, drags, tracks, simple trajectories, sessions and largest speeds of Method III
     """
 
     criterion: Criterion = field(default_factory=Criterion)
@@ -224,10 +233,21 @@ class Results:
     cell_swings: list[Swing] = field(default_factory=list)
     dragged: dict[tuple[str, str, str], Dragged] = field(default_factory=dict)
     located: list[Located] = field(default_factory=list)
+    third: Results | None = None
+
+    def compared(self) -> Results:
+        """Return the results with Method III beside the methods of the paper, for figures and tables."""
+        return self if self.third is None else replace(self, **_join(self, self.third))
 
     def onset(self, position_gain: float) -> tuple[float | None, float | None]:
         """Return the `onset_among` those at one K_p, 1/m."""
         return onset_among([one for one in self.swings if one.position_gain == position_gain])
+
+
+def _join(one: Results, other: Results) -> dict[str, Any]:
+    """Return the dictionaries of two results by name of the field, as one each."""
+    known = {item.name: (getattr(one, item.name), getattr(other, item.name)) for item in fields(one)}
+    return {name: {**first, **last} for name, (first, last) in known.items() if isinstance(first, dict)}
 
 
 def onset_among(swings: list[Swing]) -> tuple[float | None, float | None]:

@@ -14,12 +14,30 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.method_trials import find_free_speed
 
 __all__ = [
-    "METHODS", "NAMES", "PRESSED", "QUICKER", "SINK", "TALL", "Device", "at_rest", "blister", "fastest_lift",
-    "held", "slowed",
+    "COMPARED",
+    "METHODS",
+    "NAMES",
+    "PRESSED",
+    "QUICKER",
+    "SINK",
+    "TALL",
+    "THIRD",
+    "Device",
+    "at_rest",
+    "blister",
+    "fastest_lift",
+    "held",
+    "slowed",
 ]  # fmt: skip
 
 METHODS = ("virtual_master", "cell_states")
-NAMES = {"virtual_master": "Method I, virtual master", "cell_states": "Method II, cell states"}
+#: The method that the paper asks for in its conclusion, and all that figures compare.
+THIRD = "hybrid"
+COMPARED = (*METHODS, THIRD)
+NAMES = {
+    "virtual_master": "Method I, virtual master", "cell_states": "Method II, cell states",
+    THIRD: "Method III, hybrid",
+}  # fmt: skip
 #: Finger over the bed at rest: for a blister 15 mm high (the pins press 1.5 mm into it), and in a valley, m.
 TALL, SINK = 13.5e-3, -10e-3
 #: How deep the first press goes: less never reaches the trigger, because the pulp relaxes, m.

@@ -19,8 +19,8 @@ from digiclay.core.studies.method_trials import find_free_speed, find_unintended
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
 
 from . import scenes
-from .results import AS_IT_IS, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing
-from .scenes import METHODS, QUICKER, SINK, TALL, Device
+from .results import AS_IT_IS, BEYOND, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing
+from .scenes import METHODS, QUICKER, SINK, TALL, THIRD, Device
 from .variants import dragged, vary
 
 __all__ = ["sessions", "simulate"]
@@ -45,10 +45,7 @@ def simulate(extent: Extent, told: Told) -> Results:
     """
     results = Results()
     for method in METHODS:
-        told(f"blisters, {method}")
-        for shape, height in (("convex", TALL), ("concave", SINK)):
-            for profile in ("cone", "gaussian"):
-                results.blisters[method, shape, profile] = _run(scenes.blister(method, height, profile))
+        _form_blisters(results, method, told)
     for method in METHODS:
         _track(results, method, extent, told)
     sessions(results, told)
@@ -69,7 +66,33 @@ def simulate(extent: Extent, told: Told) -> Results:
         results.cell_swings.append(_swing(gain, extent.position_gains[0], None, METHODS[1])[0])
     _go_wild(results, told)
     vary(results, extent, told)
+    results.third = _run_third(results.slow, extent, told)
     return results
+
+
+def _form_blisters(results: Results, method: str, told: Told) -> None:
+    """Raise and sink blisters with a method."""
+    told(f"blisters, {method}")
+    for shape, height in (("convex", TALL), ("concave", SINK)):
+        for profile in ("cone", "gaussian"):
+            results.blisters[method, shape, profile] = _run(scenes.blister(method, height, profile))
+
+
+def _run_third(slow: float, extent: Extent, told: Told) -> Results:
+    """Run blisters, drags, lifts and the session with Method III, which the paper does not have."""
+    found = Results()
+    if "blisters" in extent.third:
+        _form_blisters(found, THIRD, told)
+    if "tracks" in extent.third:
+        highest, more = BEYOND
+        wider = replace(extent, drags=(extent.drags[0], highest), speeds=(*extent.speeds, *more))
+        _track(found, THIRD, wider, told)
+    told(f"the paper's session, {THIRD}")
+    scene = load(find(SESSION), [Setting("control.method", THIRD)])
+    found.printed[THIRD] = _boiled_down(_run(scene))
+    slowly = scenes.slowed(scene, slow)
+    found.session[THIRD] = _boiled_down(_run(slowly)) if slow > 1.0 else found.printed[THIRD]
+    return found
 
 
 def _go_wild(results: Results, told: Told) -> None:

@@ -19,7 +19,7 @@ from .page import page
 from .panel import curves, letter, table
 from .relief_sections import LIMITS, sections
 from .results import Extent, Results
-from .scenes import METHODS
+from .scenes import COMPARED
 from .simulations import Told, simulate
 
 __all__ = ["produce"]
@@ -48,11 +48,12 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
     results = simulate(extent, told)
     took = time.perf_counter() - started
     drawn = {}
-    for name, (caption, draw) in _pictures(results).items():
+    shown = results.compared()
+    for name, (caption, draw) in _pictures(shown).items():
         told(f"drawing {name}")
         picture = draw()
         if name == SURFACES:
-            rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
+            rows = table(figures_session.surface_rows(shown.session), ("method", *"xy", "height (mm)"))
         else:
             letter(picture)
             rows = table(curves(picture))
@@ -61,7 +62,7 @@ def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
         drawn[name] = caption
     found = claims(results)
     (folder / "paper.md").write_text(page(results, found, drawn, took, __version__), encoding="utf-8")
-    numbers = json.dumps(_numbers(results), indent=2, ensure_ascii=False, allow_nan=False)
+    numbers = json.dumps(_numbers(shown), indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "metrics.json").write_text(numbers + "\n", encoding="utf-8")
     return [f"{claim.verdict:14} {claim.printed}" for claim in found]
 
@@ -72,7 +73,7 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
     title = f"The paper's session{slow}"
     pictures: dict[str, tuple[str, Callable[[], Any]]] = {
         "fig04_blisters": (
-            "Fig. 4: blisters in section, convex and concave, both profiles and both methods",
+            "Fig. 4: blisters in section, convex and concave, both profiles and all methods",
             lambda: figures_blister.blisters(results),
         ),
         "fig06_freezing": (
@@ -121,15 +122,18 @@ def _pictures(results: Results) -> dict[str, tuple[str, Callable[[], Any]]]:
 
 def _numbers(results: Results) -> dict[str, Any]:
     """Return what was measured, as it is written to ``metrics.json``; SI units."""
+    methods = [method for method in COMPARED if method in results.session]
     return {
         "criterion": {"lag": results.criterion.lag, "rfd": results.criterion.deviation},
         "slow": results.slow,
-        "session": {method: results.session[method].metrics for method in METHODS},
-        "session_at_its_own_times": {method: results.printed[method].metrics for method in METHODS},
-        "lost_at_its_own_times": {method: results.printed[method].lost for method in METHODS},
+        "session": {method: results.session[method].metrics for method in methods},
+        "session_at_its_own_times": {method: results.printed[method].metrics for method in methods},
+        "lost_at_its_own_times": {method: results.printed[method].lost for method in methods},
         "largest_drag_speed": results.fastest,
         "largest_lift_speed": results.lifting,
-        "drags": {method: [_finite(asdict(one)) for one in results.tracks[method]] for method in METHODS},
+        "drags": {
+            method: [_finite(asdict(one)) for one in results.tracks.get(method, [])] for method in methods
+        },
         "simple_at_15_mm_a_second": {
             f"{method}, {name}": _finite(asdict(one)) for (method, name), one in results.simple.items()
         },
@@ -153,7 +157,7 @@ def _numbers(results: Results) -> dict[str, Any]:
                 }
                 for one in sections(results.session[method])
             }
-            for method in METHODS
+            for method in methods
         },
     }
 

@@ -12,6 +12,7 @@ import pytest
 from digiclay.cli import main
 
 from digiclay_paper.results import WAYS
+from digiclay_paper.scenes import COMPARED
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,8 @@ def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path) -> None:
     with (folder / "fig10_surfaces.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
-    for method in ("virtual_master", "cell_states"):
+    assert {row["method"] for row in rows} == set(COMPARED)
+    for method in COMPARED:
         heights = [float(row["height (mm)"]) for row in rows if row["method"] == method]
         # Six digits are written.
         assert max(heights) == pytest.approx(1e3 * known[method]["highest"], rel=1e-5)
@@ -120,3 +122,13 @@ def test_an_older_folder_is_kept_unless_it_may_be_replaced(
     assert main(["paper", "--quick", "--out", str(folder)]) == 2
     assert "--overwrite" in capfd.readouterr().err
     assert (folder / "paper.md").stat().st_mtime_ns == before
+
+
+def test_the_page_sets_method_three_beside_the_others(folder: Path, text: str) -> None:
+    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["session"]
+    table = text.split("## Method III")[1].split("## Fig. 3")[0]
+    row = next(line for line in table.splitlines() if line.startswith("| RFD in the session (N)"))
+    shown = [float(cell) for cell in row.strip("|").split("|")[1:]]
+    assert shown == pytest.approx([known[method]["rfd"] for method in COMPARED], rel=5e-3)  # three digits
+    # The goal of Method III on the session: at most half of Method I's.
+    assert shown[2] < 0.5 * shown[0]

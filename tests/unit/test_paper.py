@@ -228,3 +228,12 @@ def test_the_detail_of_the_session_shows_heights_of_cells_side_by_side_at_every_
     assert np.ptp(height[rising, 84]) > 2e-3
     assert np.abs(lift.get_lines()[0].get_ydata()).max() < 100.0
     assert len(figure.axes) == 4
+
+
+def test_method_three_is_beside_the_methods_of_the_paper_in_figures_and_in_no_claim() -> None:
+    two = results(Swing(5.0, 500.0, 0.001, None, 0.3))
+    three = Results(simple={(scenes.THIRD, name): GOOD for name in WAYS})
+    both = replace(two, third=three).compared()
+    assert {method for method, _ in both.simple} == set(scenes.COMPARED)
+    assert two.compared() is two
+    assert "Method III" not in tracking(replace(two, third=three)).measured
