@@ -156,7 +156,8 @@ def surfaces(sessions: Mapping[str, Session], title: str) -> Any:
             relief = place(
                 f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
             )
-            draw_relief(relief, history)
+            room = (left + 0.3) / across, 4.6 / 9.6, (left + 6.3) / across, 8.7 / 9.6
+            draw_relief(relief, history, room)
             # Its own title would lie far above the picture.
             figure.text((left + 0.3) / across, 8.85 / 9.6, f"({'ace'[column]}) {NAMES[method]}")
             plan = place(f"{method} map", left + 1.1, 0.7, 4.2, 3.6)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.metrics.summary import find_contact_rows
 from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
-from .relief import fit_relief
+from .relief import ROOM, Room, fit_relief
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
@@ -85,7 +85,7 @@ def draw_path(axes: Axes, history: History) -> None:
     legend_above(axes)
 
 
-def draw_relief(axes: Any, history: History) -> None:
+def draw_relief(axes: Any, history: History, room: Room = ROOM) -> None:
     """Draw the final surface in three dimensions, lit from the left, equal scale on all axes.
 
     Parameters
@@ -93,6 +93,8 @@ def draw_relief(axes: Any, history: History) -> None:
     axes : Axes3D
     history : mapping of str to array_like
         Needs `position` and `height`.
+    room : tuple of float, optional
+        Left, bottom, right and top of the part of the figure that it fills, as shares of the figure.
     """
     from matplotlib import colormaps
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -111,7 +113,7 @@ def draw_relief(axes: Any, history: History) -> None:
     axes.set(**dict(zip(("xlim", "ylim", "zlim"), limits, strict=True)), zlabel="height (mm)")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
     axes.view_init(elev=34, azim=-62)
-    fit_relief(axes, np.ptp(vertices, axis=0), limits)
+    fit_relief(axes, np.ptp(vertices, axis=0), limits, room)
     for corners, paint in ((vertices[walls], CUT), (bright[:, :, :3], color)):
         axes.add_collection3d(Poly3DCollection(corners, facecolors=paint, edgecolors=paint, linewidths=0.3))
 

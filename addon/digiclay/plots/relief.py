@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["fit_relief", "hidden"]
+__all__ = ["ROOM", "Room", "fit_relief", "hidden"]
+
+Room = tuple[float, float, float, float]
 
 #: Where the relief and all that is written on it has room, as parts of the figure: left, bottom, right, top.
-ROOM = (0.01, 0.02, 0.525, 0.9)
+ROOM: Room = (0.01, 0.02, 0.525, 0.9)
 #: Times the relief is fitted; a little less than the room, because letters do not grow with it.
 ROUNDS, LARGER = 3, 1.6
 #: Most numbers along an axis, and how far its name may stand off, points.
 NUMBERS, OFF = 5, (4, 12, 20, 28, 36, 46, 56, 70)
 
 
-def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> None:
+def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]], room: Room = ROOM) -> None:
     """Choose numbers on the axes and places of their names so that they are apart, and fill the room.
 
     Parameters
@@ -29,9 +31,11 @@ def fit_relief(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> N
     size : array_like (3,)
         Of what is shown, in the same unit on all axes.
     limits : three pairs of float
+    room : tuple of float, optional
+        Left, bottom, right and top of the part of the figure that it fills, as shares of the figure.
     """
     with _alone(axes):
-        _fit(axes, size, limits)
+        _fit(axes, size, limits, room)
 
 
 @contextmanager
@@ -47,7 +51,7 @@ def _alone(axes: Any) -> Iterator[None]:
             other.set_visible(True)
 
 
-def _fit(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> None:
+def _fit(axes: Any, size: Any, limits: Sequence[tuple[float, float]], room: Room) -> None:
     """Fit a relief, see `fit_relief`."""
     zoom = 0.84
     sides = (axes.xaxis, axes.yaxis, axes.zaxis)
@@ -67,8 +71,8 @@ def _fit(axes: Any, size: Any, limits: Sequence[tuple[float, float]]) -> None:
             if all(counts.values()):  # beside a narrow bed no distance takes the name off the numbers
                 _give_way(axes, axis)
         if turn < ROUNDS - 1:
-            zoom *= min(LARGER, _placed(axes))
-    _placed(axes)
+            zoom *= min(LARGER, _placed(axes, room))
+    _placed(axes, room)
 
 
 def hidden(axes: Any) -> list[tuple[Any, Any]]:
@@ -109,7 +113,7 @@ def _give_way(axes: Any, axis: Any) -> None:
     axis.set_major_locator(FixedLocator(kept))
 
 
-def _placed(axes: Any) -> float:
+def _placed(axes: Any, room: Room) -> float:
     """Move a relief into the middle of its room, and return how much larger it could be there."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
@@ -125,8 +129,8 @@ def _placed(axes: Any) -> float:
     inside = figure.transFigure.inverted().transform(np.concatenate(places))
     inside = inside[np.all(np.abs(inside) < 2.0, axis=1)]  # a number that is not drawn has no place
     low, high = inside.min(axis=0), inside.max(axis=0)
-    room = np.array(ROOM).reshape(2, 2)
+    ends = np.array(room).reshape(2, 2)
     now = axes.get_position()
-    across, up = 0.5 * (room.sum(axis=0) - low - high)
+    across, up = 0.5 * (ends.sum(axis=0) - low - high)
     axes.set_position((now.x0 + across, now.y0 + up, now.width, now.height))
-    return float(np.min((room[1] - room[0]) / (high - low)))
+    return float(np.min((ends[1] - ends[0]) / (high - low)))
