@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import MethodError, SceneError
+from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS, find_method, list_added, remove_method
 from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
@@ -138,3 +139,20 @@ def test_the_name_in_scene_files_is_that_of_the_class(attribute: str, name: str)
 
 def test_the_table_of_methods_finds_built_in_ones_first() -> None:
     assert find_method("elastic") is METHODS["elastic"]
+
+
+def test_a_batch_gives_what_the_runs_give_alone(here: Path) -> None:
+    write_method(here)
+    name = load_method("pad.py:SoftPad")
+    scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
+    found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
+    for number, scene in enumerate(scenes):
+        np.testing.assert_allclose(found[number], run(scene).history["height"], rtol=0, atol=1e-12)
+    assert np.abs(found[0] - found[2]).max() > 1e-5
+
+
+def test_a_shape_is_displayed_before_it_takes_over(here: Path) -> None:
+    write_method(here)
+    scene = small(load_method("pad.py:SoftPad"), "shape.file=saddle", "simulation.duration=0.4")
+    height = run(scene).history["height"]
+    assert np.ptp(height[-1]) > 1e-3

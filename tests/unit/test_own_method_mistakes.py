@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import MethodError
+from digiclay.core.control.guarded import Pace
 from digiclay.core.control.methods import list_added
 from digiclay.core.session.run_scene import run
 from digiclay.plugins.method_loader import load_method
@@ -151,6 +152,21 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(
                 "    return float('nan'), Orders()"),
             "command must return a memory without NaN.",
         ),
+        (
+            bad("def begin(self, device):\n    return (0.0, 1)\ndef command(self, memory, cells, device):\n"
+                "    return (float('nan'), 1), Orders()"),
+            "command must return a memory without NaN.",
+        ),
+        (
+            bad("def begin(self, device):\n    return (0.0, 1)\ndef command(self, memory, cells, device):\n"
+                "    return (0.0, 1.5), Orders()"),
+            "command must keep the kinds of its memory, here int (got float).",
+        ),
+        (
+            bad("def begin(self, device):\n    return np.zeros(3)\ndef command(self, memory, c, device):\n"
+                "    return np.zeros((3, 3)), Orders()"),
+            "command must keep the memory's array of 1 dimensions and float64 (got 2 and float64).",
+        ),
         (bad("def build(self, device):\n    return 3"), "build must return a controller with begin (got"),
     ],
 )  # fmt: skip
@@ -160,21 +176,67 @@ def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text: str, rule: s
     assert rule in said
 
 
+#: Each call takes more than twenty control periods.
+SLOW = bad(
+    "def command(self, memory, cells, device):\n"
+    "    import time\n"
+    "    end = time.thread_time() + 22 * device.period\n"
+    "    while time.thread_time() < end: pass\n"
+    "    return memory, Orders()"
+)
+
+
 def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # Twenty calls of more than twenty control periods of 0.2 ms each.
-    text = bad(
-        "def command(self, memory, cells, device):\n"
-        "    import time\n"
-        "    end = time.thread_time() + 22 * device.period\n"
-        "    while time.thread_time() < end: pass\n"
-        "    return memory, Orders()"
-    )
-    write_method(here, text, "bad.py")
+    write_method(here, SLOW, "bad.py")
     period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
     assert main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet"]) == 2
     said = capsys.readouterr().err
     assert "bad.py:Bad: command must take at most 20 control periods of processor time a call (got 2" in said
     assert [path.name for path in here.iterdir()] == ["bad.py"]
+
+
+@pytest.mark.parametrize(
+    ("commands", "rule"),
+    [
+        ("seen.target, seen.mode, seen.height * 0 + 1.5", "must return commands from -1 to 1 (got 1.5)."),
+        ("seen.target, seen.mode, seen.height * 0 - 1.5", "must return commands from -1 to 1 (got 1.5)."),
+        ("seen.target, seen.mode + 9, seen.height * 0", "must return mode as codes of Mode, from 0 to 7"),
+        ("seen.target, seen.height", "must not raise (got ValueError"),
+        (
+            "seen.target, seen.mode, seen.own.__setitem__(0, np.nan) or seen.height * 0",
+            "rows as finite numbers",
+        ),
+    ],
+)
+def test_a_controller_of_ones_own_is_checked_as_well(commands: str, rule: str) -> None:
+    text = bad("def build(self, device):\n    return Raw()")
+    controller = f"""
+class Raw:
+    rows = 1
+    begin = lambda self: 0
+    locate = lambda self, memory, touched: (memory, None)
+    command = lambda self, memory, seen: (memory, ({commands}))
+"""
+    said = refusal(text + controller)
+    assert said.startswith("bad.py:Bad: command ")
+    assert rule in said
+
+
+def test_the_pace_is_the_mean_over_twenty_calls() -> None:
+    pace = Pace()
+    for _ in range(2):
+        assert [pace.add(0.5) for _ in range(19)] == [None] * 19
+        assert pace.add(10.5) == 1.0
+
+
+def test_one_slow_call_is_no_slow_method(here: Path) -> None:
+    text = SLOW.replace("while", "while memory == 0 and").replace("return memory", "return 1")
+    write_method(
+        here, text.replace("def command", "begin = lambda self, device: 0\n    def command"), "bad.py"
+    )
+    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
+    duration = ["--set", "simulation.duration=0.008", "--quiet", "--no-errors", "--out", "r"]
+    assert main(["run", "tap", "--method", "bad.py:Bad", *period, *duration]) == 0
 
 
 def test_two_methods_of_one_name_are_refused(here: Path) -> None:
