@@ -29,7 +29,7 @@ EXTENSION = "bl_ext.user_default.digiclay"
 OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
 #: Time between steps, s: software GL draws a window of this size in a third of it.
 PAUSE = 0.4
-#: What the script has seen, by name; `blender_window.played` returns it.
+#: What the script has seen, for `blender_window.played`.
 SEEN: dict[str, Any] = {}
 
 
@@ -121,8 +121,7 @@ def add_bed() -> Iterator[float | None]:
         key("SPACE" if letter == " " else letter.upper(), middle(), unicode=letter)
         yield 0.15
     key("RET", middle())
-    yield None
-    yield None
+    yield from rounds()
     key("HOME", middle())
     yield None
 
@@ -191,6 +190,12 @@ def until(found: Callable[[], bool]) -> Iterator[float | None]:
     raise AssertionError("What was waited for did not come")
 
 
+def rounds(count: int = 3) -> Iterator[float | None]:
+    """Let Blender go round its main loop: in each it reads events, handles them, and draws."""
+    for _ in range(count):
+        yield 0.02
+
+
 def settle(ticks: int = 3) -> Iterator[float | None]:
     """Wait until the sessions have ticked some times, and so taken up whatever has happened."""
     running = part("live.running")
@@ -207,11 +212,8 @@ def look(name: str) -> None:
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
     evaluate()
     bridge, running = part("bridge"), part("live.running")
-    found: dict[str, Any] = {
-        "beds": len(beds()),
-        "sessions": len(running.list_sessions()),
-        "said": running.last_message(),
-    }
+    found: dict[str, Any] = {"beds": len(beds()), "said": running.last_message()}
+    found["sessions"] = len(running.list_sessions())
     for bed in beds()[:1]:
         session = running.find(bed)
         found["kept"] = len(bed.get("digiclay_state", b""))
@@ -239,8 +241,7 @@ def shot(name: str) -> None:
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
-    command = ["import", "-window", "root", str(file)]
-    subprocess.run(command, check=True, timeout=120, capture_output=True)
+    subprocess.run(["import", "-window", "root", str(file)], check=True, timeout=120, capture_output=True)
     image = bpy.data.images.load(str(file))
     SEEN.setdefault("colors", {})[name] = len(
         np.unique(np.array(image.pixels[:], np.float32).reshape(-1, image.channels), axis=0)
@@ -264,14 +265,11 @@ def main() -> None:
     """Enable the extension under the name Blender gives it, and play the script."""
     faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
-    # A view that is still on its way would not be where the mouse is sent by it.
-    bpy.context.preferences.view.smooth_view = 0
-    # Smooth edges cost software GL most of its time.
-    bpy.context.preferences.system.viewport_aa = "OFF"
+    bpy.context.preferences.view.smooth_view = 0  # the mouse is sent by where things are seen
+    bpy.context.preferences.system.viewport_aa = "OFF"  # it costs software GL most of its time
     # What Blender saves by itself has the name of its process: others can have had that before.
     bpy.context.preferences.filepaths.temporary_directory = str(OUT)
-    # Whoever is asked whether to save waits for ever.
-    bpy.context.preferences.view.use_save_prompt = False
+    bpy.context.preferences.view.use_save_prompt = False  # nobody would answer
     if addon_utils.enable(EXTENSION) is None:
         SEEN["error"] = f"{EXTENSION} cannot be enabled"
     sys.path.insert(0, str(SCRIPT.parent))  # scripts share what a hand does

@@ -43,11 +43,16 @@ def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
     return " ".join(to((int(x), int(y)), duration / count) for x, y in way)
 
 
+def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
+    """Wait until the hand is done, and Blender has worked off what it has sent."""
+    yield from blender.until(lambda: process.poll() is not None)
+    yield from blender.rounds()
+
+
 def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
     """Wait until the hand is done, and then until the finger is, and the pins have come to rest."""
     running = blender.part("live.running")
-    yield from blender.until(lambda: process.poll() is not None)
-    yield 0.5
+    yield from done(blender, process)
     yield from blender.until(lambda: not any(session.strokes for session in running.list_sessions()))
     yield from blender.settle(10)
 
@@ -103,8 +108,9 @@ def take_tool(blender: Any) -> None:
 
 def focus_window() -> Iterator[float | None]:
     """Make Blender's window the active one: else a button is pressed where the pointer is by then."""
-    hand("search --onlyvisible --class blender windowfocus").wait(30)
-    yield 1.0
+    # A slow server has the time it needs.
+    hand("search --onlyvisible --class blender windowfocus --sync").wait(300)
+    yield 0.2
 
 
 def script(blender: Any) -> Iterator[float | None]:

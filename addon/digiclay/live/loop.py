@@ -11,7 +11,7 @@ from . import running
 
 __all__ = [
     "begin", "end", "is_aside", "is_due", "is_running", "redraw_numbers", "step_aside", "take_over",
-    "token",
+    "time_window", "token",
 ]  # fmt: skip
 
 #: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
@@ -21,7 +21,7 @@ EARLY = 0.2
 #: How often the numbers in the sidebar are drawn anew, s.
 NUMBERS = 0.25
 
-#: The loop that runs: its timer, a number of its own, when it last ticked, when numbers were last drawn.
+#: The loop that runs: its timer and window, a number of its own, times of the last tick and drawn numbers.
 _LOOP: dict[str, Any] = {}
 _COUNT = [0]
 
@@ -43,10 +43,22 @@ def begin(context: Any) -> int:
     timer = context.window_manager.event_timer_add(
         1.0 / preferences.get(context).redraw_rate, window=context.window
     )
-    _LOOP.update(timer=timer, token=_COUNT[0], ticked=time.perf_counter(), numbers=0.0)
+    window, now = context.window.as_pointer(), time.perf_counter()
+    _LOOP.update(timer=timer, window=window, token=_COUNT[0], ticked=now, numbers=0.0)
     bpy.types.STATUSBAR_HT_header.prepend(draw)
     redraw_status()
     return _COUNT[0]
+
+
+def time_window(context: Any) -> Any | None:
+    """Return a timer for the window of the context, to be removed; None where the loop has one.
+
+    A timer's events come to the operators of its window alone.
+    """
+    if _LOOP and _LOOP["window"] == context.window.as_pointer():
+        return None
+    rate = preferences.get(context).redraw_rate
+    return context.window_manager.event_timer_add(1.0 / rate, window=context.window)
 
 
 def step_aside() -> None:

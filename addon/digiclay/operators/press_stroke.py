@@ -9,7 +9,7 @@ from ..compat import bpy
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
 from ..device import view
-from ..live import running, selection, tick
+from ..live import loop, running, selection, tick
 from ..live.stroke import DEEPEST, SYMMETRIES, Brush, deepen, draw
 from ..live.stroke_path import pull
 from ..live.stroke_queue import change_stroke, find_stroke, queue_stroke
@@ -77,6 +77,7 @@ class Press(PressSettings, Polled, bpy.types.Operator):
             session, *place, depth, SYMMETRIES[self.symmetry], self.kind, share, self.lean
         )
         running.put(session)
+        self.timer = loop.time_window(context)
         context.window_manager.modal_handler_add(self)
         self._tell(context)
         return {"RUNNING_MODAL"}
@@ -182,8 +183,11 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         status.show(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, said))
 
     def _end(self, result: set[str]) -> set[str]:
-        """Give back the status bar."""
+        """Give back the status bar, and the timer."""
         status.clear()
+        if self.timer is not None:
+            bpy.context.window_manager.event_timer_remove(self.timer)
+            self.timer = None
         return result
 
 

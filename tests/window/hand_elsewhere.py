@@ -1,0 +1,171 @@
+"""Draws while a 3D mouse turns the view, in a quad view and a second window; leaves sculpt mode."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from tests.window import space_mouse
+from tests.window.hand_strokes import (
+    HALF,
+    Pixel,
+    add_bed,
+    done,
+    drag,
+    ends,
+    finish,
+    focus_window,
+    hand,
+    note,
+    on_the_screen,
+    reset,
+    take_tool,
+    to,
+)
+from tests.window.play_and_look import top_quarter
+
+#: The last button in the header of the Sculpting workspace's 3D view, pixels from its left and top.
+LEAVE = (450, 13)
+#: A slow turn of the 3D mouse about the vertical axis: full is 350.
+TURN = (0, 0, 0, 0, 15, 0)
+
+
+def script(blender: Any) -> Iterator[float | None]:
+    """Do what a hand does."""
+    add_bed(blender)
+    take_tool(blender)
+    yield from focus_window()
+    yield from turned(blender)
+    yield from reset(blender)
+    yield from quarter(blender)
+    yield from reset(blender)
+    yield from second_window(blender)
+    yield from sculpting(blender)
+
+
+def held_stroke(blender: Any) -> Any:
+    """Return the stroke that the hand draws."""
+    (session,) = blender.part("live.running").list_sessions()
+    return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
+
+
+def let_go(blender: Any, name: str) -> Iterator[float | None]:
+    """Wait until the finger follows the stroke that is held, note the path, and let go."""
+    yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
+    path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke(blender).samples]
+    yield from finish(blender, hand("mouseup 1"))
+    note(blender, name)
+    blender.SEEN[name]["path"] = path
+
+
+def turned(blender: Any) -> Iterator[float | None]:
+    """Turn the view by the 3D mouse while the hand draws, then turn the wheels, and draw on."""
+    looking = blender.view()[0].spaces.active.region_3d
+    start, end = ends(blender)
+    before, distance = np.array(looking.view_rotation), looking.view_distance
+    middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
+    process = hand(to(start), "mousedown 1", drag(start, middle, 3.0, 60))
+    yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
+    drawing = process.poll() is None
+    while np.abs(np.array(looking.view_rotation) - before).max() < 0.03:
+        space_mouse.push(TURN)
+        yield 0.05
+    space_mouse.push((0,) * 6)
+    seen = {"drawing": drawing, "turned": np.abs(np.array(looking.view_rotation) - before).max().item()}
+    yield from done(blender, process)
+    # What a trackpad sends to Blender on X11: two fingers up, to the left and to the right are wheels.
+    yield from done(blender, hand("click 4 sleep 0.1 click 6 sleep 0.1 click 7 sleep 0.1"))
+    seen["nearer"] = distance / looking.view_distance
+    yield from done(blender, hand(drag(middle, on_the_screen(blender, HALF, 0.0), 0.5, 60)))
+    yield from let_go(blender, "turned")
+    blender.SEEN["turned"] |= seen
+    blender.shot("elsewhere_turned")
+
+
+def quarter(blender: Any) -> Iterator[float | None]:
+    """Draw in the top view of a quad view."""
+    blender.call(bpy.ops.screen.region_quadview)
+    yield from blender.until(lambda: top_quarter(blender) is not None)
+    yield from draw_in(blender, "quarter", blender.window(), top_quarter(blender), (0, 0))
+    blender.shot("elsewhere_quarter")
+    blender.call(bpy.ops.screen.region_quadview)
+    yield None
+
+
+def draw_in(blender: Any, name: str, window: Any, region: Any, corner: Pixel) -> Iterator[float | None]:
+    """Draw along the middle row in a region of a window whose top left corner is somewhere on the screen."""
+    scale = blender.part("bridge").SCALE * 1e-3
+    bed, places = blender.beds()[0].matrix_world, []
+    for x in (-HALF, HALF):
+        at = location_3d_to_region_2d(region, region.data, bed @ (Vector((x, 0.0, 40.0)) * scale))
+        across, up = round(region.x + at.x), round(region.y + at.y)
+        places.append((corner[0] + across, corner[1] + window.height - 1 - up))
+    start, end = places
+    yield from done(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60)))
+    yield from let_go(blender, name)
+
+
+def windows_on_screen() -> dict[str, dict[str, int]]:
+    """Return place and size of Blender's windows on the screen, by their number."""
+    found = subprocess.run(
+        ["xdotool", "search", "--onlyvisible", "--class", "blender"],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    seen = {}
+    for number in found.stdout.split():
+        words = ["xdotool", "getwindowgeometry", "--shell", number]
+        lines = subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()
+        seen[number] = {name: int(value) for name, value in (line.split("=") for line in lines)}
+    return seen
+
+
+def second_window(blender: Any) -> Iterator[float | None]:
+    """Draw in a second window, while the first one drives the session."""
+    first = set(windows_on_screen())
+    bpy.ops.wm.window_new()
+    yield from blender.until(lambda: len(windows_on_screen()) > len(first))
+    number, shown = next((one, at) for one, at in windows_on_screen().items() if one not in first)
+    window = bpy.context.window_manager.windows[-1]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    looking, seen = region.data, blender.view()[0].spaces.active.region_3d
+    looking.view_location, looking.view_distance = seen.view_location, seen.view_distance
+    yield from blender.rounds()  # its matrices are those of the last drawing
+    yield from done(blender, hand(f"windowfocus --sync {number}"))
+    yield from draw_in(blender, "second window", window, region, (shown["X"], shown["Y"]))
+    blender.SEEN["second window"]["windows"] = len(bpy.context.window_manager.windows)
+    blender.shot("elsewhere_window")
+    with bpy.context.temp_override(window=window):
+        bpy.ops.wm.window_close()
+    yield from blender.until(lambda: len(bpy.context.window_manager.windows) == 1)
+    yield from focus_window()
+
+
+def sculpting(blender: Any) -> Iterator[float | None]:
+    """Leave Blender's sculpt mode by one click into the header, and draw."""
+    blender.select(blender.beds()[0])
+    home = blender.window().workspace
+    blender.window().workspace = bpy.data.workspaces["Sculpting"]
+    yield from blender.until(lambda: bpy.context.mode == "SCULPT")
+    blender.SEEN["mode before"] = bpy.context.mode
+    blender.shot("elsewhere_sculpting")
+    area, _ = blender.view()
+    at = area.x + LEAVE[0], blender.window().height - (area.y + area.height) + LEAVE[1]
+    yield from done(blender, hand(to(at, 0.2), "click 1"))
+    yield from blender.until(lambda: bpy.context.mode == "OBJECT")
+    blender.shot("elsewhere_back")
+    tool = blender.window().workspace.tools.from_space_view3d_mode("OBJECT")
+    blender.SEEN["back"] = {"mode": bpy.context.mode, "tool": tool.idname}
+    blender.window().workspace = home
+    yield None

@@ -1,0 +1,112 @@
+"""Stand-in for the driver of a 3D mouse: programs connect to it, and what a hand sends comes to them.
+
+The library libspnav, by which Blender reads a 3D mouse on Linux, connects to the socket in ``SPNAV_SOCKET``
+and asks first for a version of the protocol. Each motion is then 8 integers: 0, translation to the right, up
+and to the user, turns about these axes, and the time since the one before, ms.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+__all__ = ["VARIABLE", "driver", "push"]
+
+#: Blender asks libspnav only where this file is there, whatever it is.
+USUAL = "/var/run/spnav.sock"
+
+#: Name of the environment variable with the path of the socket.
+VARIABLE = "SPNAV_SOCKET"
+#: A motion; the number that a hand sends first, in place of a request of the library.
+MOTION, HAND = struct.Struct("8i"), struct.pack("i", 1)
+
+
+@contextmanager
+def driver(folder: Path, blender: str) -> Iterator[str]:
+    """Run the stand-in; yield the path of its socket.
+
+    Parameters
+    ----------
+    folder : Path
+        For the socket.
+    blender : str
+        Blender's command: a launcher may give it a file system of its own.
+    """
+    path, mark = str(folder / "space_mouse"), folder / "made"
+    # Where a true driver runs, the file is there already, and stays.
+    _run(
+        blender, f"import os; os.path.exists({USUAL!r}) or [open(n, 'x') for n in ({USUAL!r}, {str(mark)!r})]"
+    )
+    try:
+        yield from _listen(path)
+    finally:
+        if mark.exists():
+            _run(blender, f"import os; os.remove({USUAL!r})")
+
+
+def _run(blender: str, words: str) -> None:
+    """Run a line of Python in a Blender without a window."""
+    command = [
+        blender,
+        "--background",
+        "--factory-startup",
+        "--python-exit-code",
+        "3",
+        "--python-expr",
+        words,
+    ]
+    subprocess.run(command, check=True, timeout=300, capture_output=True)
+
+
+def _listen(path: str) -> Iterator[str]:
+    """Listen at a path, and yield it."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(path)
+        listener.listen()
+        programs: list[socket.socket] = []
+        threading.Thread(target=_serve, args=(listener, programs), daemon=True).start()
+        try:
+            yield path
+        finally:
+            listener.shutdown(socket.SHUT_RDWR)
+            for program in programs:
+                program.close()
+
+
+def _serve(listener: socket.socket, programs: list[socket.socket]) -> None:
+    """Keep the programs that connect, and pass on what a hand sends, until the listener is shut down."""
+    while True:
+        try:
+            connection, _ = listener.accept()
+        except OSError:
+            return
+        asked = connection.recv(4)
+        if asked != HAND:
+            connection.sendall(asked)  # the version that it asks for is the one it gets
+            programs.append(connection)
+            continue
+        with connection:
+            while sent := connection.recv(MOTION.size, socket.MSG_WAITALL):
+                for program in programs:
+                    program.sendall(sent)
+
+
+def push(*motions: tuple[int, int, int, int, int, int], pause: int = 16) -> None:
+    """Push the cap of the 3D mouse of the environment.
+
+    Parameters
+    ----------
+    motions : tuple of int
+        Translations and turns, each -500 to 500; all 0: it is let go.
+    pause : int, optional
+        Time since the motion before, ms.
+    """
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as hand:
+        hand.connect(os.environ[VARIABLE])
+        hand.sendall(HAND + b"".join(MOTION.pack(0, *motion, pause) for motion in motions))

@@ -1,0 +1,55 @@
+"""Strokes by a hand while a 3D mouse turns the view, in a quad view and a second window; the way back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.window.blender_window import BLENDER, played
+from tests.window.hand_strokes import HALF
+from tests.window.space_mouse import VARIABLE, driver
+
+PITCH, REST = 3.0, 40.0
+#: A pin that a finger of 4 mm depth has passed is down by more than this, mm.
+FORMED = 1.0
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Play the script once, with a 3D mouse; return what stood in the scene after each of its steps."""
+    with (
+        driver(tmp_path_factory.mktemp("mouse"), BLENDER) as path,
+        pytest.MonkeyPatch.context() as environment,
+    ):
+        environment.setenv(VARIABLE, path)
+        out = tmp_path_factory.mktemp("elsewhere")
+        return played("hand_elsewhere.py", out, size=(800, 560), by_hand=True)
+
+
+@pytest.mark.parametrize("name", ["turned", "quarter", "second window"])
+def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: dict[str, Any], name: str) -> None:
+    # The path is that of the samples that the tool has queued while the button was held.
+    path, bed = np.array(seen[name]["path"]), np.array(seen[name]["bed"])
+    np.testing.assert_allclose(path[[0, -1]], [[-HALF, 0.0], [HALF, 0.0]], rtol=0, atol=2.0)
+    columns, rows = np.rint(path / PITCH + 12).astype(int).clip(0, 24).T
+    assert (REST - bed[rows, columns] > FORMED).mean() >= 0.95
+
+
+def test_a_3d_mouse_turns_the_view_while_the_hand_draws(seen: dict[str, Any]) -> None:
+    assert seen["turned"]["drawing"]
+    assert seen["turned"]["turned"] > 0.03
+
+
+def test_the_wheels_of_a_trackpad_zoom_in_mid_stroke(seen: dict[str, Any]) -> None:
+    assert seen["turned"]["nearer"] > 1.05
+
+
+def test_a_stroke_in_a_second_window_leaves_the_session_to_the_first(seen: dict[str, Any]) -> None:
+    assert (seen["second window"]["windows"], seen["second window"]["sessions"]) == (2, 1)
+
+
+def test_one_click_leads_back_from_the_sculpting_workspace(seen: dict[str, Any]) -> None:
+    assert seen["mode before"] == "SCULPT"
+    assert seen["back"] == {"mode": "OBJECT", "tool": "digiclay.press_tool"}
