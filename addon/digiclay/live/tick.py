@@ -18,7 +18,7 @@ from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..settings import properties
 from ..ui_text import localize
-from . import bed_state, gestures, running, sculpting
+from . import bed_state, follow, gestures, running, sculpting
 from .running import Floats, Running
 from .stroke_queue import drop_strokes
 from .waiting import blocking_reason, find_bed
@@ -72,6 +72,7 @@ def start(context: Any, bed: Any) -> list[Note]:
 def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and what was recorded as a take; return words about that."""
     ended = running.drop(uid)
+    follow.end(uid)
     bed = find_bed(uid, ended.name) if ended else None
     return takes.keep_recording(bed, ended) if ended is not None and bed is not None else ""
 
@@ -144,6 +145,7 @@ def tick(context: Any, now: float) -> list[Note]:
         bed = find_bed(session.uid, session.name)
         if bed is None:
             running.drop(session.uid)
+            follow.end(session.uid)
             notes.append(
                 Note("WARNING", localize("The session of {} ended: its bed was deleted", session.name))
             )
@@ -176,16 +178,20 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         notes.append(Note("INFO", localize("The session of {} goes on", bed.name)))
     session = replace(session, blocking_reason="", name=bed.name)
     seen = _visible_rows(session)
+    followed, heard = follow.follow(session.uid, now)
+    if heard:
+        notes.append(Note("WARNING", f"{bed.name}: {heard}"))
     try:
         # The finger of a stroke is where the session has put it.
-        pose = session.pose if session.strokes else bridge.pose(view.fingertip_of(bed))
+        pose = session.pose if session.strokes else followed
+        pose = bridge.pose(view.fingertip_of(bed)) if pose is None else pose
         later = sculpting.advance(session, pose, now, most, display.picked_pins(bed))
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.snapshot, session.pose)
         later = replace(drop_strokes(back), paused=True)
         notes.append(Note("ERROR", localize("The session of {} is paused: {}", bed.name, error)))
     running.put(later)
-    moved = bool(session.strokes) and _move_finger(bed, later)
+    moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
     bed_state.write(bed, later, before)
     # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
     if before.stale or said or not np.array_equal(seen, _visible_rows(later)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..compat import bpy
-from ..live import bed_state, running
+from ..live import bed_state, follow, running
 from ..live.running import Running
 from ..overlay.sections import error_message
 from ..recorded import bake, takes
@@ -39,6 +39,7 @@ class Session(Panel, bpy.types.Panel):
                 row.scale_y = 1.4
                 row.operator("digiclay.leave_mode", icon="LOOP_BACK")
             _buttons(column, session)
+            _server(self.layout, session)
             _numbers(self.layout, session)
         said = (
             session.blocking_reason and localize("Waits: {}", session.blocking_reason)
@@ -62,6 +63,18 @@ def _buttons(column: Any, session: Running) -> None:
     count = len(session.gestures)
     words = localize("Take Back a Gesture ({})", count) if count else "Take Back a Gesture"
     column.operator("digiclay.session_rewind", text=words, icon="REW")
+
+
+def _server(layout: Any, session: Running) -> None:
+    """Draw the server that a session follows."""
+    following = follow.find(session.uid)
+    if following is None:
+        layout.operator("digiclay.follow_server", icon="LINKED")
+        return
+    column = layout.column(align=True)
+    column.operator("digiclay.leave_server", icon="UNLINKED")
+    icon = "ERROR" if following.silent else "LINKED"
+    column.label(text=localize("Follows {}", following.address), icon=icon)
 
 
 def _numbers(layout: Any, session: Running) -> None:

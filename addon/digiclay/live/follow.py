@@ -1,0 +1,160 @@
+"""Following of a server: the fingertip of a session goes where that of `digiclay serve` is. No Blender.
+
+A tick looks for datagrams and never waits for one. UDP suits that: a pose that is lost is not missed, since
+the next one is newer, and a server that stalls leaves nothing half-read.
+"""
+
+from __future__ import annotations
+
+import math
+import socket
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ui_text import localize
+from .follow_messages import pack_subscription, parse_address, read_pose
+
+__all__ = ["Following", "begin", "end", "find", "follow"]
+
+Floats = NDArray[np.float64]
+
+#: Poses a second asked for: some between two ticks.
+RATE = 120.0
+#: Time between two subscriptions, and that after which a server is silent, s.
+RENEW, SILENT = 1.0, 3.0
+#: Most datagrams read in a tick: more than a server sends meanwhile.
+MOST = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Server that a session follows.
+
+    Attributes
+    ----------
+    address : str
+        As it was entered.
+    token : str
+    door : socket
+        Connected to the server and not blocking: what others send never arrives.
+    asked : float
+        When the last subscription was sent, s.
+    heard : float or None
+        When the last pose was read, or else the first look, s; None before that.
+    pose : ndarray (7,) or None
+        The newest; None before the first.
+    silent : bool
+        Whether it has been told that nothing comes.
+    """
+
+    address: str
+    token: str
+    door: socket.socket
+    asked: float = -math.inf
+    heard: float | None = None
+    pose: Floats | None = None
+    silent: bool = False
+
+
+#: Followed servers by the uid of the session's bed: what this Blender is doing, not what a file holds.
+_FOLLOWED: dict[int, Following] = {}
+
+
+def find(uid: int) -> Following | None:
+    """Return the server that the session of a bed follows, or None."""
+    return _FOLLOWED.get(uid)
+
+
+def begin(uid: int, address: str, token: str, *, online: bool) -> None:
+    """Begin to follow a server; whatever was followed before is not any more.
+
+    Parameters
+    ----------
+    uid : int
+        `session_uid` of the bed.
+    address : str
+        Host and port of its OSC.
+    token : str
+    online : bool
+        Whether other machines may be reached.
+
+    Raises
+    ------
+    DigiclayError
+        When the address is none, or may not be reached.
+    OSError
+        When there is no way there.
+    """
+    host, port = parse_address(address, online=online)
+    door = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        door.setblocking(False)
+        door.connect((host, port))
+    except OSError:
+        door.close()
+        raise
+    end(uid)
+    _FOLLOWED[uid] = Following(address, token, door)
+
+
+def end(uid: int) -> None:
+    """Follow no server any more."""
+    following = _FOLLOWED.pop(uid, None)
+    if following is not None:
+        following.door.close()
+
+
+def follow(uid: int, now: float) -> tuple[Floats | None, str]:
+    """Look for poses; return the newest one, None before the first, and what is to be told.
+
+    Parameters
+    ----------
+    uid : int
+        `session_uid` of the bed.
+    now : float
+        By a clock that never goes back, s.
+    """
+    following = _FOLLOWED.get(uid)
+    if following is None:
+        return None, ""
+    if now - following.asked >= RENEW:
+        _send(following.door, pack_subscription(following.token, RATE))
+        following = replace(following, asked=now)
+    pose, told = _receive(following.door), ""
+    heard = now if following.heard is None else following.heard
+    if pose is not None:
+        if following.silent:
+            told = localize("The server at {} is heard again", following.address)
+        following = replace(following, pose=pose, heard=now, silent=False)
+    elif not following.silent and now - heard >= SILENT:
+        following = replace(following, silent=True)
+        told = localize("No pose from {}: is the server running, and the token right?", following.address)
+    else:
+        following = replace(following, heard=heard)
+    _FOLLOWED[uid] = following
+    return following.pose, told
+
+
+def _send(door: socket.socket, data: bytes) -> None:
+    """Send a datagram; one that cannot be sent is repeated soon."""
+    try:
+        door.send(data)
+    except OSError:  # nobody listens there now, or the network is busy
+        return
+
+
+def _receive(door: socket.socket) -> Floats | None:
+    """Return the newest pose that has come, None for none."""
+    newest = None
+    for _ in range(MOST):
+        try:
+            data = door.recv(2048)
+        except BlockingIOError:
+            break
+        except OSError:  # nobody listens there now
+            continue
+        pose = read_pose(data)
+        newest = newest if pose is None else pose
+    return newest

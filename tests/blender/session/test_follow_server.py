@@ -1,0 +1,176 @@
+"""A live session follows a server of poses: a socket that speaks its OSC, and `digiclay serve` itself."""
+
+from __future__ import annotations
+
+import importlib.util
+import socket
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from digiclay.device import view
+from digiclay.live import follow, running
+from digiclay.live.follow_messages import pack_subscription, parse_address, read_pose
+
+from tests.blender.session.live import FLOAT32, Clock, exact, started
+from tests.timeouts import TIMEOUT
+
+TOKEN = "a-token-of-tests"
+PRESS = (0.0, 0.0, 0.037, 1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def server() -> Iterator[socket.socket]:
+    """A socket of this machine that answers as a test has it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as door:
+        door.bind(("127.0.0.1", 0))
+        door.settimeout(TIMEOUT)
+        yield door
+
+
+def state(*pose: float) -> bytes:
+    """Return a state as docs/serve.md describes it."""
+    return b"/digiclay/state\0,hhddddddddd\0\0\0\0" + struct.pack(">qq9d", 1, 1, 0.5, 0.0, *pose)
+
+
+def followed(bed: Any, server: socket.socket, clock: Clock) -> Any:
+    """Start to follow; return the address of the session's socket."""
+    started(bed)
+    bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{server.getsockname()[1]}", token=TOKEN)
+    clock.tick()
+    asked, address = server.recvfrom(2048)
+    assert asked == pack_subscription(TOKEN, follow.RATE)
+    return address
+
+
+def arrived(server: socket.socket, address: Any, *datagrams: bytes) -> None:
+    """Send datagrams; on one machine they have arrived with the call."""
+    for data in datagrams:
+        server.sendto(data, address)
+
+
+def pose_of(bed: Any) -> list[float]:
+    """Return the pose of the session's fingertip."""
+    session = running.find(bed)
+    assert session is not None
+    return list(session.pose)
+
+
+def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: socket.socket) -> None:
+    address = followed(bed, server, clock)
+    for _ in range(10):
+        arrived(server, address, state(0.0, 0.0, 0.045, 1.0, 0.0, 0.0, 0.0), state(*PRESS))
+        assert clock.tick() == []
+    assert pose_of(bed) == list(PRESS)
+    # The empty is the ellipsoid's center, 8 mm above its lowest point.
+    assert view.fingertip_of(bed).location.z == pytest.approx(0.45, abs=10 * FLOAT32)
+    assert exact(bed).min() < 39.9e-3
+
+
+def test_garbage_and_poses_that_are_none_change_nothing(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    address = followed(bed, server, clock)
+    arrived(server, address, state(*PRESS))
+    clock.tick()
+    nan, huge = float("nan"), 1e300
+    wrong = [b"", b"x" * 2000, state(*PRESS)[:-1], state(*PRESS) + b"\0", b"/digiclay/state\0"]
+    wrong += [state(nan, *PRESS[1:]), state(huge, *PRESS[1:]), state(*PRESS[:3], 0.0, 0.0, 0.0, 0.0)]
+    wrong += [state(*PRESS[:3], *[huge] * 4), state(*PRESS[:3], *[float("inf")] * 4)]
+    arrived(server, address, *wrong)
+    assert clock.tick(3) == []
+    assert pose_of(bed) == list(PRESS)
+
+
+def test_what_others_send_is_not_taken(bed: Any, clock: Clock, server: socket.socket) -> None:
+    address = followed(bed, server, clock)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(state(*PRESS), address)
+        clock.tick(3)
+    assert pose_of(bed) != list(PRESS)
+
+
+def test_a_silent_server_is_told_once_and_again_when_it_is_heard(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    address = followed(bed, server, clock)
+    notes = clock.tick(200)
+    assert ["No pose from" in note.message for note in notes] == [True]
+    arrived(server, address, state(*PRESS))
+    assert ["heard again" in note.message for note in clock.tick(2)] == [True]
+
+
+def test_a_server_that_has_gone_stalls_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
+    followed(bed, server, clock)
+    server.close()
+    period = running.find(bed).state.period
+    assert ["No pose from" in note.message for note in clock.tick(200)] == [True]
+    assert running.find(bed).state.period > period
+
+
+def test_the_subscription_is_renewed_and_ends_with_the_session(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    followed(bed, server, clock)
+    uid = running.find(bed).uid
+    clock.tick(40)
+    assert server.recv(2048) == pack_subscription(TOKEN, follow.RATE)
+    bpy.ops.digiclay.session_stop()
+    assert follow.find(uid) is None
+
+
+def test_a_deleted_bed_is_followed_no_more(bed: Any, clock: Clock, server: socket.socket) -> None:
+    followed(bed, server, clock)
+    uid = running.find(bed).uid
+    bpy.data.objects.remove(bed)
+    assert ["bed was deleted" in note.message for note in clock.tick()] == [True]
+    assert follow.find(uid) is None
+
+
+def test_the_fingertip_is_the_hands_again_when_following_ends(
+    bed: Any, clock: Clock, server: socket.socket
+) -> None:
+    address = followed(bed, server, clock)
+    arrived(server, address, state(*PRESS))
+    clock.tick(3)
+    bpy.ops.digiclay.leave_server()
+    view.fingertip_of(bed).location.z = 0.6
+    clock.tick(3)
+    assert pose_of(bed)[2] == pytest.approx(0.052, abs=FLOAT32)
+
+
+@pytest.mark.parametrize(
+    "address", ["", "127.0.0.1", "example.org:80", "127.0.0.1:0", "127.0.0.1:99999", ":80"]
+)
+def test_a_wrong_address_is_refused_in_one_line(bed: Any, clock: Clock, address: str) -> None:
+    started(bed)
+    with pytest.raises(RuntimeError, match="must be HOST:PORT"):
+        bpy.ops.digiclay.follow_server(address=address, token=TOKEN)
+
+
+def test_another_machine_needs_online_access() -> None:
+    from digiclay.core.base.errors import DigiclayError
+
+    with pytest.raises(DigiclayError, match="allow online access"):
+        parse_address("192.0.2.1:8766", online=False)
+    assert parse_address("192.0.2.1:8766", online=True) == ("192.0.2.1", 8766)
+    assert parse_address("localhost:1", online=False) == ("127.0.0.1", 1)
+    assert parse_address("[::1]:1", online=False) == ("::1", 1)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("websockets") is None, reason="digiclay[serve] is not installed")
+def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Path) -> None:
+    from digiclay_serve.protocol import Pose, pack_pose
+    from tests.served import serve
+
+    started(bed)
+    with serve(tmp_path) as one, one.connect("?rate=0") as client:
+        bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{one.osc_port}", token=TOKEN)
+        while not np.allclose(pose_of(bed), PRESS, rtol=0, atol=1e-12):
+            client.send(pack_pose(Pose(PRESS)))
+            clock.tick()
+    assert read_pose(state(*PRESS)).tolist() == list(PRESS)
