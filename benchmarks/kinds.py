@@ -15,6 +15,7 @@ from . import (
     method_figures,
     precision,
     runs_together,
+    serve_times,
     session_parts,
     stiff,
     terms,
@@ -36,6 +37,7 @@ examples:
   python -m benchmarks export         mesh files of beds from 625 pins to a million
   python -m benchmarks viewport       a tick of a live session in Blender
   python -m benchmarks ticks          how the time of a tick is distributed
+  python -m benchmarks serve          deadlines of a session for other programs at 1 kHz
   python -m benchmarks methods        force deviation of Methods I and III over paths and drags
   python -m benchmarks made           things formed by recorded strokes, beside what was intended
 """
@@ -53,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
     for kind in (
         session_parts, stiff, precision, terms, bed_size, mesh_export, viewport, ticks, runs_together, made,
-        cluster_cost, method_figures,
+        cluster_cost, serve_times, method_figures,
     ):  # fmt: skip
         kind.add(kinds)
     return top

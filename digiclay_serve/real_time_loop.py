@@ -44,7 +44,7 @@ class LoopTimes:
         From the beginning of a period to the frame after it, those left out included: above a period it
         has missed its deadline.
     spent : TimeCounts
-        Processor time of each turn of the loop.
+        Processor time of each simulated period.
     lateness : TimeCounts
         From the beginning of a period to that of its simulation.
     """
@@ -120,7 +120,10 @@ def run_session(
         session = _advance(session, order.target, order.number, due.count, tell)
         doors.show(pack_frame(make_frame(session)))
         ended = time.perf_counter()
-        times.spent.count(time.thread_time() - spent)
+        # A turn that makes up for late periods simulates several.
+        each = (time.thread_time() - spent) / due.count
+        for _ in range(due.count):
+            times.spent.count(each)
         for begin in due.begins.tolist():
             times.elapsed.count(ended - begin)
             times.lateness.count(began - begin)
