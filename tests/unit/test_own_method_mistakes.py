@@ -167,6 +167,11 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(
                 "    return np.zeros((3, 3)), Orders()"),
             "command must keep the memory's array of 1 dimensions and float64 (got 2 and float64).",
         ),
+        (
+            bad("def command(self, memory, cells, device):\n    raise DigiclayError('no finger')").replace(
+                "import numpy", "from digiclay.core.base.errors import DigiclayError\nimport numpy"),
+            "command must not raise (got DigiclayError in line 12: no finger).",
+        ),
         (bad("def build(self, device):\n    return 3"), "build must return a controller with begin (got"),
     ],
 )  # fmt: skip

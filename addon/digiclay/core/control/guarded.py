@@ -131,7 +131,7 @@ class Guarded:
         """Turn whatever goes wrong into one line."""
         try:
             yield
-        except (DigiclayError, MemoryError):
+        except (MethodError, MemoryError):
             raise
         except Exception as error:
             raise MethodError(f"{self.origin}: {function} {describe_failure(error, self.file)}.") from error
