@@ -16,8 +16,12 @@ from ..core.control.own_method import OwnMethod
 
 __all__ = ["check_class", "list_classes"]
 
-#: Names in the section [control] of a scene file that are no parameters.
-TAKEN = ("method",)
+#: Names that are no parameters: in the section [control] of a scene file, among a method's functions, and
+#: among those of Blender's properties.
+TAKEN = (
+    "method", "begin", "blister", "build", "check", "command", "locate", "recovers", "rows", "set_point",
+    "bl_rna", "get", "id_data", "items", "keys", "name", "pop", "rna_type", "values",
+)  # fmt: skip
 Refuse = Callable[..., NoReturn]
 #: Types of a parameter's default.
 KINDS = (bool, int, float, str, tuple)
@@ -82,7 +86,7 @@ def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
     if not isinstance(known, Quantity):
         refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
     if field.name in TAKEN or field.name.startswith("_"):
-        refuse("a field must not be called method, nor begin with an underscore", field.name)
+        refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
     if known.unit not in EXTENTS:
         refuse(f"the unit of {field.name} must be one of {', '.join(filter(None, EXTENTS))}", known.unit)
     if not isinstance(field.default, KINDS):
