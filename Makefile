@@ -87,7 +87,7 @@ docs: ## build the site in site/, without a warning, and check it: links, search
 
 test-release: ## release a copy, and run its wheel in bare Pythons 3.11, 3.12, 3.13 with lowest and highest libraries
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
-	@rm -f .reports/release.txt; $(PART) .reports/release.txt "release, and its wheel in bare Pythons" 600 -- -n 2 --dist loadfile tests/release
+	@rm -f .reports/release.txt; PYTHON311="$(PYTHON)" PYTHON313="$(PYTHON313)" $(PART) .reports/release.txt "release, and its wheel in bare Pythons" 1200 -- -n 2 --dist loadfile tests/release
 
 # The version in the files and in the changelog: make release VERSION=0.1.0
 VERSION ?=

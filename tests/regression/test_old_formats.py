@@ -21,6 +21,8 @@ SAMPLES = Path(__file__).parents[1] / "samples"
 #: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
 #: all numbers are the same.
 ROUNDING = 1e-11
+#: The same, of forces that are some kN where a pin is driven to its stop.
+RELATIVE = 1e-12
 WRITTEN = sorted(
     path
     for folder in ("scenes", "states")
@@ -106,7 +108,7 @@ def test_a_session_goes_on_from_a_kept_state_of_an_older_version_as_it_did(path:
         height.append(now.row(0))
         force.append(now.row(system.rows.force))
     np.testing.assert_allclose(height[::10], known["height"], rtol=0.0, atol=ROUNDING)
-    np.testing.assert_allclose(force[::10], known["force"], rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(force[::10], known["force"], rtol=RELATIVE, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("path", STATES, ids=lambda path: path.stem)

@@ -1,0 +1,122 @@
+"""The wheel in Pythons that have nothing else: lowest, usual and highest versions of its libraries."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay import __version__
+from digiclay.cli import main
+from digiclay.core.mesh_io.mesh_reader import read
+
+from tests.release.bare_python import BarePython, find_core_tests, install_pytest, make_bare
+from tests.timeouts import TIMEOUT
+
+#: Python and the file of requirements/ that pins its libraries, empty for what pip chooses.
+KINDS = {"3.11": "lowest", "3.12": "", "3.13": "highest"}
+#: Reads the meshes that it is given, and prints what is in them.
+SCRIPT = """
+import json, sys
+from pathlib import Path
+from digiclay.core.mesh_io.mesh_reader import read
+meshes = {name: read(Path(name)) for name in sys.argv[1:]}
+print(json.dumps({name: [mesh.vertices.tolist(), mesh.faces.tolist()] for name, mesh in meshes.items()}))
+"""
+#: Difference of heights between versions of numpy, m: its sums have another order, and valves amplify that.
+ROUNDING = 1e-12
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def bare(request: pytest.FixtureRequest, wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> BarePython:
+    """A Python with the wheel alone."""
+    folder = tmp_path_factory.mktemp("bare") / request.param
+    return make_bare(folder, request.param, wheel, KINDS[request.param])
+
+
+@pytest.fixture(scope="module")
+def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run of the sample `tap`."""
+    folder = tmp_path_factory.mktemp("runs")
+    done = bare.run("digiclay", "run", "tap", "--out", "tap", cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "0.5 s simulated" in done.stdout
+    return folder / "tap"
+
+
+@pytest.fixture(scope="module")
+def tap_here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same run with the versions of the tests."""
+    folder = tmp_path_factory.mktemp("here") / "tap"
+    assert main(["run", "tap", "--out", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def test_nothing_is_installed_but_the_package_and_its_libraries(bare: BarePython, tmp_path: Path) -> None:
+    done = bare.run("python", "-m", "pip", "list", "--format", "json", cwd=tmp_path)
+    found = {one["name"]: one["version"] for one in json.loads(done.stdout)}
+    assert set(found) - {"pip", "setuptools"} == {"digiclay", "numpy", "trimesh"}
+    assert found["digiclay"] == __version__
+    assert {name: found[name] for name in bare.pins} == bare.pins
+    assert bare.run("python", "-m", "pip", "check", cwd=tmp_path).returncode == 0
+
+
+def test_the_sample_tap_leaves_its_files(tap: Path) -> None:
+    assert {path.name for path in tap.iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
+
+
+def test_the_run_is_the_same_as_with_our_versions(tap: Path, tap_here: Path) -> None:
+    runs = [np.load(folder / "history.npz") for folder in (tap, tap_here)]
+    assert set(runs[0].files) == set(runs[1].files)
+    heights = [run["height"] for run in runs]
+    assert np.ptp(heights[0]) > 1e-4
+    np.testing.assert_allclose(heights[0], heights[1], rtol=0, atol=ROUNDING)
+
+
+def test_runs_are_exported_and_shapes_formed_without_another_library(bare: BarePython, tap: Path) -> None:
+    formats = ("stl", "obj", "ply", "glb", "3mf")
+    done = bare.run("digiclay", "export", "tap", "--format", ",".join(formats), cwd=tap.parent)
+    assert done.returncode == 0, done.stderr
+    assert {path.suffix[1:] for path in tap.iterdir()} >= set(formats)
+    done = bare.run("digiclay", "describe", "ridge_mound_valley", cwd=tap.parent)
+    assert (done.returncode, "25 x 25 = 625 cells" in done.stdout) == (0, True), done.stderr
+
+
+def test_a_missing_library_is_one_line(bare: BarePython, tap: Path) -> None:
+    done = bare.run("digiclay", "plot", "tap", cwd=tap.parent)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "pip install digiclay[plots]" in done.stderr
+
+
+def test_meshes_are_read_as_with_our_versions(bare: BarePython, tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=10.0)
+    for name in ("ball.stl", "ball.ply", "ball.off", "ball.obj"):
+        ball.export(tmp_path / name)
+    (tmp_path / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(ball), encoding="ascii")
+    (tmp_path / "text.ply").write_bytes(ball.export(file_type="ply", encoding="ascii"))
+    names = sorted(path.name for path in tmp_path.iterdir())
+    done = bare.run("python", "-c", SCRIPT, *names, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for name, (vertices, faces) in json.loads(done.stdout).items():
+        here = read(tmp_path / name)
+        np.testing.assert_array_equal(here.vertices, vertices, err_msg=name)
+        np.testing.assert_array_equal(here.faces, faces, err_msg=name)
+
+
+def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:
+    if not bare.pins:
+        return  # between the lowest and the highest versions, which are tested
+    root = Path(__file__).parents[2]
+    files = find_core_tests()
+    assert len(files) > 50
+    install_pytest(bare, tmp_path / "pytest")
+    # Not with the checkout's addon/ on the path: what is tested is the wheel.
+    words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-o", "pythonpath=.", *files)
+    done = bare.run("python", *words, cwd=root, path=str(tmp_path / "pytest"), limit=5 * TIMEOUT)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+    passed = re.search(r"(\d+) passed", done.stdout)
+    assert passed is not None
+    assert int(passed[1]) > 1000
