@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -71,13 +72,17 @@ def run_mismatched(true: Scene, model: Scene) -> dict[str, float | None]:
     return run_controller(true, controller)
 
 
-def run_controller(scene: Scene, controller: Controller) -> dict[str, float | None]:
+def run_controller(
+    scene: Scene, controller: Controller, phase: Sequence[float] | None = None
+) -> dict[str, float | None]:
     """Return RFD, losses and largest force of a session with a controller in place of the scene's.
 
     Parameters
     ----------
     scene : Scene
     controller : Controller
+    phase : sequence of float, optional
+        When the part starts and ends whose RFD is taken, over all its rows, s; by default rows in contact.
     """
     system = replace(assemble(scene), controller=controller)
     forces, losses = [], 0
@@ -86,5 +91,7 @@ def run_controller(scene: Scene, controller: Controller) -> dict[str, float | No
         losses = state.memory.losses
     total = np.array(forces)
     wanted = find_set_point(scene.set_point, total)
-    rfd = compute_rfd(np.arange(total.size) * system.period, total, wanted)
+    moments = np.arange(1, total.size + 1) * system.period
+    rows = None if phase is None else (moments >= phase[0]) & (moments <= phase[1])
+    rfd = compute_rfd(moments, total, wanted, rows)
     return {"rfd": rfd, "losses": float(losses), "max_total_force": float(total.max())}

@@ -132,3 +132,15 @@ def test_the_page_sets_method_three_beside_the_others(folder: Path, text: str) -
     assert shown == pytest.approx([known[method]["rfd"] for method in COMPARED], rel=5e-3)  # three digits
     # The goal of Method III on the session: at most half of Method I's.
     assert shown[2] < 0.5 * shown[0]
+
+
+def test_each_relief_of_the_surfaces_stands_over_the_map_of_its_own_method(folder: Path) -> None:
+    drawn = (folder / "fig10_surfaces.svg").read_text(encoding="utf-8")
+    bitmaps = re.findall(
+        r'<image xlink:href="[^"]*" id="\w+" transform="[^"]*" x="([\d.]+)" [^>]*? width="([\d.]+)"', drawn
+    )
+    boxes = [(float(x), float(x) + float(width)) for x, width in bitmaps]
+    # A relief, its map, and the scale of that, for each method.
+    assert len(boxes) == 3 * len(COMPARED)
+    for relief, plan in zip(boxes[::3], boxes[1::3], strict=True):
+        assert plan[0] < 0.5 * sum(relief) < plan[1]

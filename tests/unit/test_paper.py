@@ -19,7 +19,7 @@ from digiclay_paper.claim import Claim, verdict
 from digiclay_paper.claims import carried_out
 from digiclay_paper.claims_following import tracking
 from digiclay_paper.claims_force import onset, trade
-from digiclay_paper.figures_session import details, heights_and_force, surfaces
+from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page
 from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
 from digiclay_paper.simulations import sessions
@@ -237,11 +237,3 @@ def test_method_three_is_beside_the_methods_of_the_paper_in_figures_and_in_no_cl
     assert {method for method, _ in both.simple} == set(scenes.COMPARED)
     assert two.compared() is two
     assert "Method III" not in tracking(replace(two, third=three)).measured
-
-
-def test_each_relief_stands_over_the_map_of_its_own_method(lost: Results) -> None:
-    figure = surfaces(lost.session, "title")
-    panels = {axes.get_label(): axes.get_position() for axes in figure.axes}
-    for method in lost.session:
-        relief, plan = panels[f"{method} relief"], panels[f"{method} map"]
-        assert plan.x0 < 0.5 * (relief.x0 + relief.x1) < plan.x1

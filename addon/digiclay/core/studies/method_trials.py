@@ -25,7 +25,7 @@ from .speed_limits import Criterion, Drag, Follows, Lift, find_largest_speed, ju
 from .trial_paths import draw_drags, lift_off, list_paths, with_path
 
 __all__ = [
-    "GROUPS", "LIMITS", "LOW", "OUTCOMES", "QUICK", "RANDOM", "Trial", "find_free_speed",
+    "GROUPS", "LIMITS", "LOW", "OUTCOMES", "PHASES", "QUICK", "RANDOM", "Trial", "find_free_speed",
     "find_unintended_losses", "list_trials", "measure_trial", "place_trial", "read_groups",
 ]  # fmt: skip
 
