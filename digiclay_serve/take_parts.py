@@ -9,7 +9,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.failure = ""
+        self._made = False
         self._until_the_end = ExitStack()
         self._parts: queue.Queue[tuple[Path, Take] | None] = queue.Queue(WAITING)
         self._thread = threading.Thread(target=self._write_all, daemon=True)
@@ -49,6 +50,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     def __enter__(self) -> PartWriter:
         self._until_the_end.enter_context(claim_folder(self.folder, overwrite=False))
         try:
+            self._made = not self.folder.exists()
             self.folder.mkdir(exist_ok=True, parents=True)
         except OSError as error:
             self._until_the_end.close()
@@ -101,6 +103,9 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         if self._thread.is_alive():
             self._parts.put(None)
             self._thread.join()
+        if self._made:
+            with suppress(OSError):  # it holds a take
+                self.folder.rmdir()
         self._until_the_end.close()
 
     def _write_all(self) -> None:

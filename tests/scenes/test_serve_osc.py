@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import sys
 from collections.abc import Iterator
@@ -68,7 +69,7 @@ def door(server: Server) -> Iterator[socket.socket]:
     """A client's socket."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         client.connect(("127.0.0.1", server.osc_port))
-        client.settimeout(TIMEOUT)
+        client.settimeout(0.2)
         yield client
 
 
@@ -80,31 +81,54 @@ def message(address: str, *values: Any) -> bytes:
     return bytes(builder.build().dgram)
 
 
-def received(door: socket.socket, address: str) -> list[Any]:
-    """Return the values of the next message to an address."""
+def received(door: socket.socket, address: str, *requests: bytes) -> list[Any]:
+    """Return the values of the next message to an address; requests are sent until there is one."""
     while True:
-        got = OscMessage(door.recv(65536))
-        if got.address == address:
-            return list(got.params)
+        for request in requests:
+            door.send(request)
+        with suppress(TimeoutError):
+            while True:
+                got = OscMessage(door.recv(65536))
+                if got.address == address:
+                    return list(got.params)
 
 
 def state_after(door: socket.socket, number: int, part: str = "state") -> list[Any]:
     """Subscribe, and return the state that names a pose."""
-    door.send(message("/digiclay/subscribe", TOKEN, part, 200.0))
+    subscribe = message("/digiclay/subscribe", TOKEN, part, 200.0)
     while True:
-        state = received(door, "/digiclay/state")
+        state = received(door, "/digiclay/state", subscribe)
         if state[1] == number:
             return state
 
 
 def is_well(door: socket.socket, number: int) -> None:
     """Check that a client with good intentions is served as ever."""
-    door.send(message("/digiclay/subscribe", TOKEN, "state", 200.0))
+    subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
+    pose = message("/digiclay/pose", TOKEN, *PLACE, number)
     state: list[Any] = [0, 0]
     while state[1] != number:
-        door.send(message("/digiclay/pose", TOKEN, *PLACE, number))
-        state = received(door, "/digiclay/state")
+        state = received(door, "/digiclay/state", subscribe, pose)
     assert state[4:7] == pytest.approx(PLACE, abs=1e-8)  # python-osc sends 32 bits
+
+
+def test_the_examples_of_the_page_run(
+    server: Server, door: socket.socket, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "serve.md").read_text(encoding="utf-8")
+    by_websocket, by_osc, joining = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(server.report.parent)
+    monkeypatch.setenv("DIGICLAY_SERVE_TOKEN", TOKEN)
+    monkeypatch.setenv("DIGICLAY_SERVE", f"ws://127.0.0.1:{server.port}")
+    monkeypatch.setenv("DIGICLAY_SERVE_OSC", str(server.osc_port))
+    for example in (by_websocket, by_osc, joining):
+        exec(example, {})
+    said = capsys.readouterr().out
+    assert said.startswith("9 x 9 pins\ntotal force: ")
+    assert float(said.split()[-2]) > 0.0
+    subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
+    while received(door, "/digiclay/state", subscribe)[4:7] != pytest.approx(PLACE, abs=1e-8):
+        pass
 
 
 def test_a_pose_comes_back_as_a_state(door: socket.socket) -> None:
@@ -113,8 +137,8 @@ def test_a_pose_comes_back_as_a_state(door: socket.socket) -> None:
 
 
 def test_the_pins_come_as_blobs(door: socket.socket) -> None:
-    door.send(message("/digiclay/subscribe", TOKEN, "pins", 200.0))
-    heights = np.frombuffer(received(door, "/digiclay/heights")[1], ">f4")
+    subscribe = message("/digiclay/subscribe", TOKEN, "pins", 200.0)
+    heights = np.frombuffer(received(door, "/digiclay/heights", subscribe)[1], ">f4")
     assert heights.shape == (81,)
     assert ((heights > 0.0) & (heights < 0.1)).all()
 
@@ -137,12 +161,8 @@ def test_a_reset_has_its_message(door: socket.socket) -> None:
     ],
 )
 def test_a_wrong_message_is_answered_in_one_line(door: socket.socket, address: str, values: Any) -> None:
-    answer: list[Any] = []
-    door.settimeout(0.2)
-    while not answer:  # errors are sent ten times a second at most
-        door.send(message(address, TOKEN, *values))
-        with suppress(TimeoutError):
-            answer = received(door, "/digiclay/error")
+    # Errors are sent ten times a second at most.
+    answer = received(door, "/digiclay/error", message(address, TOKEN, *values))
     assert "must" in answer[0]
     assert "\n" not in answer[0]
 

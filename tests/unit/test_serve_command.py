@@ -1,0 +1,77 @@
+"""Errors of `digiclay serve` and `python -m benchmarks serve` are one line, and nothing is left behind."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+from digiclay.cli import main
+
+from benchmarks.serve_times import ENDS, sum_bins
+
+SMALL = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "control=absent"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--rate", "0"], "must be from 1 to 1000 Hz"),
+        (["--rate", "nan"], "must be from 1 to 1000 Hz"),
+        (["--rate", "1e9"], "must be from 1 to 1000 Hz"),
+        (["--port", "65536"], "must be a port from 0 to 65535"),
+        (["--port", "-1"], "must be a port from 0 to 65535"),
+        (["--osc-port", "x"], "must be a port from 0 to 65535"),
+        (["--token", "short"], "--token must have 8 to 128"),
+        (["--part", "0"], "must be from 0.1 to 600 s"),
+        (["--seconds", "inf"], "must be from 0 to 1e+09 s"),
+        (["--tokn", "x"], "Did you mean --token (not --tokn)?"),
+        (["--report", "missing/report.json", "--out", "."], "holds other things"),
+        (["missing.toml"], "missing.toml"),
+    ],
+)
+def test_a_wrong_option_is_refused_in_one_line(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "mine").write_text("", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert (
+        main(["serve", *options, "--seconds", "0"] if "--seconds" not in options else ["serve", *options])
+        == 2
+    )
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_port_in_use_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = str(other.getsockname()[1])
+        assert (
+            main(["serve", *SMALL, "--port", port, "--osc-port", "0", "--out", str(tmp_path / "take")]) == 2
+        )
+    said = capsys.readouterr().err
+    assert said.startswith(f"Port {port} of 127.0.0.1 cannot be opened: ")
+    assert said.count("\n") == 1
+    assert not (tmp_path / "take").exists()
+
+
+def test_a_display_that_is_no_serial_line_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    assert main(["serve", *SMALL, "--port", "0", "--osc-port", "0", "--display", str(tmp_path / "file")]) == 2
+    said = capsys.readouterr().err
+    assert "must be a serial line" in said
+    assert said.count("\n") == 1
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+
+
+def test_the_times_of_the_benchmark_are_summed_below_each_end() -> None:
+    bins = [(0.0, 1), (0.00024, 2), (0.00025, 4), (0.00099, 8), (0.001, 16), (0.2, 32)]
+    assert sum_bins(bins, ENDS) == [3, 4, 0, 8, 16, 0, 0, 0, 0, 32]
