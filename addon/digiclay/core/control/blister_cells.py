@@ -24,6 +24,10 @@ __all__ = ["BlisterCells", "BlisterRule"]
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+#: Share of the radius of the flat top within which no cell of a blister that sinks freezes.
+HELD = 0.4
+#: Such a frozen cell is freed when it lies less far behind than this share of the cosine from which cells freeze.
+FREED = 0.3
 CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
 
 
@@ -90,7 +94,7 @@ class BlisterRule:
         facing &= cells.ring
         return facing
 
-    def find_frozen(self, cells: BlisterCells, seen: Measurement) -> Flags:
+    def find_frozen(self, cells: BlisterCells, seen: Measurement, sinks: Any = False) -> Flags:
         """Return which cells are left behind, and which of those left before stay so: none that is pressed.
 
         Parameters
@@ -98,11 +102,19 @@ class BlisterRule:
         cells : BlisterCells
         seen : Measurement
             Gives the modes of the last period, and the forces.
+        sinks : bool or ndarray of bool (b,), optional
+            Whether the blister sinks into a ground of several heights: cells freeze nearer to the fingertip
+            then, and those that lie ahead of it again are freed.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
-        frozen: Flags = cells.ahead < behind * cells.distance
+        limit = behind * cells.distance
+        frozen: Flags = cells.ahead < limit
+        froze = seen.mode == CODES[seen.mode.shape][2]
+        if np.any(sinks):
+            flat_radius = np.where(sinks, HELD, 1.0) * flat_radius
+            froze &= (cells.ahead < FREED * limit) | ~np.asarray(sinks)
         frozen &= cells.distance > flat_radius
-        frozen |= seen.mode == CODES[seen.mode.shape][2]
+        frozen |= froze
         frozen &= cells.inside
         frozen &= seen.force < release
         return frozen

@@ -3,6 +3,12 @@
 The paper takes one height for all cells, the mean at the blister's edge. What is formed inside is then cut:
 a ridge across another one has a gap on either side. With a ground of its own a cell goes from the height that
 it was commanded to when the blister came over it, and one at the blister's rim stays where it is.
+
+A level blister on a slope moves every cell to one height: behind a finger that climbs, what it has pressed is
+raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the own
+ground of the cells under the finger, raises no cell, and lowers none farther than those. What the finger has
+left freezes sooner, and is freed when it lies ahead again: on a slope the finger is felt beside its lowest
+point.
 """
 
 from __future__ import annotations
@@ -15,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
+from .runs import sum_weighted
 
 __all__ = ["GROUNDS", "EdgeGround", "OwnGround"]
 
@@ -22,11 +29,26 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
+#: Least weight of a cell in the ground under the finger, N: a blister that nobody touches has a ground, too.
+UNTOUCHED = 1e-9
+#: How many standard deviations about its mean the ground under the finger reaches.
+SPREAD = 1.0
+
+
 @dataclass(frozen=True)
 class EdgeGround:
-    """One height for all cells, that of the edge (the paper's)."""
+    """One height for all cells, that of the edge (the paper's).
+
+    Attributes
+    ----------
+    rows : int
+        State rows a cell needs.
+    turning : float
+        Distance traveled back that reverses the direction, as a share of the radius of the flat top.
+    """
 
     rows = 0
+    turning = 0.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
         """Return the ground, m.
@@ -39,7 +61,18 @@ class EdgeGround:
         """
         return edge
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any) -> Flags:
+    def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
+        """Return the height of the flat top for each cell, m, and whether it sinks; see `OwnGround.find_tops`.
+
+        Parameters
+        ----------
+        ground, top : float or ndarray (b,)
+        inside : ndarray of bool (m,) or (m, b)
+        force : ndarray (m,) or (m, b)
+        """
+        return top, False
+
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any) -> Flags:
         """Tell which frozen cells keep their command: those farther off the ground than the profile.
 
         Parameters
@@ -50,6 +83,8 @@ class EdgeGround:
             See `find`, m.
         top : float or ndarray (b,)
             Height of the blister's top, m.
+        sinks : bool or ndarray of bool (b,)
+            See `find_tops`.
         """
         kept: Flags = target > profile
         kept ^= top < ground
@@ -58,9 +93,10 @@ class EdgeGround:
 
 @dataclass(frozen=True)
 class OwnGround:
-    """Height of each cell when the blister came over it, in a row of the controller's."""
+    """Height of each cell when the blister came over it, in a row of the controller's; see `EdgeGround`."""
 
     rows = 1
+    turning = 1.0
 
     def find(self, seen: Measurement, edge: Any) -> Any:
         """Return the ground of each cell, m; see `EdgeGround.find`.
@@ -75,7 +111,42 @@ class OwnGround:
         np.copyto(own, seen.target, where=seen.mode <= Mode.EDGE)
         return own
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any) -> Flags:
+    def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
+        """Return the height of the flat top for each cell, m, and whether it sinks.
+
+        Parameters
+        ----------
+        ground : ndarray (m,) or (m, b)
+            m.
+        top : float or ndarray (b,)
+            Height of the top, m.
+        inside : ndarray of bool (m,) or (m, b)
+            Cells of the blister.
+        force : ndarray (m,) or (m, b)
+            N: the ground under the finger is their mean and standard deviation, weighted with it.
+
+        Returns
+        -------
+        tops : ndarray (m,) or (m, b)
+            m.
+        sinks : bool or ndarray of bool (b,)
+        """
+        weight = np.maximum(force, UNTOUCHED)
+        weight *= inside
+        whole = np.maximum(weight.sum(axis=0), UNTOUCHED)
+        mean = sum_weighted(ground, weight) / whole
+        sinks = top < mean
+        if not np.any(sinks):
+            return top, sinks
+        off = ground - mean
+        off *= off
+        reach = SPREAD * np.sqrt(sum_weighted(off, weight) / whole)
+        change: Floats = top - ground
+        np.maximum(change, np.minimum(top - mean - reach, 0.0), out=change)
+        np.minimum(change, np.maximum(top - mean + reach, 0.0), out=change)
+        return np.where(sinks, ground + change, top), sinks
+
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
 
         Parameters
@@ -84,10 +155,12 @@ class OwnGround:
             m.
         top : float or ndarray (b,)
             m.
+        sinks : bool or ndarray of bool (b,)
         """
         kept: Flags = target > profile
-        # What is raised stays when the blister sinks below the ground beside it.
-        kept ^= (top < ground) & (target <= ground)
+        # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one that
+        # sinks is not raised where the ground falls below its top.
+        kept ^= (sinks | (top < ground)) & (target <= ground)
         return kept
 
 

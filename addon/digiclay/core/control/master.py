@@ -96,6 +96,11 @@ class MasterControl(BatchControl):
     model: MasterCell
     period: float
 
+    @property
+    def reversal(self) -> float:
+        """Distance traveled back that reverses the direction, m."""
+        return self.parameters.travel
+
     def follow(
         self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float
     ) -> Master:
@@ -121,7 +126,7 @@ class MasterControl(BatchControl):
         if master.phase is not Phase.IDLE:
             if near >= known.felt_force:
                 x, y = near_x / near, near_y / near
-                return master.move_to(x, y, update_heading(master.heading, x, y, known.travel))
+                return master.move_to(x, y, update_heading(master.heading, x, y, known.travel, self.reversal))
             # The finger has jumped out of reach: this is a new touch elsewhere.
             master = master._replace(losses=master.losses + 1)
         x, y = x / total, y / total

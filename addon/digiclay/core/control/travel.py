@@ -38,7 +38,7 @@ class Heading(NamedTuple):
     toward_y: float = 0.0
 
 
-def update_heading(heading: Heading, x: float, y: float, travel: float) -> Heading:
+def update_heading(heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0) -> Heading:
     """Return the heading of a finger; a new one once it has traveled far enough.
 
     Parameters
@@ -48,10 +48,15 @@ def update_heading(heading: Heading, x: float, y: float, travel: float) -> Headi
         Where the finger is now, m.
     travel : float
         Distance that settles the direction, m.
+    reversal : float, optional
+        Distance that settles one by more than a right angle off the last one, m, if longer: on a slope the
+        centroid of the forces moves about under a finger that goes one way.
     """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
-    return heading if way < travel else Heading(x, y, dx / way, dy / way)
+    if way < travel or (way < reversal and dx * heading.toward_x + dy * heading.toward_y < 0.0):
+        return heading
+    return Heading(x, y, dx / way, dy / way)
 
 
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:

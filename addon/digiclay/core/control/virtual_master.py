@@ -64,6 +64,11 @@ class VirtualMasterControl(MasterControl):
         """State rows a cell needs."""
         return self.ground.rows
 
+    @cached_property
+    def reversal(self) -> float:
+        """Distance traveled back that reverses the direction, m."""
+        return max(self.parameters.travel, self.ground.turning * self.blister.flat_radius)
+
     @property
     def batch_class(self) -> type[VirtualMasterControl]:
         """Class of the controller of a batch."""
@@ -131,11 +136,12 @@ class VirtualMasterControl(MasterControl):
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind, beyond = self.get_heights(memory)
         ground = self.ground.find(seen, edge)
-        profile = self.blister.interpolate(cells.distance, ground, top)
-        frozen = self._rule.find_frozen(cells, seen)
+        tops, sinks = self.ground.find_tops(ground, top, cells.inside, seen.force)
+        profile = self.blister.interpolate(cells.distance, ground, tops)
+        frozen = self._rule.find_frozen(cells, seen, sinks)
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
-            kept = self.ground.find_kept(seen.target, profile, ground, top)
+            kept = self.ground.find_kept(seen.target, profile, ground, top, sinks)
             kept |= beyond
             kept &= frozen
             np.putmask(profile, kept, seen.target)
