@@ -103,3 +103,51 @@ def test_a_scene_with_the_papers_ground_is_written_as_older_versions_read_it() -
 def test_a_scene_is_read_with_the_ground_it_was_written_with(ground: str) -> None:
     scene = resolve({"control": {"ground": ground}})
     assert resolve(tomllib.loads(format_scene(scene))) == scene
+
+
+#: A slope that rises to the east by 1 mm a millimeter, within the stroke.
+SLOPE = 40e-3 + BED.x
+
+
+def pressed(force_at: tuple[float, float], top: float, mode: Mode = Mode.BLISTER) -> Commands:
+    """Return the commands on the slope to a blister that the finger touches in one place, mm."""
+    measured = seen(SLOPE, mode, own=SLOPE)
+    measured.force[at(*force_at)] = 0.4
+    return command(master(*EAST, height=top), measured)
+
+
+def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far() -> None:
+    change = pressed((0.0, 0.0), 36e-3).target - SLOPE
+    assert change.max() <= 1e-12
+    # Below the finger by 4 mm; cells that it does not touch count with a nanonewton.
+    assert change.min() == pytest.approx(-4e-3, abs=1e-5)
+
+
+def test_a_blister_that_rises_on_a_slope_is_level() -> None:
+    target = pressed((0.0, 0.0), 44e-3).target
+    assert target[at(3, 0)] == pytest.approx(44e-3, abs=1e-9)
+    assert target[at(-3, 0)] == pytest.approx(44e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize(("top", "mode"), [(36e-3, Mode.FROZEN), (44e-3, Mode.BLISTER)])
+def test_what_the_finger_has_left_freezes_on_the_flat_top_when_the_blister_sinks(
+    top: float, mode: Mode
+) -> None:
+    assert pressed((3.0, 0.0), top).mode[at(-3, 0)] == mode
+
+
+@pytest.mark.parametrize(("top", "mode"), [(36e-3, Mode.BLISTER), (46e-3, Mode.FROZEN)])
+def test_a_frozen_cell_ahead_of_a_blister_that_sinks_is_freed(top: float, mode: Mode) -> None:
+    assert pressed((0.0, 0.0), top, Mode.FROZEN).mode[at(6, 0)] == mode
+
+
+def test_the_stacked_runs_of_a_batch_have_tops_of_their_own() -> None:
+    ground, force = np.stack([SLOPE, SLOPE], 1), np.zeros((BED.count, 2))
+    force[at(0.0, 0.0)] = 0.4
+    inside, tops = np.ones((BED.count, 2), np.bool_), np.array([36e-3, 44e-3])
+    own = GROUNDS["cell"]
+    found, sinks = own.find_tops(ground, tops, inside, force)
+    assert sinks.tolist() == [True, False]
+    for run in (0, 1):
+        alone, _ = own.find_tops(SLOPE, float(tops[run]), inside[:, run], force[:, run])
+        np.testing.assert_allclose(np.broadcast_to(alone, BED.count), found[:, run], rtol=0, atol=1e-15)

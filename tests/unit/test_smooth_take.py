@@ -91,7 +91,7 @@ def test_a_version_yet_to_come_is_refused() -> None:
 def test_a_take_with_smooth_strokes_is_no_scene_file() -> None:
     take = smooth_take()
     system = assemble(SCENE)
-    with pytest.raises(OutputError, match="has strokes of the brush Smooth"):
+    with pytest.raises(OutputError, match="has strokes that smooth pins"):
         to_scene(replace(take, start=snapshot.dump(system, begin(system))), "mine")
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from .tracking import Tracking
 
 __all__ = [
-    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "RISING", "SHALLOWEST", "SYMMETRIES",
-    "WAITING", "Brush", "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
+    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "RISING", "SETTLING", "SHALLOWEST",
+    "SYMMETRIES", "WAITING", "Brush", "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -20,8 +20,9 @@ Floats = NDArray[np.float64]
 Mirror = tuple[float, float]
 
 #: What the finger does: it waits for its turn, goes above the path's first place, presses there, rises with
-#: the blister (if its brush has one), goes along the path, leaves it; and the end.
-WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, DONE = range(7)
+#: the blister (if its brush has one), goes along the path, leaves it, waits above until what it has left has
+#: settled; and the end.
+WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, SETTLING, DONE = range(8)
 #: Paths of a stroke, by its symmetry. There is one finger: it goes along them one after the other.
 SYMMETRIES: dict[str, tuple[Mirror, ...]] = {
     "NONE": ((1.0, 1.0),),
@@ -124,7 +125,7 @@ class Stroke:
     climb : float
         How fast the finger rises with the blister, m/s.
     left : float
-        When a finger that smooths came to the end of the path, s of `clock`.
+        When a finger that smooths, or waits, came to the end of the path, s of `clock`.
     turn : ndarray (4,) or None
         Orientation of the finger when it began, which it has again when it is done; None before.
     """

@@ -27,7 +27,7 @@ from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
 from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, SPAN, Place, cross, drag, finish_image, run_clock
 from .tracking import Tracking
 
-__all__ = ["APPROACH", "SPEED", "follow"]
+__all__ = ["APPROACH", "SEARCH", "SPEED", "follow"]
 
 Floats = NDArray[np.float64]
 
@@ -128,16 +128,18 @@ def _step(
         z = min(safe, z + lift * period)
         return (finish_image(stroke) if z >= safe - NEAR else stroke), (x, y, z)
     move = _press if stroke.tracking is None or stroke.phase == PRESSING else _track
-    stroke, (x, y, z) = move(stroke, grid, radius, (x, y, z), period)
+    stroke, (x, y, z) = move(stroke, grid, finger, (x, y, z), period)
     over = not stroke.held and stroke.reached == len(stroke.samples) - 1
     if stroke.phase == DRAGGING and over and abs(z - _find_lowest(stroke, grid, x, y, radius)) < NEAR:
         stroke = replace(stroke, phase=LEAVING)
     return stroke, (x, y, z)
 
 
-def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: float) -> tuple[Stroke, Place]:
+def _press(
+    stroke: Stroke, grid: Grid, finger: Fingertip, place: Place, period: float
+) -> tuple[Stroke, Place]:
     """Press into the surface, or drag at a depth below it."""
-    height = stroke.height
+    height, radius = stroke.height, finger.width / 2
     assert height is not None
     x, y, z = place
     if stroke.phase == DRAGGING:
@@ -148,14 +150,17 @@ def _press(stroke: Stroke, grid: Grid, radius: float, place: Place, period: floa
         lowest, after = _find_lowest(stroke, grid, x, y, radius), DRAGGING
     else:
         lowest, after = max(0.0, surface - stroke.tracking.press), RISING
-    z = _sink(z, surface, lowest, period)
+    touch = max(surface, _find_touch(grid, height, finger, x, y)) if stroke.phase == PRESSING else surface
+    z = _sink(z, touch, lowest, period)
     pressed = stroke.phase == PRESSING and abs(z - lowest) < NEAR
     return (replace(stroke, phase=after) if pressed else stroke), (x, y, z)
 
 
-def _track(stroke: Stroke, grid: Grid, radius: float, place: Place, period: float) -> tuple[Stroke, Place]:
+def _track(
+    stroke: Stroke, grid: Grid, finger: Fingertip, place: Place, period: float
+) -> tuple[Stroke, Place]:
     """Take the blister up, or along; it goes along where the finger is at its height."""
-    tracking = stroke.tracking
+    tracking, radius = stroke.tracking, finger.width / 2
     assert tracking is not None
     x, y, z = place
     lowest = _find_lowest(stroke, grid, x, y, radius)
@@ -223,6 +228,26 @@ def _climb(z: float, climb: float, aim: float, fastest: float, period: float) ->
     if abs(far) <= max(abs(climb), gain * period) * period:
         return aim, 0.0
     return z + climb * period, climb
+
+
+def _find_touch(grid: Grid, height: Floats, finger: Fingertip, x: float, y: float) -> float:
+    """Return how high a finger is that comes down at a place and first touches a pin, m.
+
+    On a slope it touches the pins beside it first, several millimeters above the surface below it.
+
+    Parameters
+    ----------
+    grid : Grid
+    height : ndarray (n,)
+        m.
+    finger : Fingertip
+    x, y : float
+        m.
+    """
+    cells = grid.disc(x, y, finger.width)
+    square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2
+    gap = finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
+    return float((height[cells] - gap).max(initial=0.0))
 
 
 def _sink(z: float, surface: float, lowest: float, period: float) -> float:

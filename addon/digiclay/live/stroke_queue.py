@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..core.base.modes import Mode
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
-from .stroke import LEAVING, SYMMETRIES, Brush, Mirror, Stroke, start
+from .settling import begin_settling, settle
+from .stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
 from .sweep import find_radius, sweep
 from .tracking import find_tracking
@@ -123,10 +124,16 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     system, pose = running.system, running.pose
     finger, height = find_ellipsoid(running.scene), running.state.row(0)
     now, period = running.clock.seen or stroke.began, system.period
+    arrived = not bool((running.state.mode() == Mode.BLISTER).any())
+    if stroke.phase == SETTLING:
+        target, blister = running.state.row(system.rows.target), running.scene.blister
+        assert blister is not None  # a stroke that is tracked has one
+        return settle(stroke, system.grid, target, finger, blister, pose, count, period, arrived=arrived)
     if stroke.brush is Brush.SMOOTH:
         radius = find_radius(finger, system.grid.layout)
-        arrived = stroke.phase == LEAVING and not bool((running.state.mode() == Mode.BLISTER).any())
+        arrived = arrived and stroke.phase == LEAVING
         height = np.maximum(height, running.state.row(system.rows.target))
         return sweep(stroke, height, radius, pose, count, period, now, arrived=arrived)
     tracking = find_tracking(running.scene, system) if stroke.height is None else stroke.tracking
-    return *follow(stroke, system.grid, height, finger, pose, count, period, now, tracking), None
+    stroke, path = follow(stroke, system.grid, height, finger, pose, count, period, now, tracking)
+    return begin_settling(stroke) if stroke.done else stroke, path, None

@@ -17,7 +17,7 @@ from ..core.model.layout import Layout
 from .stroke import ABOVE, DRAGGING, LEAVING, Stroke
 from .stroke_travel import CLEARANCE, DRAG, LIFT, cross, drag, finish_image, run_clock
 
-__all__ = ["find_radius", "sweep"]
+__all__ = ["PATIENCE", "find_radius", "sweep"]
 
 Floats = NDArray[np.float64]
 

@@ -62,7 +62,7 @@ class EdgeGround:
         return edge
 
     def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
-        """Return the height of the flat top for each cell, m, and whether it sinks; see `OwnGround.find_tops`.
+        """Return the height of the flat top for each cell, m, and whether it sinks; see `OwnGround`.
 
         Parameters
         ----------
@@ -158,8 +158,8 @@ class OwnGround:
         sinks : bool or ndarray of bool (b,)
         """
         kept: Flags = target > profile
-        # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one that
-        # sinks is not raised where the ground falls below its top.
+        # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
+        # that sinks is not raised where the ground falls below its top.
         kept ^= (sinks | (top < ground)) & (target <= ground)
         return kept
 
