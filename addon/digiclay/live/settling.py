@@ -152,7 +152,8 @@ def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
             highest, lowest = np.fmax(highest, beside), np.fmin(lowest, beside)
     # A bed of a single pin has no neighbors: their highest and lowest are still infinite then.
     highest, lowest = np.where(np.isinf(highest), one, highest), np.where(np.isinf(lowest), one, lowest)
-    return (np.maximum(one - highest, 0.0) - np.maximum(lowest - one, 0.0)).ravel()
+    excess: Floats = np.maximum(one - highest, 0.0) - np.maximum(lowest - one, 0.0)
+    return excess.ravel()
 
 
 def _find_form(stroke: Stroke, grid: Grid, finger: Fingertip, blister: Blister) -> float:

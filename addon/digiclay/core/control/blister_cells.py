@@ -26,7 +26,7 @@ Flags = NDArray[np.bool_]
 
 #: Share of the radius of the flat top within which no cell of a blister that sinks freezes.
 HELD = 0.4
-#: Such a frozen cell is freed when it lies less far behind than this share of the cosine from which cells freeze.
+#: It is freed when it lies less far behind than this share of the cosine from which cells freeze.
 FREED = 0.3
 CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
 

@@ -72,7 +72,7 @@ class EdgeGround:
         """
         return top, False
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any) -> Flags:
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any = False) -> Flags:
         """Tell which frozen cells keep their command: those farther off the ground than the profile.
 
         Parameters
@@ -83,7 +83,7 @@ class EdgeGround:
             See `find`, m.
         top : float or ndarray (b,)
             Height of the blister's top, m.
-        sinks : bool or ndarray of bool (b,)
+        sinks : bool or ndarray of bool (b,), optional
             See `find_tops`.
         """
         kept: Flags = target > profile
@@ -146,7 +146,7 @@ class OwnGround:
         np.minimum(change, np.maximum(top - mean + reach, 0.0), out=change)
         return np.where(sinks, ground + change, top), sinks
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any) -> Flags:
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any = False) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
 
         Parameters
@@ -155,7 +155,7 @@ class OwnGround:
             m.
         top : float or ndarray (b,)
             m.
-        sinks : bool or ndarray of bool (b,)
+        sinks : bool or ndarray of bool (b,), optional
         """
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one

@@ -153,8 +153,8 @@ def to_scene(take: Take, name: str) -> Scene:
     """
     if take.smoothing is not None:
         raise OutputError(
-            f"The take {name!r} has strokes that smooth pins, of the brush Smooth or at a crossing, and a scene "
-            "file holds the fingertip's path alone: record a take without them for export."
+            f"The take {name!r} has strokes that smooth pins, of the brush Smooth or at a crossing, and a "
+            "scene file holds the fingertip's path alone: record a take without them for export."
         )
     system = assemble(take.scene)
     if not _is_at_rest(system, take.start):
