@@ -31,8 +31,6 @@ Floats = NDArray[np.float64]
 
 #: Trajectories, and the noise of the force sensors on them.
 TRIALS = (("session", "0"), ("session", "2 mN"), ("twisted", "0"), ("dead-stop", "0"), ("ridge-40", "0"))
-#: Share that is left of the weights of the relaxation.
-FAINT = 1e-6
 #: Those of --quick.
 FEW = (("ridge-40", "0"),)
 
@@ -87,9 +85,9 @@ def _like(kind: type[Any], part: Any, **changes: Any) -> Any:
 
 def _without_relaxation(known: HybridControl) -> HybridControl:
     touch = known.pulp.touch
-    # As many filters as before, with next to no weight: a controller's rows are the device's.
+    # As many filters as before, without weight: a controller's rows are the device's.
     assert isinstance(touch.pulp, Relaxation)
-    stiff = replace(touch.pulp, weights=tuple(FAINT * weight for weight in touch.pulp.weights))
+    stiff = replace(touch.pulp, weights=(1.0, *(0.0 for _ in touch.pulp.times)))
     return replace(known, pulp=replace(known.pulp, touch=replace(touch, pulp=stiff)))
 
 
