@@ -1,0 +1,128 @@
+"""Blister of Method III: about the predicted place of the fingertip, and led ahead of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import any_true, count_true
+from ..base.modes import Mode
+from ..model.control_interface import Measurement
+from ..model.layout import Disc, enclose_discs
+from .blister import Blister
+from .blister_cells import BlisterCells, BlisterRule
+from .ground import EdgeGround
+from .hybrid_memory import Follower
+from .lead_profile import LeadProfile
+from .master_memory import Phase
+
+__all__ = ["LedBlister", "Region"]
+
+Floats = NDArray[np.float64]
+
+#: Surface from which the blister rises.
+GROUND = EdgeGround()
+#: Plain number: numpy takes an enumeration's member ten times as long.
+FORCE_FOLLOW = int(Mode.FORCE_FOLLOW)
+#: How much farther than the place estimated and the reach of the period before pins may be led, m.
+MARGIN = 2e-3
+
+
+class Region(NamedTuple):
+    """Cells about the predicted place of the finger.
+
+    Attributes
+    ----------
+    aim : (float, float, float)
+        Lowest point of the finger then, m.
+    speed : float
+        Of the finger in the plane, m/s.
+    cells : BlisterCells
+        About the aim.
+    drop : ndarray (m,)
+        How far they may stand from the top; see `LeadProfile.find_drop`, m.
+    """
+
+    aim: tuple[float, float, float]
+    speed: float
+    cells: BlisterCells
+    drop: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class LedBlister:
+    """Blister that is led.
+
+    Attributes
+    ----------
+    blister : Blister
+    rule : BlisterRule
+    profile : LeadProfile
+    ahead : float
+        Time over which the fingertip is predicted, s.
+    """
+
+    blister: Blister
+    rule: BlisterRule
+    profile: LeadProfile
+    ahead: float
+
+    def find_disc(self, memory: Follower) -> Disc | None:
+        """Return the disc of the pins to command: those led now, and those led before."""
+        led = (memory.led_x, memory.led_y, memory.led_radius)
+        if memory.phase is Phase.IDLE:
+            return led if memory.led_radius else None
+        x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
+        reach = self.profile.find_reach(memory.top - memory.edge, math.hypot(vx, vy))
+        disc = (x, y, max(self.blister.edge_radius, reach) + MARGIN)
+        return enclose_discs(disc, led) if memory.led_radius else disc
+
+    def survey(self, memory: Follower, basis: Floats, left: Floats) -> tuple[float, Region]:
+        """Return the height of the surface ahead, m, and the cells about the predicted finger.
+
+        Parameters
+        ----------
+        memory : Follower
+        basis : ndarray (6, m)
+            Rows 1, x, y, x², x y, y² of the cells.
+        left : ndarray (m,)
+            Heights at which pins were left so far, m.
+        """
+        x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
+        time, speed = self.ahead, math.hypot(vx, vy)
+        aim = (x + vx * time, y + vy * time, z + vz * time)
+        cells = self.rule.divide((*aim[:2], *memory.heading[2:]), basis)
+        facing = self.rule.find_edge(cells)
+        count = count_true(facing)
+        edge = float(left.dot(facing)) / count if count else memory.edge
+        drop = self.profile.find_drop(cells.distance, cells.ahead, speed, raised=memory.top > edge)
+        return edge, Region(aim, speed, cells, drop)
+
+    def leave(
+        self, memory: Follower, seen: Measurement, left: Floats, cells: BlisterCells, mode: NDArray[np.int8]
+    ) -> Floats:
+        """Return the heights at which pins are left by the finger, m; modes are set in place.
+
+        Parameters
+        ----------
+        memory : Follower
+        seen : Measurement
+        left : ndarray (m,)
+            Those heights so far, m.
+        cells : BlisterCells
+        mode : ndarray of int8 (m,)
+        """
+        top, edge = memory.top, memory.edge
+        heights = self.blister.interpolate(cells.distance, edge, top)
+        frozen = self.rule.find_frozen(cells, seen)
+        if any_true(frozen):
+            # What is frozen is never called back; a blister that outgrows it takes it along.
+            kept = GROUND.find_kept(left, heights, edge, top)
+            kept &= frozen
+            np.putmask(heights, kept, left)
+        self.rule.set_modes(mode, cells, seen.force, FORCE_FOLLOW, frozen)
+        return np.where(cells.inside, heights, left)
