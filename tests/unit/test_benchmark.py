@@ -90,7 +90,7 @@ def test_a_period_of_method_i_makes_at_most_115_numpy_calls() -> None:
 def test_a_period_of_method_iii_makes_fewer_than_twice_the_numpy_calls_of_method_i() -> None:
     scene = sample("ridge_mound_valley", "control.method=hybrid")
     calls, _ = period_calls(assemble(scene), scene.trajectories(), 400)
-    # While the force is held a period makes 174 calls; with a fit of the fingertip, one in four, 262.
+    # While the force is held every second period makes 174 calls, the others 262.
     assert statistics.mean(calls[300:]) < 2 * 115
 
 

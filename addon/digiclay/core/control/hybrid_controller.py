@@ -33,9 +33,9 @@ Floats = NDArray[np.float64]
 
 #: Share of the set point within which the force counts as held: then the trim learns; it is at most as large.
 LEARNED = 0.5
-#: While the force is within this share of the set point, the finger is fitted in one of so many periods, and
-#: the top solved for; in the others it goes along with the finger.
-HELD, FIT_EVERY, SOLVE_EVERY = 0.1, 4, 2
+#: While the force is within this share of the set point, and the finger no faster than this, m/s, the finger
+#: is fitted and the top solved for in one of so many periods; in the others the top goes along with the finger.
+HELD, SLOW, EVERY = 0.02, 20e-3, 2
 #: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
 JUMP = 1.5
 
@@ -152,7 +152,7 @@ class HybridControl:
             own[at.residual] = 0.0
             waiting: Follower = self._loss.wait(memory)
             return waiting
-        if memory.period % FIT_EVERY and self._holds(float(np.add.reduce(force))):
+        if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
             return memory if not memory.alone else memory._replace(alone=0)
         own[at.residual] = 0.0
         basis = touched.quadratic_basis.take(here, 1)
@@ -160,9 +160,11 @@ class HybridControl:
             return self._find(memory._replace(losses=memory.losses + 1), touched, here)
         return self._fit(memory, touched, here, basis)
 
-    def _holds(self, force: float) -> bool:
-        """Tell whether a total force, N, is near enough to the set point to solve less often."""
-        return abs(force - self.parameters.force_setpoint) <= HELD * self.parameters.force_setpoint
+    def _holds(self, memory: Follower, force: float) -> bool:
+        """Tell whether a finger is slow, and a total force, N, near the set point: then less is solved."""
+        _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
+        error = abs(force - self.parameters.force_setpoint)
+        return error <= HELD * self.parameters.force_setpoint and math.hypot(vx, vy, vz) <= SLOW
 
     def _has_jumped(self, guess: Estimate, basis: Floats) -> bool:
         """Tell whether no touched cell is where the finger can be."""
@@ -238,7 +240,7 @@ class HybridControl:
         top, felt, trim = memory.felt, memory.felt, memory.trim
         if not memory.alone:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
-            top = self._set_top(memory, seen, region, moved, self._holds(force), raised=raised)
+            top = self._set_top(memory, seen, region, moved, self._holds(memory, force), raised=raised)
             if abs(asked - force) <= LEARNED * asked:
                 trim += (asked - force) * self.device.period / self.parameters.trim_time
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
@@ -251,7 +253,7 @@ class HybridControl:
     ) -> float:
         """Return the height of the top, m: solved for, or while the force is held along with the finger."""
         guess = memory.top + float(memory.estimate.mean[5]) * self.device.period
-        if held and memory.period % SOLVE_EVERY:
+        if held and memory.period % EVERY:
             seen.own[self._at.later] += guess - memory.top
             top = guess
         else:
