@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 #: Share of the set point within which the force counts as held: then the trim learns; it is at most as large.
 LEARNED = 0.5
 #: While the force is within this share of the set point, and the finger no faster than this, m/s, the finger
-#: is fitted and the top solved for in one of so many periods; in the others the top goes along with the finger.
+#: is fitted and the top solved for in one of so many periods; in the others the top goes along with it.
 HELD, SLOW, EVERY = 0.02, 20e-3, 2
 #: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
 JUMP = 1.5
