@@ -71,7 +71,7 @@ test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 guide-pictures: ## follow the first page of the guide in a window, and retake its pictures
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py
+	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py tests/window/test_press_tool.py
 	@.venv/bin/python tools/guide_pictures.py .reports/guide
 
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids

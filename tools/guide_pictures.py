@@ -1,4 +1,4 @@
-"""Pictures of the guide, from the screenshots of its first page's script: see make guide-pictures."""
+"""Pictures of the guide, from screenshots of window tests: see make guide-pictures."""
 
 from __future__ import annotations
 

@@ -73,21 +73,26 @@ def turned(blender: Any) -> Iterator[float | None]:
     start, end = ends(blender)
     before, distance = np.array(looking.view_rotation), looking.view_distance
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
-    process = hand(to(start), "mousedown 1", drag(start, middle, 3.0, 60))
+    # To and fro for as long as it takes to turn the view.
+    there, back = drag(start, middle, 1.0, 60), drag(middle, start, 1.0, 60)
+    process = hand(to(start), "mousedown 1", *[there, back] * 60)
     yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
-    drawing = process.poll() is None
-    while np.abs(np.array(looking.view_rotation) - before).max() < 0.03:
+
+    def is_turned() -> bool:
         space_mouse.push(TURN)
-        yield 0.05
+        return bool(np.abs(np.array(looking.view_rotation) - before).max() > 0.03)
+
+    yield from blender.until(is_turned)
     space_mouse.push((0,) * 6)
-    seen = {"drawing": drawing, "turned": np.abs(np.array(looking.view_rotation) - before).max().item()}
+    process.terminate()
     yield from done(blender, process)
+    seen = {"held": held_stroke(blender) is not None}
     # What a trackpad sends to Blender on X11: two fingers up, to the left and to the right are wheels.
     yield from done(blender, hand("click 4 sleep 0.1 click 6 sleep 0.1 click 7 sleep 0.1"))
     seen["nearer"] = distance / looking.view_distance
     yield from done(blender, hand(drag(middle, on_the_screen(blender, HALF, 0.0), 0.5, 60)))
     yield from let_go(blender, "turned")
-    blender.SEEN["turned"] |= seen
+    blender.SEEN["turned"] |= seen | {"turned": np.abs(np.array(looking.view_rotation) - before).max().item()}
     blender.shot("elsewhere_turned")
 
 

@@ -110,7 +110,7 @@ def focus_window() -> Iterator[float | None]:
     """Make Blender's window the active one: else a button is pressed where the pointer is by then."""
     # A slow server has the time it needs.
     hand("search --onlyvisible --class blender windowfocus --sync").wait(300)
-    yield 0.2
+    yield None
 
 
 def script(blender: Any) -> Iterator[float | None]:
@@ -178,8 +178,7 @@ def navigation(blender: Any) -> Iterator[float | None]:
         "mousedown 2 sleep 0.05", drag(middle, (middle[0] + 60, middle[1]), 0.3, 60), "mouseup 2 sleep 0.1",
         "click 4 sleep 0.2",
     )  # fmt: skip
-    yield from blender.until(lambda: process.poll() is not None)
-    yield 1.0
+    yield from done(blender, process)
     note(blender, "in mid-stroke")
     process = hand(drag(end, on_the_screen(blender, HALF, 0.0), 0.3, 60), "mouseup 1")
     yield from finish(blender, process)

@@ -130,9 +130,9 @@ def depths(blender: Any) -> Iterator[float | None]:
     note(blender, "after Ctrl")
     blender.event("LEFT_CTRL", "RELEASE", at)
     blender.key("ESC", at)
-    yield 1.0
+    yield from blender.settle()
     blender.event("LEFTMOUSE", "RELEASE", at)
-    yield 0.5
+    yield from blender.settle()
     note(blender, "taken back")
 
 
@@ -169,17 +169,20 @@ def shown(blender: Any) -> Iterator[float | None]:
     note(blender, "picked")
     yield from drag(blender, [(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
     display = blender.beds()[0].digiclay_display
-    display.color, display.arrows = "force", True
-    yield 1.0
+    display.color, display.arrows, display.overlay_full = "force", True, True
+    chosen = bpy.context.preferences.addons[blender.EXTENSION].preferences
+    chosen.overlay_corner = "bottom_right"  # the finger is on the left
+    yield from blender.settle()
     note(blender, "forces shown")
-    blender.shot("press_forces")
+    blender.shot("guide_forces")
     yield from let_go(blender, 4.0, -24.0)
     preferences = bpy.context.preferences
     theme = bpy.utils.preset_paths("interface_theme")[0]
     bpy.ops.script.execute_preset(
         filepath=f"{theme}/Blender_Light.xml", menu_idname="USERPREF_MT_interface_theme_presets"
     )
-    display.color, display.arrows = "mode", False
+    display.color, display.arrows, display.overlay_full = "mode", False, False
+    chosen.overlay_corner = "top_left"
     yield 1.5
     blender.shot("press_light")
     preferences.view.ui_scale = 1.5
@@ -187,22 +190,22 @@ def shown(blender: Any) -> Iterator[float | None]:
     blender.shot("press_scaled")
     preferences.view.ui_scale = 1.0
     display.overlay = False
-    yield 1.0
+    yield from blender.settle()
     note(blender, "overlay off")
     display.overlay = True
-    yield 0.5
+    yield from blender.settle()
     note(blender, "overlay on")
 
 
 def ended(blender: Any) -> Iterator[float | None]:
     """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
     blender.key("ESC", blender.middle())
-    yield 1.0
+    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
     note(blender, "ended")
     yield from drag(blender, [(20.0, 20.0)])
     note(blender, "started anew")
     bpy.data.objects.remove(blender.beds()[0])
-    yield 1.0
+    yield from blender.until(lambda: not blender.part("live.running").list_sessions())
     blender.look("bed deleted")
     blender.event("LEFTMOUSE", "RELEASE", blender.middle())
     yield 0.5

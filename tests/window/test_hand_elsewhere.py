@@ -38,7 +38,7 @@ def test_a_stroke_is_formed_wherever_the_hand_has_drawn(seen: dict[str, Any], na
 
 
 def test_a_3d_mouse_turns_the_view_while_the_hand_draws(seen: dict[str, Any]) -> None:
-    assert seen["turned"]["drawing"]
+    assert seen["turned"]["held"]
     assert seen["turned"]["turned"] > 0.03
 
 
