@@ -9,6 +9,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.ground import GROUNDS
+from digiclay.core.control.travel import Heading, update_heading
 from digiclay.core.control.virtual_master import Master, VirtualMaster
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
@@ -117,9 +118,12 @@ def pressed(force_at: tuple[float, float], top: float, mode: Mode = Mode.BLISTER
 
 
 def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far() -> None:
-    change = pressed((0.0, 0.0), 36e-3).target - SLOPE
-    assert change.max() <= 1e-12
-    # Below the finger by 4 mm; cells that it does not touch count with a nanonewton.
+    measured = seen(SLOPE, Mode.BLISTER, own=SLOPE)
+    measured.force[at(0.0, 0.0)] = 0.4
+    change = command(master(height=36e-3), measured).target - SLOPE
+    # Cells that it does not touch count with a nanonewton: a hundredth of a millimeter.
+    assert change.max() <= 1e-5
+    # Below the finger by 4 mm.
     assert change.min() == pytest.approx(-4e-3, abs=1e-5)
 
 
@@ -141,6 +145,16 @@ def test_a_frozen_cell_ahead_of_a_blister_that_sinks_is_freed(top: float, mode: 
     assert pressed((0.0, 0.0), top, Mode.FROZEN).mode[at(6, 0)] == mode
 
 
+def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> None:
+    measured = seen(SLOPE - 3e-3, Mode.FROZEN, own=SLOPE)
+    measured.force[at(3.0, 0.0)] = 0.4
+    found = command(master(*EAST, x=1e-3, height=38e-3), measured)
+    # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
+    for x in (-9.0, -6.0, 0.0):
+        assert found.mode[at(x, 0)] == Mode.FROZEN
+        assert found.target[at(x, 0)] == SLOPE[at(x, 0)] - 3e-3
+
+
 def test_the_stacked_runs_of_a_batch_have_tops_of_their_own() -> None:
     ground, force = np.stack([SLOPE, SLOPE], 1), np.zeros((BED.count, 2))
     force[at(0.0, 0.0)] = 0.4
@@ -151,3 +165,12 @@ def test_the_stacked_runs_of_a_batch_have_tops_of_their_own() -> None:
     for run in (0, 1):
         alone, _ = own.find_tops(SLOPE, float(tops[run]), inside[:, run], force[:, run])
         np.testing.assert_allclose(np.broadcast_to(alone, BED.count), found[:, run], rtol=0, atol=1e-15)
+
+
+def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction() -> None:
+    east = Heading(0.0, 0.0, 1.0, 0.0)
+    back = [update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)]
+    assert back == [1.0, 1.0, -1.0]
+    assert update_heading(east, 0.0, 2e-3, 1.5e-3, 6e-3).toward_y == 1.0
+    for ground, reversal in (("cell", 6e-3), ("edge", 1.5e-3)):
+        assert make_system(control=VirtualMaster(ground=ground)).controller.reversal == reversal

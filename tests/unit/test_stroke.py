@@ -177,3 +177,16 @@ def test_a_mirror_image_waits_until_the_hand_has_let_go() -> None:
     held = replace(line(0.2, held=True), mirrors=SYMMETRIES["X"])
     stroke, _ = follow(held, CELLS, HEIGHT, Fingertip(), AT, 1000, PERIOD, 0.0)
     assert (stroke.image, stroke.done) == (0, False)
+
+
+def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
+    beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)  # 1 mm beyond where the surface below the finger counts
+    click = replace(start(1, 0.0, 0.0, 4e-3), held=False)
+    _, poses = follow(click, CELLS, beside, Fingertip(), AT, 400, PERIOD, 0.0)
+    z = np.array(poses)[:, 2]
+    cells = np.hypot(CELLS.x, CELLS.y) < 8e-3
+    gap = 8e-3 - np.sqrt(64e-6 - (CELLS.x**2 + CELLS.y**2)[cells])
+    touch = float((beside[cells] - gap).max())
+    down = -np.diff(z) / PERIOD
+    assert down.max() == pytest.approx(APPROACH, rel=1e-6)
+    assert down[z[:-1] <= touch + 1e-9].max() <= SPEED + 1e-9
