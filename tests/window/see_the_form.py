@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hand_strokes import add_bed, drag, finish, focus_window, hand, on_the_screen, to
+from hand_strokes import add_bed, done, drag, finish, focus_window, hand, on_the_screen, to
 
 
 def count_orange(name: str, blender: Any) -> int:
@@ -75,8 +75,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from levels_of_detail(blender)
     for name in ("alt s", "alt s again", "alt s once more"):
         process = hand(to(middle), "key alt+s")
-        yield from blender.until(lambda process=process: process.poll() is not None)
-        yield 0.5
+        yield from done(blender, process)
         note(blender, name)
     blender.call(bpy.ops.digiclay.session)
     yield from blender.settle(5)
@@ -112,8 +111,7 @@ def levels_of_detail(blender: Any) -> Iterator[float | None]:
         # Between the limits: 3.5 pixels a pitch.
         looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 3.5)
         area.tag_redraw()
-        yield None
-        yield 1.0
+        yield from blender.rounds(20)  # the pitch is measured in a drawing, and acted upon by a timer
         note(blender, name)
     looking.view_distance = distance
 
