@@ -1,0 +1,122 @@
+"""Commands of all pages: executed in the order of their page, or listed with what shows them instead."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.site.page_commands import Command, find_commands, find_files
+from tests.unit.test_docs import PAGES
+
+ROOT = Path(__file__).parents[2]
+LIST = Path(__file__).with_name("not_executed.toml")
+#: Beyond this a command hangs, s.
+LONGEST = 1200.0
+
+
+@functools.cache
+def _listed() -> dict[str, Any]:
+    """Return the list of commands that are not executed."""
+    return tomllib.loads(LIST.read_text(encoding="utf-8"))
+
+
+def _excused() -> set[str]:
+    return {command for group in _listed()["group"] for command in group["commands"]}
+
+
+@functools.cache
+def execute(command: str, folder: Path) -> str:
+    """Carry out a command in a folder; return why it failed, or "".
+
+    Parameters
+    ----------
+    command : str
+    folder : Path
+    """
+    program, *words = shlex.split(command)
+    beside = Path(sys.executable).parent / Path(program).name
+    found = str(beside) if beside.exists() else shutil.which(program)
+    paths = os.pathsep.join((str(ROOT), str(ROOT / "addon")))
+    environment = {**os.environ, "PYTHONPATH": paths, "MPLBACKEND": "agg", "COLUMNS": "80"}
+    done = subprocess.run(
+        [found or program, *words], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, errors="replace", timeout=LONGEST, check=False,
+    )  # fmt: skip
+    return f"{command}: status {done.returncode}: {done.stderr[-400:]}" if done.returncode else ""
+
+
+def play(text: str, folder: Path, excused: set[str]) -> list[str]:
+    """Carry out the commands of a page in a folder that has its files; return the failures.
+
+    `make` runs in the checkout, where it belongs, and once for all pages.
+
+    Parameters
+    ----------
+    text : str
+        The page.
+    folder : Path
+    excused : set of str
+        Commands that are not executed.
+    """
+    for name, source in _listed()["own"].items():
+        shutil.copyfile(ROOT / source, folder / name)
+    for file in find_files(text):
+        (folder / file.name).write_text(file.content, encoding="utf-8")
+    once = dict.fromkeys(command.text for command in find_commands(text) if command.text not in excused)
+    return list(filter(None, (execute(one, ROOT if one.startswith("make ") else folder) for one in once)))
+
+
+def _commands() -> list[Command]:
+    return [command for page in PAGES for command in find_commands(page.read_text(encoding="utf-8"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_command_of_the_page_is_carried_out(page: Path, tmp_path: Path) -> None:
+    assert play(page.read_text(encoding="utf-8"), tmp_path, _excused()) == []
+
+
+def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
+    text = "    digiclay run absent_scene\n    digiclay --version\n"
+    (failure,) = play(text, tmp_path, set())
+    assert "digiclay run absent_scene: status 2" in failure
+    assert play(text, tmp_path, {"digiclay run absent_scene"}) == []
+
+
+def test_a_file_of_a_page_is_there_for_its_commands(tmp_path: Path) -> None:
+    text = '```python title="a.py"\nopen("made", "w").close()\n```\n\n    .venv/bin/python a.py\n'
+    assert play(text, tmp_path, set()) == []
+    assert (tmp_path / "made").exists()
+
+
+def test_every_listed_command_is_on_a_page_and_has_a_reason_and_something_that_shows_it() -> None:
+    groups = _listed()["group"]
+    listed = [command for group in groups for command in group["commands"]]
+    assert sorted(set(listed) - {command.text for command in _commands()}) == []
+    assert len(listed) == len(set(listed))
+    assert [group for group in groups if not group["reason"] or not (ROOT / group["shown"]).is_file()] == []
+
+
+def test_a_command_shown_by_the_whole_check_is_one_of_its_parts() -> None:
+    parts = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    (shown,) = [group["commands"] for group in _listed()["group"] if group["shown"] == ".ci/run"]
+    assert [command for command in shown if not re.search(rf" {command}( WHOLE=1)?\n", parts)] == []
+
+
+def test_most_commands_of_blocks_are_carried_out() -> None:
+    blocks = {command.text for command in _commands() if command.block}
+    assert len(blocks - _excused()) > 40
+
+
+def test_names_and_forms_within_sentences_are_no_commands() -> None:
+    text = "`digiclay run` is `digiclay run SCENE --out DIR`; `digiclay run tap`.\n\n    make demo  # x\n"
+    assert [command.text for command in find_commands(text)] == ["digiclay run tap", "make demo"]
