@@ -14,7 +14,7 @@ PROGRAM = re.compile(
 #: Word in place of which a reader writes something: DIR, RUN, SCENE.
 PLACEHOLDER = re.compile(r"(?<![\w./-])[A-Z]{3,}[0-9]?(?![\w./])(?!=)|\.\.\.|…|/path/to")
 #: Command without arguments: within a sentence it is the name of the command.
-NAME = re.compile(r"digiclay [\w-]+")
+NAME = re.compile(r"(?:blender --command digiclay|digiclay [\w-]+)")
 #: First line of a block that is a file, with the name of the file.
 TITLE = re.compile(r'```\w+ title="([^"]+)"')
 

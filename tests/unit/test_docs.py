@@ -87,7 +87,7 @@ def _commands(page: Path) -> list[tuple[str, str]]:
     return [(match[1], re.split(r"\s{2,}|\s#", match[2])[0]) for match in found if match]
 
 
-def _refused(program: str, arguments: str) -> bool:
+def is_refused(program: str, arguments: str) -> bool:
     words = shlex.split(arguments)
     try:
         PARSERS[program]().parse_args(words if len(words) > 1 else [*words, "--help"])
@@ -184,7 +184,7 @@ def test_every_name_of_a_module_that_a_page_gives_exists(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_is_one_that_its_program_takes(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert [command for command in _commands(page) if _refused(*command)] == [], capsys.readouterr().err
+    assert [command for command in _commands(page) if is_refused(*command)] == [], capsys.readouterr().err
 
 
 def test_the_pages_have_commands_to_check() -> None:

@@ -1,0 +1,65 @@
+"""Pictures of the docs: each has the command that makes it (docs/pictures.md), and is shown."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.unit.test_docs import PAGES
+
+ROOT = Path(__file__).parents[2]
+TABLE = ROOT / "docs" / "pictures.md"
+ROW = re.compile(r"^\| (`.*?) \| (.*) \|$", re.MULTILINE)
+SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def rows(text: str) -> dict[str, str]:
+    """Return the command of each picture of the table."""
+    return {name: made for names, made in ROW.findall(text) for name in re.findall(r"`([^`]+)`", names)}
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[str, str]:
+    """The table of the page."""
+    return rows(TABLE.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def shown() -> set[Path]:
+    """The pictures that the pages show."""
+    targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
+    return {(page.parent / target).resolve() for page, target in targets}
+
+
+def test_the_table_has_every_picture_that_a_page_shows_and_no_other(
+    made: dict[str, str], shown: set[Path]
+) -> None:
+    assert sorted(made) == sorted(path.name for path in shown)
+
+
+def test_no_picture_of_the_docs_is_unused(shown: set[Path]) -> None:
+    assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []
+
+
+def test_what_makes_a_picture_exists(made: dict[str, str]) -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for name, cell in made.items():
+        command = next(iter(re.findall(r"`([^`]+)`", cell)), "")
+        if command.startswith("python tools/"):
+            source = (ROOT / command.split()[1]).read_text(encoding="utf-8")
+            assert f'"{name}"' in source, command
+        elif command.startswith("make "):
+            assert f"\n{command.removeprefix('make ')}:" in makefile
+        elif not command:  # a page has the command
+            assert re.search(r"\]\(\w+\.md#|same section", cell), name
+        else:  # tests/unit/test_docs.py checks commands of the benchmarks
+            assert command.startswith("python -m benchmarks ")
+
+
+def test_the_table_is_read_as_it_stands() -> None:
+    assert rows("| `a.jpg`, `b.jpg` | `make x` (slow) |\n") == {
+        "a.jpg": "`make x` (slow)",
+        "b.jpg": "`make x` (slow)",
+    }
