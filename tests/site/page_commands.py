@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 #: Programs whose lines are commands; a number behind a name is a version.
 PROGRAM = re.compile(
-    r"(?:\$ )?((?:digiclay|python -m (?:benchmarks|digiclay)|python tools/\w+\.py|make|pip install"
+    r"(?:\$ )?(python tools/\w+\.py(?: .*)?|(?:digiclay|python -m (?:benchmarks|digiclay)|make|pip install"
     r"|blender (?:--command|--background|-b)|dask|\.venv/bin/\w+) (?!\d).*)"
 )
 #: Word in place of which a reader writes something: DIR, RUN, SCENE.
