@@ -52,9 +52,10 @@ def test_every_option_of_every_command_is_on_the_page_of_the_command_line(site: 
 
 def test_every_example_of_the_command_line_is_one_that_its_program_takes() -> None:
     epilogs = [*(command.epilog or "" for command in commands()), parser().epilog, benchmarks_parser().epilog]
-    joined = [re.sub(r"\\\n\s*", "", epilog or "") for epilog in epilogs]
+    joined = [" ".join((epilog or "").split("\\\n")) for epilog in epilogs]
     found = [COMMAND.match(line.strip()) for epilog in joined for line in epilog.splitlines()]
-    examples = [(match[1], re.split(r"\s{2,}| > ", match[2])[0]) for match in found if match]
+    # Two blanks begin the remark beside a command.
+    examples = [(match[1], re.split(r"(?<! )\s{2,}(?=[^-\s])| > ", match[2])[0]) for match in found if match]
     assert len(examples) > 40
     assert [example for example in examples if is_refused(*example)] == []
 
