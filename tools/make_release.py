@@ -16,12 +16,17 @@ import sys
 import tempfile
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tools")]
 
-from release_build import ReleaseError, build_twice, check_files  # noqa: E402
+from release_build import (  # noqa: E402
+    SIGNALED,
+    ReleaseError,
+    build_twice,
+    check_files,
+    refuse_stopped,
+)
 from release_rules import find_obstacles, git, read_notes, tag_of  # noqa: E402
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -54,12 +59,13 @@ def publish(made: Path, folder: Path, version: str, commit: str) -> None:
     Raises
     ------
     ReleaseError
-        When the tag cannot be made.
+        When the tag cannot be made, or a signal has come before.
     OSError
         When the folder cannot be moved.
     """
     for number in SIGNALS:  # it takes an instant, and is not to be stopped between the two
         signal.signal(number, signal.SIG_IGN)
+    refuse_stopped()
     folder.parent.mkdir(exist_ok=True)
     made.rename(folder)
     notes = str(folder / "release-notes.md")
@@ -100,9 +106,8 @@ def release(version: str) -> Path:
     return folder
 
 
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    signal.signal(number, signal.SIG_IGN)  # what is being taken back is taken back to its end
-    raise ReleaseError(f"stopped by {signal.Signals(number).name}.")
+def _note(number: int, frame: FrameType | None) -> None:
+    SIGNALED.append(number)
 
 
 def main() -> None:
@@ -111,7 +116,7 @@ def main() -> None:
     parser.add_argument("version", help="such as 0.1.0")
     version = parser.parse_args().version
     for number in SIGNALS:
-        signal.signal(number, _stop)
+        signal.signal(number, _note)
     try:
         folder = release(version)
     except (ReleaseError, OSError) as error:

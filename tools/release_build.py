@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import time
 import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -20,9 +21,11 @@ sys.path[:0] = [str(ROOT / "tools")]
 import extension  # noqa: E402
 from repacking import repack_tar, repack_zip  # noqa: E402
 
-__all__ = ["ReleaseError", "build_twice", "check_files"]
+__all__ = ["SIGNALED", "ReleaseError", "build_twice", "check_files", "refuse_stopped"]
 
 LIMIT = 300
+#: Time between two looks whether a signal has come, s.
+LOOK = 0.05
 #: Largest zip, bytes.
 LARGEST = 2_000_000
 #: Differences between the two builds: time and mode of the sources, language, time zone, order of sets.
@@ -32,8 +35,18 @@ BUILDS = (
 )
 
 
+#: Signals that have come. A handler that raised would be lost where Python ignores errors, as in `__del__`.
+SIGNALED: list[int] = []
+
+
 class ReleaseError(Exception):
     """Reason, in one line, why there is no release."""
+
+
+def refuse_stopped() -> None:
+    """Raise ReleaseError when a signal has come."""
+    if SIGNALED:
+        raise ReleaseError(f"stopped by {signal.Signals(SIGNALED[0]).name}.")
 
 
 def carry_out(command: Sequence[str | Path], folder: Path, added: dict[str, str], umask: int) -> None:
@@ -52,21 +65,30 @@ def carry_out(command: Sequence[str | Path], folder: Path, added: dict[str, str]
     Raises
     ------
     ReleaseError
-        When it fails; what it printed goes to standard error.
+        When it fails; what it printed goes to standard error. When a signal comes.
     """
+    refuse_stopped()
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
             command, cwd=folder, env=os.environ | added, umask=umask, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
         )  # fmt: skip
         try:
-            status = process.wait(LIMIT)
-        except subprocess.TimeoutExpired:
-            raise ReleaseError(f"'{' '.join(map(str, command[1:4]))}' takes more than {LIMIT} s.") from None
+            status, started = None, time.monotonic()
+            while status is None:
+                with suppress(subprocess.TimeoutExpired):
+                    status = process.wait(LOOK)
+                refuse_stopped()
+                if status is None and time.monotonic() - started > LIMIT:
+                    raise ReleaseError(f"'{' '.join(map(str, command[1:4]))}' takes more than {LIMIT} s.")
         finally:
             # Also when the release is stopped: nothing goes on writing into a folder that is being removed.
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+                for _ in range(200):  # its own children end an instant later
+                    os.killpg(process.pid, 0)
+                    time.sleep(LOOK)
             process.wait()
         if status:
             output.seek(0)

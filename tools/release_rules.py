@@ -27,7 +27,10 @@ LIMIT = 60
 def git(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Run git in a checkout, also in that of another user; the caller reads the status."""
     command = ["git", "-c", "safe.directory=*", *words]
-    return subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=LIMIT)
+    # In a session of its own: Ctrl-C is for the release, which ends in order.
+    return subprocess.run(
+        command, cwd=root, capture_output=True, text=True, timeout=LIMIT, start_new_session=True
+    )
 
 
 def tag_of(version: str) -> str:
