@@ -24,7 +24,7 @@ __all__ = ["BlisterCells", "BlisterRule"]
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: Share of the radius of the flat top within which no cell of a blister that sinks freezes.
+#: Share of the radius of the flat top within which no cell freezes when the blister sinks into uneven ground.
 HELD = 0.4
 #: It is freed when it lies less far behind than this share of the cosine from which cells freeze.
 FREED = 0.3
@@ -94,7 +94,7 @@ class BlisterRule:
         facing &= cells.ring
         return facing
 
-    def find_frozen(self, cells: BlisterCells, seen: Measurement, sinks: Any = False) -> Flags:
+    def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
         """Return which cells are left behind, and which of those left before stay so: none that is pressed.
 
         Parameters
@@ -102,17 +102,17 @@ class BlisterRule:
         cells : BlisterCells
         seen : Measurement
             Gives the modes of the last period, and the forces.
-        sinks : bool or ndarray of bool (b,), optional
-            Whether the blister sinks into a ground of several heights: cells freeze nearer to the fingertip
-            then, and those that lie ahead of it again are freed.
+        uneven : bool or ndarray of bool (b,), optional
+            Whether the blister sinks into uneven ground: cells freeze nearer to the fingertip then, and those
+            that lie ahead of it again are freed.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance
         frozen: Flags = cells.ahead < limit
         froze = seen.mode == CODES[seen.mode.shape][2]
-        if np.any(sinks):
-            flat_radius = np.where(sinks, HELD, 1.0) * flat_radius
-            froze &= (cells.ahead < FREED * limit) | ~np.asarray(sinks)
+        if np.any(uneven):
+            flat_radius = np.where(uneven, HELD, 1.0) * flat_radius
+            froze &= (cells.ahead < FREED * limit) | ~np.asarray(uneven)
         frozen &= cells.distance > flat_radius
         frozen |= froze
         frozen &= cells.inside

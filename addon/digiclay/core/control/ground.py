@@ -6,9 +6,9 @@ it was commanded to when the blister came over it, and one at the blister's rim 
 
 A level blister on a slope moves every cell to one height: behind a finger that climbs, what it has pressed is
 raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the own
-ground of the cells under the finger, raises no cell, and lowers none farther than those. What the finger has
-left freezes sooner, and is freed when it lies ahead again: on a slope the finger is felt beside its lowest
-point.
+ground of the cells under the finger, raises no cell, and lowers none farther than those. Where that ground is
+uneven, what the finger has left freezes sooner, and is freed when it lies ahead again: on a slope the finger
+is felt beside its lowest point. On even ground that would leave a groove with ragged flanks.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ Flags = NDArray[np.bool_]
 UNTOUCHED = 1e-9
 #: How many standard deviations about its mean the ground under the finger reaches.
 SPREAD = 1.0
+#: The ground under the finger is uneven when it reaches that far about its mean, as a share of the depth.
+UNEVEN = 0.1
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,9 @@ class EdgeGround:
         return edge
 
     def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
-        """Return the height of the flat top for each cell, m, and whether it sinks; see `OwnGround`.
+        """Return the height of the flat top for each cell, m, and whether it sinks into uneven ground.
+
+        See `OwnGround`.
 
         Parameters
         ----------
@@ -72,7 +76,7 @@ class EdgeGround:
         """
         return top, False
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any = False) -> Flags:
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command: those farther off the ground than the profile.
 
         Parameters
@@ -83,7 +87,7 @@ class EdgeGround:
             See `find`, m.
         top : float or ndarray (b,)
             Height of the blister's top, m.
-        sinks : bool or ndarray of bool (b,), optional
+        uneven : bool or ndarray of bool (b,), optional
             See `find_tops`.
         """
         kept: Flags = target > profile
@@ -112,7 +116,7 @@ class OwnGround:
         return own
 
     def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
-        """Return the height of the flat top for each cell, m, and whether it sinks.
+        """Return the height of the flat top for each cell, m, and whether it sinks into uneven ground.
 
         Parameters
         ----------
@@ -129,7 +133,7 @@ class OwnGround:
         -------
         tops : ndarray (m,) or (m, b)
             m.
-        sinks : bool or ndarray of bool (b,)
+        uneven : bool or ndarray of bool (b,)
         """
         weight = np.maximum(force, UNTOUCHED)
         weight *= inside
@@ -144,9 +148,9 @@ class OwnGround:
         change: Floats = top - ground
         np.maximum(change, np.minimum(top - mean - reach, 0.0), out=change)
         np.minimum(change, np.maximum(top - mean + reach, 0.0), out=change)
-        return np.where(sinks, ground + change, top), sinks
+        return np.where(sinks, ground + change, top), sinks & (reach > UNEVEN * (mean - top))
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, sinks: Any = False) -> Flags:
+    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
 
         Parameters
@@ -155,12 +159,12 @@ class OwnGround:
             m.
         top : float or ndarray (b,)
             m.
-        sinks : bool or ndarray of bool (b,), optional
+        uneven : bool or ndarray of bool (b,), optional
         """
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
-        # that sinks is not raised where the ground falls below its top.
-        kept ^= (sinks | (top < ground)) & (target <= ground)
+        # that sinks into uneven ground is not raised where the ground falls below its top.
+        kept ^= (uneven | (top < ground)) & (target <= ground)
         return kept
 
 

@@ -59,7 +59,7 @@ class Hybrid(ControlParameters):
         1.5e-3, "distance traveled that determines the direction", unit="m", symbol="d_t", above=0.0
     )
     behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
+        -0.05, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
     )
     release_force: float = quantity(
         0.02, "force that releases a frozen cell", unit="N", symbol="F_free", above=0.0

@@ -136,12 +136,12 @@ class VirtualMasterControl(MasterControl):
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind, beyond = self.get_heights(memory)
         ground = self.ground.find(seen, edge)
-        tops, sinks = self.ground.find_tops(ground, top, cells.inside, seen.force)
+        tops, uneven = self.ground.find_tops(ground, top, cells.inside, seen.force)
         profile = self.blister.interpolate(cells.distance, ground, tops)
-        frozen = self._rule.find_frozen(cells, seen, sinks)
+        frozen = self._rule.find_frozen(cells, seen, uneven)
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
-            kept = self.ground.find_kept(seen.target, profile, ground, top, sinks)
+            kept = self.ground.find_kept(seen.target, profile, ground, top, uneven)
             kept |= beyond
             kept &= frozen
             np.putmask(profile, kept, seen.target)
