@@ -13,6 +13,8 @@ export GOAL := $(firstword $(MAKECMDGOALS))
 ENVIRONMENT := tools/environment .venv
 IN_311 := 3.11 PYTHON "$(PYTHON)"
 PART := .venv/bin/python tools/run_part.py
+# A test that hangs is a failure with its place; none takes a tenth of that. Tests themselves wait up to 240 s.
+HANGS := --timeout 300
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,8 +30,8 @@ extension: ## build the Blender extension and leave its zip in dist/
 test: ## run all tests but those of convergence, of the matrix, of the window and of other programs
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
-	$(PART) .reports/test.txt "tests" 1800 -- -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/release --ignore=tests/site --ignore=tests/window || status=1; \
-	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- -n auto --dist loadfile tests/blender || status=1; \
+	$(PART) .reports/test.txt "tests" 1800 -- $(HANGS) -n auto --dist loadfile tests --ignore=tests/blender --ignore=tests/convergence --ignore=tests/proof --ignore=tests/release --ignore=tests/site --ignore=tests/window || status=1; \
+	$(PART) .reports/test.txt "tests in Blender 4.5" 1200 -- $(HANGS) -n auto --dist loadfile tests/blender || status=1; \
 	awk '/ s of processor time/ { sub(/.*; /, ""); total += $$1 } \
 	  END { printf "processor time of make test: %d s, to be kept below 600 s\n", total }' .reports/test.txt >.reports/time.txt; \
 	cat .reports/time.txt >>.reports/test.txt; rm .reports/time.txt; \
@@ -37,7 +39,7 @@ test: ## run all tests but those of convergence, of the matrix, of the window an
 
 test-convergence: ## run tests/convergence: errors of the integration against references, tolerances and estimates
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- -n auto --dist loadfile tests/convergence
+	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- $(HANGS) -n auto --dist loadfile tests/convergence
 
 lint: ## check style, format, types and docstrings
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
@@ -77,7 +79,7 @@ guide-pictures: ## follow the guide in a window, and retake its pictures
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids
 	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids" 600 -- tests/proof
+	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids" 600 -- $(HANGS) tests/proof
 
 docs: ## build the site in site/, without a warning, and check it: links, search in a browser, commands of all pages
 	@$(ENVIRONMENT) requirements/docs.txt $(IN_311)

@@ -110,11 +110,15 @@ def test_a_scene_is_read_with_the_ground_it_was_written_with(ground: str) -> Non
 SLOPE = 40e-3 + BED.x
 
 
-def pressed(force_at: tuple[float, float], top: float, mode: Mode = Mode.BLISTER) -> Commands:
-    """Return the commands on the slope to a blister that the finger touches in one place, mm."""
-    measured = seen(SLOPE, mode, own=SLOPE)
-    measured.force[at(*force_at)] = 0.4
-    return command(master(*EAST, height=top), measured)
+def touch(measured: Measurement, x: float, about: float = 3.0) -> Measurement:
+    """Return the measurement with forces in three cells on the x axis, mm: the ground below them is uneven."""
+    measured.force[[at(x - about, 0.0), at(x, 0.0), at(x + about, 0.0)]] = 0.05, 0.3, 0.05
+    return measured
+
+
+def pressed(x: float, top: float, mode: Mode = Mode.BLISTER, ground: Floats = SLOPE) -> Commands:
+    """Return the commands to a blister that the finger touches at x, mm."""
+    return command(master(*EAST, height=top), touch(seen(ground, mode, own=ground), x))
 
 
 def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far() -> None:
@@ -128,26 +132,39 @@ def test_a_blister_that_sinks_into_a_slope_raises_none_and_lowers_none_too_far()
 
 
 def test_a_blister_that_rises_on_a_slope_is_level() -> None:
-    target = pressed((0.0, 0.0), 44e-3).target
+    target = pressed(0.0, 44e-3).target
     assert target[at(3, 0)] == pytest.approx(44e-3, abs=1e-9)
     assert target[at(-3, 0)] == pytest.approx(44e-3, abs=1e-9)
 
 
-@pytest.mark.parametrize(("top", "mode"), [(36e-3, Mode.FROZEN), (44e-3, Mode.BLISTER)])
-def test_what_the_finger_has_left_freezes_on_the_flat_top_when_the_blister_sinks(
-    top: float, mode: Mode
+#: By so little even ground rises: 0.03 mm a millimeter.
+EVEN = 40e-3 + 0.03 * BED.x
+
+
+@pytest.mark.parametrize(
+    ("ground", "top", "mode"),
+    [(SLOPE, 36e-3, Mode.FROZEN), (SLOPE, 44e-3, Mode.BLISTER), (EVEN, 36e-3, Mode.BLISTER)],
+    ids=["sinks into a slope", "rises", "sinks into even ground"],
+)
+def test_what_the_finger_has_left_freezes_on_the_flat_top_where_the_blister_sinks_into_uneven_ground(
+    ground: Floats, top: float, mode: Mode
 ) -> None:
-    assert pressed((3.0, 0.0), top).mode[at(-3, 0)] == mode
+    assert pressed(3.0, top, ground=ground).mode[at(-3, 0)] == mode
 
 
-@pytest.mark.parametrize(("top", "mode"), [(36e-3, Mode.BLISTER), (46e-3, Mode.FROZEN)])
-def test_a_frozen_cell_ahead_of_a_blister_that_sinks_is_freed(top: float, mode: Mode) -> None:
-    assert pressed((0.0, 0.0), top, Mode.FROZEN).mode[at(6, 0)] == mode
+@pytest.mark.parametrize(
+    ("ground", "top", "mode"),
+    [(SLOPE, 36e-3, Mode.BLISTER), (SLOPE, 46e-3, Mode.FROZEN), (EVEN, 36e-3, Mode.FROZEN)],
+    ids=["sinks into a slope", "rises", "sinks into even ground"],
+)
+def test_a_frozen_cell_ahead_of_a_blister_that_sinks_into_uneven_ground_is_freed(
+    ground: Floats, top: float, mode: Mode
+) -> None:
+    assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == mode
 
 
 def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> None:
-    measured = seen(SLOPE - 3e-3, Mode.FROZEN, own=SLOPE)
-    measured.force[at(3.0, 0.0)] = 0.4
+    measured = touch(seen(SLOPE - 3e-3, Mode.FROZEN, own=SLOPE), 6.0)
     found = command(master(*EAST, x=1e-3, height=38e-3), measured)
     # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
     for x in (-9.0, -6.0, 0.0):
@@ -157,11 +174,11 @@ def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> Non
 
 def test_the_stacked_runs_of_a_batch_have_tops_of_their_own() -> None:
     ground, force = np.stack([SLOPE, SLOPE], 1), np.zeros((BED.count, 2))
-    force[at(0.0, 0.0)] = 0.4
+    force[[at(-3.0, 0.0), at(0.0, 0.0)]] = 0.2
     inside, tops = np.ones((BED.count, 2), np.bool_), np.array([36e-3, 44e-3])
     own = GROUNDS["cell"]
-    found, sinks = own.find_tops(ground, tops, inside, force)
-    assert sinks.tolist() == [True, False]
+    found, uneven = own.find_tops(ground, tops, inside, force)
+    assert uneven.tolist() == [True, False]
     for run in (0, 1):
         alone, _ = own.find_tops(SLOPE, float(tops[run]), inside[:, run], force[:, run])
         np.testing.assert_allclose(np.broadcast_to(alone, BED.count), found[:, run], rtol=0, atol=1e-15)
@@ -171,6 +188,9 @@ def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse
     east = Heading(0.0, 0.0, 1.0, 0.0)
     back = [update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)]
     assert back == [1.0, 1.0, -1.0]
+    # A way to the side is a new one, also when it leads back a little: 60 degrees off the way back at least.
     assert update_heading(east, 0.0, 2e-3, 1.5e-3, 6e-3).toward_y == 1.0
+    assert update_heading(east, -0.9e-3, 2e-3, 1.5e-3, 6e-3).toward_y > 0.9
+    assert update_heading(east, -1.3e-3, 2e-3, 1.5e-3, 6e-3) == east
     for ground, reversal in (("cell", 6e-3), ("edge", 1.5e-3)):
         assert make_system(control=VirtualMaster(ground=ground)).controller.reversal == reversal

@@ -29,7 +29,7 @@ class Help(argparse.RawDescriptionHelpFormatter):
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog)
-        self._action_max_length = 13
+        self._action_max_length = 14
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:

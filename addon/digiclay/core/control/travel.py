@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 #: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a finger
 #: may cross at a right angle, and rounding must not decide on them.
 ABEAM = 1e-12
+#: A direction is opposite to another when the cosine of the angle between them is below this.
+BACK = -0.5
 
 
 class Heading(NamedTuple):
@@ -49,12 +51,12 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
     travel : float
         Distance that settles the direction, m.
     reversal : float, optional
-        Distance that settles one by more than a right angle off the last one, m, if longer: on a slope the
+        Distance that settles one opposite to the last one, within 60 degrees, m, if longer: on a slope the
         centroid of the forces moves about under a finger that goes one way.
     """
     dx, dy = x - heading.x, y - heading.y
     way = math.hypot(dx, dy)
-    if way < travel or (way < reversal and dx * heading.toward_x + dy * heading.toward_y < 0.0):
+    if way < travel or (way < reversal and dx * heading.toward_x + dy * heading.toward_y < BACK * way):
         return heading
     return Heading(x, y, dx / way, dy / way)
 

@@ -46,15 +46,21 @@ def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth"
 
 def lift_off(scene: Scene) -> Scene:
     """Return a scene that ends with a quick lift, and a rest in which pins come to their final heights."""
-    path, rest = scene.section("trajectory"), scene.actuator.rest_height
+    fingers = tuple(
+        replace(finger, trajectory=_lift_after(finger.trajectory, scene.actuator.rest_height))
+        for finger in scene.fingers
+    )
+    lasting = max(finger.trajectory.waypoints[-1].time for finger in fingers)
+    return replace(scene, fingers=fingers, simulation=replace(scene.simulation, duration=lasting))
+
+
+def _lift_after(path: Path, rest: float) -> Path:
+    """Return the path with a lift at its end, above the bed at rest, m."""
     last = path.waypoints[-1]
     away = (*last.position[:2], max(last.position[2], rest) + AWAY)
     end = last.time + LIFTED
     after = tuple(replace(last, time=t, position=away) for t in (end, end + SETTLED))
-    lasting = replace(scene.simulation, duration=end + SETTLED)
-    return scene.with_sections(
-        trajectory=replace(path, waypoints=(*path.waypoints, *after)), simulation=lasting
-    )
+    return replace(path, waypoints=(*path.waypoints, *after))
 
 
 def _turn(turn: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
