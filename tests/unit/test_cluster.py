@@ -6,12 +6,14 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from digiclay.cli import main
+from digiclay.commands import cluster as cluster_module
 from digiclay.commands.cluster import open_cluster
 from digiclay.commands.cluster_task import Versions, describe_versions, evaluate_on_worker
 from digiclay.core.base.errors import DigiclayError, OutputError
@@ -134,6 +136,34 @@ def test_errors_of_tasks_are_told_of_each_piece_and_the_others_go_on(address: st
 def invert(number: int) -> float:
     """Return the reciprocal."""
     return 1 / number
+
+
+class SlowToSend:
+    """Result that takes seconds to be sent the first time."""
+
+    sent = 0
+
+    def __reduce__(self) -> tuple[type[SlowToSend], tuple[()]]:
+        SlowToSend.sent += 1
+        if SlowToSend.sent == 1:
+            time.sleep(3.0)
+        return SlowToSend, ()
+
+
+def give_slowly(number: int) -> SlowToSend:
+    """Return a result that arrives late."""
+    return SlowToSend()
+
+
+def test_a_result_that_does_not_arrive_is_computed_again(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "FETCH", 0.5)
+    done: Found = {}
+    with open_cluster(address, lambda: False, silent) as cluster:
+        finish(cluster, give_slowly, [0], done.__setitem__, done.__setitem__, stopped=lambda: False)
+    assert isinstance(done[0], SlowToSend)
+    assert SlowToSend.sent > 1
 
 
 def test_a_scheduler_that_is_gone_ends_a_series_in_one_line() -> None:

@@ -26,6 +26,8 @@ __all__ = ["Cluster", "open_cluster"]
 
 #: Seconds to reach the scheduler, and between two looks whether somebody asked to stop.
 PATIENCE, PAUSE = 10.0, 0.1
+#: Seconds within which a result must arrive that a worker has.
+FETCH = 30.0
 #: Seconds between two looks at how many workers there are, and without any before that is told.
 LOOK, ALONE = 1.0, 10.0
 #: Packages whose loggers are silenced.
@@ -76,16 +78,22 @@ class Cluster(Executor):
 
         Dask blames the death of a worker on all tasks that it had, also on those that it had not begun. So
         each gets a second chance, one after the other: who kills once more is to blame.
+
+        Rarely Dask tells of a result and never hands it over. This thread would wait for good, and with it
+        all results after that one: the task is repeated then.
         """
         from distributed import KilledWorker
 
         self._remote.discard(remote)
-        if alone:
-            self._suspects.popleft()
         try:
-            outcome, error = remote.result(), None
+            outcome, error = remote.result(timeout=FETCH), None
         except BaseException as raised:  # Dask's cancellation is no Exception
             outcome, error = None, raised
+        if isinstance(error, TimeoutError) and remote.status != "error" and not future.cancelled():
+            self._send(future, packed, alone=alone)
+            return
+        if alone:
+            self._suspects.popleft()
         suspect = isinstance(error, KilledWorker) and not alone
         if suspect:
             self._suspects.append((future, packed))
