@@ -111,7 +111,7 @@ SLOPE = 40e-3 + BED.x
 
 
 def touch(measured: Measurement, x: float, about: float = 3.0) -> Measurement:
-    """Return the measurement with forces in three cells on the x axis, mm: the ground below them is uneven."""
+    """Return the measurement with forces in three cells on the x axis, mm: their grounds differ."""
     measured.force[[at(x - about, 0.0), at(x, 0.0), at(x + about, 0.0)]] = 0.05, 0.3, 0.05
     return measured
 
