@@ -20,7 +20,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from digiclay_serve.pin_frames import pack_acknowledgement, read_heights, split_frames
 from tests.served import TOKEN, Server, serve
-from tests.timeouts import TIMEOUT
+from tests.timeouts import TIMEOUT, wait_until
 
 if sys.platform == "win32":
     pytest.skip("the server runs on Linux and macOS", allow_module_level=True)
@@ -128,8 +128,7 @@ def test_the_examples_of_the_page_run(
     assert said.startswith("9 x 9 pins\ntotal force: ")
     assert float(said.split()[-2]) > 0.0
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
-    while received(door, "/digiclay/state", subscribe)[4:7] != pytest.approx(PLACE, abs=1e-8):
-        pass
+    wait_until(lambda: received(door, "/digiclay/state", subscribe)[4:7] == pytest.approx(PLACE, abs=1e-8))
 
 
 def test_a_pose_comes_back_as_a_state(door: socket.socket) -> None:
