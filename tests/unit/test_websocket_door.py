@@ -21,7 +21,7 @@ from digiclay_serve.websocket_door import open_websocket
 from tests.timeouts import TIMEOUT
 
 POSE = Pose((0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0), 1)
-OPENING = (
+REQUEST = (
     "GET /?rate=0&token=a-token-of-tests HTTP/1.1\r\nHost: 127.0.0.1\r\n"
     "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
     "Sec-WebSocket-Version: 13\r\n\r\n"
@@ -43,7 +43,7 @@ async def press_and_fall_silent(link: DoorLink) -> bytes:
     port = server.sockets[0].getsockname()[1]
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     packed = pack_pose(POSE)
-    writer.write(OPENING.encode() + bytes([0x82, 0x80 | len(packed), 0, 0, 0, 0]) + packed)
+    writer.write(REQUEST.encode() + bytes([0x82, 0x80 | len(packed), 0, 0, 0, 0]) + packed)
     try:
         async with asyncio.timeout(TIMEOUT):
             said = await reader.read()
@@ -72,3 +72,22 @@ def test_a_client_that_answers_no_ping_is_closed_and_its_fingertip_is_free(
     link = make_link()
     assert UNANSWERED in asyncio.run(press_and_fall_silent(link))
     assert link.counts["poses"] == 2
+
+
+async def connect_and_say_nothing(link: DoorLink) -> bytes:
+    """Return what comes until the door closes."""
+    server = await open_websocket(link, "127.0.0.1", 0)
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
+    try:
+        async with asyncio.timeout(TIMEOUT):
+            return await reader.read()
+    finally:
+        writer.close()
+        server.close()
+
+
+def test_a_client_that_is_silent_before_the_token_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(websocket_door, "OPENING", 0.1)
+    link = make_link()
+    assert asyncio.run(connect_and_say_nothing(link)) == b""
+    assert link.counts["clients"] == 0
