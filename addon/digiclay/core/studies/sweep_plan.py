@@ -135,9 +135,11 @@ def hash_points(points: Sequence[Point]) -> str:
 
     def write(section: str, part: Any, method: str = "") -> list[str]:
         # Points have most parts in common, and all of them are there until the end: a part is its address.
+        # Its comments are taken out of all of its lines at once, which is much faster than line by line.
         key = section, method, id(part)
         if key not in written:
-            written[key] = [NOTE.sub("", line) for line in write_part(section, part, method)]
+            lines = "\n".join(write_part(section, part, method))
+            written[key] = [NOTE.sub("", lines)] if lines else []
         return written[key]
 
     for point in points:
