@@ -42,10 +42,11 @@ def begin_bed(name: str, rows: int, columns: int) -> Running:
 
 def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
     """Queue a quick stroke from place to place, mm."""
-    (x, y), (to_x, to_y) = (np.array(place) * 1e-3 for place in ends)
-    session, number = queue_stroke(session, x, y, depth * 1e-3, brush=brush, share=share)
+    places = np.array(ends) * 1e-3
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    session, number = queue_stroke(session, *places[0].tolist(), depth * 1e-3, brush=brush, share=share)
     for part in np.arange(1, 31) / 30:
-        at = x + part * (to_x - x), y + part * (to_y - y)
+        at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
         session = change_stroke(
             session, number,
             lambda stroke, at=at, t=part * DURATION: draw(stroke, t, *at, depth * 1e-3, share),

@@ -172,16 +172,35 @@ def test_what_a_blister_that_climbs_a_slope_has_pressed_stays_behind_it() -> Non
         assert found.target[at(x, 0)] == SLOPE[at(x, 0)] - 3e-3
 
 
-def test_the_stacked_runs_of_a_batch_have_tops_of_their_own() -> None:
-    ground, force = np.stack([SLOPE, SLOPE], 1), np.zeros((BED.count, 2))
+def test_what_a_blister_has_raised_stays_when_it_begins_to_sink() -> None:
+    # It comes up out of a valley of 4 mm, whose bottom it has raised to its top.
+    ground = 40e-3 - np.where(BED.x < 0.0, 4e-3, 0.0)
+    level = np.full(BED.count, 39.3e-3)
+    found = command(master(*EAST, height=39.3e-3), touch(seen(level, Mode.BLISTER, own=ground), 1.5, 4.5))
+    for x in (-3.0, 0.0, 3.0):
+        assert found.target[at(x, 0)] == pytest.approx(39.3e-3, abs=1e-5)
+
+
+def test_what_a_blister_has_raised_is_not_freed_when_it_lies_ahead_again() -> None:
+    raised = seen(SLOPE + 3e-3, Mode.FROZEN, own=SLOPE)
+    found = command(master(*EAST, height=36e-3), touch(raised, 0.0))
+    assert found.mode[at(6, 0)] == Mode.FROZEN
+    assert found.target[at(6, 0)] == SLOPE[at(6, 0)] + 3e-3
+
+
+def test_the_stacked_runs_of_a_batch_have_profiles_of_their_own() -> None:
+    force = np.zeros(BED.count)
     force[[at(-3.0, 0.0), at(0.0, 0.0)]] = 0.2
-    inside, tops = np.ones((BED.count, 2), np.bool_), np.array([36e-3, 44e-3])
-    own = GROUNDS["cell"]
-    found, uneven = own.find_tops(ground, tops, inside, force)
-    assert uneven.tolist() == [True, False]
+    inside, tops = np.ones(BED.count, np.bool_), np.array([36e-3, 44e-3])
+    own, distance = GROUNDS["cell"], np.hypot(BED.x, BED.y)
+    alone = seen(SLOPE, Mode.BLISTER)._replace(force=force)
+    both = alone._replace(force=np.stack([force, force], 1), target=np.stack([SLOPE, SLOPE], 1))
+    of_both = (np.stack([one, one], 1) for one in (distance, inside, SLOPE))
+    found, uneven = own.find_profile(Blister(), *of_both, tops, both)
+    assert uneven.any(axis=0).tolist() == [True, False]
     for run in (0, 1):
-        alone, _ = own.find_tops(SLOPE, float(tops[run]), inside[:, run], force[:, run])
-        np.testing.assert_allclose(np.broadcast_to(alone, BED.count), found[:, run], rtol=0, atol=1e-15)
+        single, _ = own.find_profile(Blister(), distance, inside, SLOPE, float(tops[run]), alone)
+        np.testing.assert_allclose(single, found[:, run], rtol=0, atol=1e-15)
 
 
 def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction() -> None:

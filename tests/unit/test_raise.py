@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import digiclay
@@ -50,6 +51,12 @@ def along(session: Running, y: float = 0.0) -> Floats:
     """Return the heights of the pins that a stroke along x at y, mm, has passed, above rest, mm."""
     row = 12 + round(y / 3.0)
     return relief(session)[row, 12 - round(HALF / 3.0) : 13 + round(HALF / 3.0)]
+
+
+def trace(way: Places) -> Floats:
+    """Return places along a way of straight lines, (k, 2), mm."""
+    places = np.array(way)
+    return np.concatenate([np.linspace(*ends, 20) for ends in pairwise(places)])
 
 
 @pytest.fixture(scope="module")
@@ -202,3 +209,15 @@ def test_ctrl_inverts_lower_and_raise_and_leaves_level_as_it_is() -> None:
 
 def test_heights_stay_within_what_can_be_raised() -> None:
     assert start(1, 0.0, 0.0, 1.0, brush=Brush.RAISE).samples[0].depth == DEEPEST
+
+
+def test_level_fills_a_valley_that_it_crosses_by_a_bend() -> None:
+    # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes out.
+    way: Places = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
+    valley = form(begin_bed("paper", 25, 25), ALONG, Brush.LOWER, 4.0)
+    assert along(valley).max() < -3.0
+    leveled = relief(form(valley, way, Brush.LEVEL, 4.0))
+    bed = valley.system.grid
+    apart = np.min([np.hypot(1e3 * bed.x - x, 1e3 * bed.y - y) for x, y in trace(way)], axis=0)
+    # Within the flat top of the blister, 6 mm. Measured: 0.9 mm; 2.1 mm where what it has raised falls back.
+    assert np.abs(leveled.ravel()[apart < 6.0]).max() < 1.5

@@ -6,9 +6,11 @@ it was commanded to when the blister came over it, and one at the blister's rim 
 
 A level blister on a slope moves every cell to one height: behind a finger that climbs, what it has pressed is
 raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the own
-ground of the cells under the finger, raises no cell, and lowers none farther than those. Where that ground is
-uneven, what the finger has left freezes sooner, and is freed when it lies ahead again: on a slope the finger
-is felt beside its lowest point. On even ground that would leave a groove with ragged flanks.
+ground of the cells under the finger, raises no cell, and lowers none farther than those. What it has raised
+before stays: a finger that climbs out of a valley which it fills sinks into the far side. Where the ground
+is uneven, what the finger has left freezes sooner, and what it has lowered is freed when it lies ahead again:
+on a slope the finger is felt beside its lowest point. On even ground that would leave a groove with ragged
+flanks.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
+from .blister import Blister
 from .runs import sum_weighted
 
 __all__ = ["GROUNDS", "EdgeGround", "OwnGround"]
@@ -63,18 +66,22 @@ class EdgeGround:
         """
         return edge
 
-    def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
-        """Return the height of the flat top for each cell, m, and whether it sinks into uneven ground.
+    def find_profile(
+        self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
+    ) -> tuple[Floats, Any]:
+        """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
 
         See `OwnGround`.
 
         Parameters
         ----------
-        ground, top : float or ndarray (b,)
+        blister : Blister
+        distance : ndarray (m,) or (m, b)
         inside : ndarray of bool (m,) or (m, b)
-        force : ndarray (m,) or (m, b)
+        ground, top : float or ndarray (b,)
+        seen : Measurement
         """
-        return top, False
+        return blister.interpolate(distance, ground, top), False
 
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command: those farther off the ground than the profile.
@@ -87,8 +94,8 @@ class EdgeGround:
             See `find`, m.
         top : float or ndarray (b,)
             Height of the blister's top, m.
-        uneven : bool or ndarray of bool (b,), optional
-            See `find_tops`.
+        uneven : bool or ndarray of bool (m,) or (m, b), optional
+            See `find_profile`.
         """
         kept: Flags = target > profile
         kept ^= top < ground
@@ -115,40 +122,53 @@ class OwnGround:
         np.copyto(own, seen.target, where=seen.mode <= Mode.EDGE)
         return own
 
-    def find_tops(self, ground: Any, top: Any, inside: Flags, force: Floats) -> tuple[Any, Any]:
-        """Return the height of the flat top for each cell, m, and whether it sinks into uneven ground.
+    def find_profile(
+        self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
+    ) -> tuple[Floats, Any]:
+        """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
 
         Parameters
         ----------
+        blister : Blister
+        distance : ndarray (m,) or (m, b)
+            From the middle of the blister, m.
+        inside : ndarray of bool (m,) or (m, b)
+            Cells of the blister.
         ground : ndarray (m,) or (m, b)
             m.
         top : float or ndarray (b,)
             Height of the top, m.
-        inside : ndarray of bool (m,) or (m, b)
-            Cells of the blister.
-        force : ndarray (m,) or (m, b)
-            N: the ground under the finger is their mean and standard deviation, weighted with it.
+        seen : Measurement
+            Gives the forces, N: the ground under the finger is its mean and standard deviation, weighted
+            with them; and the commanded heights, m.
 
         Returns
         -------
-        tops : ndarray (m,) or (m, b)
+        profile : ndarray (m,) or (m, b)
             m.
-        uneven : bool or ndarray of bool (b,)
+        uneven : bool or ndarray of bool (m,) or (m, b)
+            Cells that are not above their ground, where the blister sinks into uneven ground.
         """
-        weight = np.maximum(force, UNTOUCHED)
+        level = blister.interpolate(distance, ground, top)
+        weight = np.maximum(seen.force, UNTOUCHED)
         weight *= inside
         whole = np.maximum(weight.sum(axis=0), UNTOUCHED)
         mean = sum_weighted(ground, weight) / whole
         sinks = top < mean
         if not np.any(sinks):
-            return top, sinks
+            return level, False
         off = ground - mean
         off *= off
         reach = SPREAD * np.sqrt(sum_weighted(off, weight) / whole)
         change: Floats = top - ground
         np.maximum(change, np.minimum(top - mean - reach, 0.0), out=change)
         np.minimum(change, np.maximum(top - mean + reach, 0.0), out=change)
-        return np.where(sinks, ground + change, top), sinks & (reach > UNEVEN * (mean - top))
+        profile = blister.interpolate(distance, ground, ground + change)
+        raised = seen.target > ground
+        # What a blister has raised before it sinks stays as far as it is within the level one.
+        np.maximum(profile, np.minimum(level, seen.target), out=profile, where=raised)
+        uneven = sinks & (reach > UNEVEN * (mean - top))
+        return np.where(sinks, profile, level), uneven & ~raised
 
     def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_kept`.
@@ -159,12 +179,12 @@ class OwnGround:
             m.
         top : float or ndarray (b,)
             m.
-        uneven : bool or ndarray of bool (b,), optional
+        uneven : bool or ndarray of bool (m,) or (m, b), optional
         """
         kept: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
         # that sinks into uneven ground is not raised where the ground falls below its top.
-        kept ^= (uneven | (top < ground)) & (target <= ground)
+        kept ^= uneven | ((top < ground) & (target <= ground))
         return kept
 
 

@@ -136,8 +136,9 @@ class VirtualMasterControl(MasterControl):
         memory = self.set_edge(memory, level, count_true(facing))
         edge, top, kind, beyond = self.get_heights(memory)
         ground = self.ground.find(seen, edge)
-        tops, uneven = self.ground.find_tops(ground, top, cells.inside, seen.force)
-        profile = self.blister.interpolate(cells.distance, ground, tops)
+        profile, uneven = self.ground.find_profile(
+            self.blister, cells.distance, cells.inside, ground, top, seen
+        )
         frozen = self._rule.find_frozen(cells, seen, uneven)
         if any_true(frozen):
             # What is frozen is never called back; a blister that outgrows it takes it along.
