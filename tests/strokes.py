@@ -41,7 +41,7 @@ def begin_bed(name: str, rows: int, columns: int) -> Running:
 
 
 def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
-    """Queue a quick stroke from place to place, mm."""
+    """Queue a quick stroke straight from place to place, mm."""
     places = np.array(ends) * 1e-3
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
     session, number = queue_stroke(session, *places[0].tolist(), depth * 1e-3, brush=brush, share=share)

@@ -102,9 +102,9 @@ class BlisterRule:
         cells : BlisterCells
         seen : Measurement
             Gives the modes of the last period, and the forces.
-        uneven : bool or ndarray of bool (b,), optional
-            Whether the blister sinks into uneven ground: cells freeze nearer to the fingertip then, and those
-            that lie ahead of it again are freed.
+        uneven : bool or ndarray of bool (m,) or (m, b), optional
+            Cells that sink into uneven ground: they freeze nearer to the fingertip, and are freed when they
+            lie ahead of it again.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance
