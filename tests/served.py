@@ -18,7 +18,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.timeouts import TIMEOUT
 
-__all__ = ["TOKEN", "Server", "serve"]
+__all__ = ["TOKEN", "Server", "frame_message", "serve"]
 
 ROOT = Path(__file__).parents[1]
 TOKEN = "a-token-of-tests"
@@ -50,6 +50,11 @@ class Server:
         assert err == ""
         report: dict[str, Any] = json.loads(self.report.read_text(encoding="utf-8"))
         return report
+
+
+def frame_message(packed: bytes) -> bytes:
+    """Return a binary message of up to 125 bytes as RFC 6455 has it, masked by zeros."""
+    return bytes([0x82, 0x80 | len(packed), 0, 0, 0, 0]) + packed
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection
 
 from digiclay_serve.protocol import Frame, Pose, pack_pose, unpack_frame
 from digiclay_serve.websocket_door import FLOOD, Pace, count_message
-from tests.served import TOKEN, Server, serve
+from tests.served import TOKEN, Server, frame_message, serve
 from tests.timeouts import TIMEOUT
 
 pytestmark = pytest.mark.skipif("sys.platform == 'win32'", reason="the server runs on Linux and macOS")
@@ -167,8 +167,7 @@ def test_a_huge_message_closes_its_client_alone(server: Server) -> None:
 
 
 def test_a_flood_harms_nobody(server: Server) -> None:
-    pose = pack_pose(Pose(PRESS, 14))
-    framed = bytes([0x82, 0x80 | len(pose), 0, 0, 0, 0]) + pose  # as RFC 6455 has it, masked by zeros
+    framed = frame_message(pack_pose(Pose(PRESS, 14)))
     with (
         server.connect("?format=binary&rate=200") as other,
         server.connect("?rate=0", close_timeout=0) as client,

@@ -18,11 +18,12 @@ from digiclay_serve.latest_slot import make_slot
 from digiclay_serve.order_slot import Order, pack_order
 from digiclay_serve.protocol import Pose, pack_pose
 from digiclay_serve.websocket_door import open_websocket
+from tests.served import TOKEN, frame_message
 from tests.timeouts import TIMEOUT
 
 POSE = Pose((0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0), 1)
 REQUEST = (
-    "GET /?rate=0&token=a-token-of-tests HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    f"GET /?rate=0&token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
     "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
     "Sec-WebSocket-Version: 13\r\n\r\n"
 )
@@ -34,16 +35,14 @@ def make_link() -> DoorLink:
     """Return a link without a session."""
     slot, file = make_slot(len(pack_order(Order())))
     file.unlink()
-    return DoorLink(Bed("bed", 1, 1, 3e-3, 0.1, 5e-3, ()), slot, slot, "a-token-of-tests")
+    return DoorLink(Bed("bed", 1, 1, 3e-3, 0.1, 5e-3, ()), slot, slot, TOKEN)
 
 
-async def press_and_fall_silent(link: DoorLink) -> bytes:
-    """Send a pose as RFC 6455 has it, answer nothing; return what comes until another client may."""
+async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
+    """Send bytes, answer nothing; return what comes until the door closes and another client has pressed."""
     server = await open_websocket(link, "127.0.0.1", 0)
-    port = server.sockets[0].getsockname()[1]
-    reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    packed = pack_pose(POSE)
-    writer.write(REQUEST.encode() + bytes([0x82, 0x80 | len(packed), 0, 0, 0, 0]) + packed)
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
+    writer.write(sent)
     try:
         async with asyncio.timeout(TIMEOUT):
             said = await reader.read()
@@ -64,30 +63,19 @@ async def press_elsewhere(link: DoorLink) -> None:
             await asyncio.sleep(0.01)
 
 
-def test_a_client_that_answers_no_ping_is_closed_and_its_fingertip_is_free(
+def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(websocket_door, "PING", 0.1)
     monkeypatch.setattr(finger_lease, "LEASE", 1e9)  # nobody else may by silence alone
     link = make_link()
-    assert UNANSWERED in asyncio.run(press_and_fall_silent(link))
+    sent = REQUEST.encode() + frame_message(pack_pose(POSE))
+    assert UNANSWERED in asyncio.run(connect(link, sent))
     assert link.counts["poses"] == 2
-
-
-async def connect_and_say_nothing(link: DoorLink) -> bytes:
-    """Return what comes until the door closes."""
-    server = await open_websocket(link, "127.0.0.1", 0)
-    reader, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
-    try:
-        async with asyncio.timeout(TIMEOUT):
-            return await reader.read()
-    finally:
-        writer.close()
-        server.close()
 
 
 def test_a_client_that_is_silent_before_the_token_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(websocket_door, "OPENING", 0.1)
     link = make_link()
-    assert asyncio.run(connect_and_say_nothing(link)) == b""
+    assert asyncio.run(connect(link)) == b""
     assert link.counts["clients"] == 0
