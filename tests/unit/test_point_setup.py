@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import time
+from dataclasses import fields
 
 from digiclay.core.batch.packing import Findings, describe_structure
 from digiclay.core.scene.assembly import assemble, count_rows, make_motion
@@ -54,6 +55,17 @@ def test_points_stand_in_the_same_batches_whatever_is_known_of_others() -> None:
         assert count_rows(point.scene, assemble(point.scene).grid, make_motion(point.scene)) == (
             assemble(point.scene).rows
         )
+
+
+def test_points_share_each_part_that_is_not_varied_also_a_duration_taken_from_the_path() -> None:
+    made = make_points(find("slow_press"), [], [read_axis("control.force_gain=1:5:3")])
+    first, *others = (point.scene for point in made)
+    for other in others:
+        assert first is not None
+        assert other is not None
+        names = [one.name for one in fields(first)]
+        apart = {name for name in names if getattr(first, name) is not getattr(other, name)}
+        assert apart - {"fingers"} == {"control"}  # the tuple of fingers is made anew, its parts are shared
 
 
 def test_a_thousand_points_take_a_part_of_the_time_of_a_thousand_scenes() -> None:

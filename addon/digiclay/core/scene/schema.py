@@ -158,6 +158,12 @@ class Simulation(Parameters):
         return replace(self, physics_step=self.control_period / (self.steps * parts))
 
 
+@lru_cache(maxsize=64)
+def _set_duration(simulation: Simulation, duration: float) -> Simulation:
+    """Return the same simulation with a duration, the same one for all points of a sweep."""
+    return replace(simulation, duration=duration)
+
+
 @dataclass(frozen=True)
 class Finger:
     """A finger: its tip, how its pulp yields and relaxes, and its path.
@@ -217,7 +223,7 @@ class Scene:
             if lasts == 0.0:
                 rule = "must be above 0 s where the trajectory has no duration of its own"
                 raise ParameterError("simulation", "duration", rule, "0 s")
-            object.__setattr__(self, "simulation", replace(self.simulation, duration=lasts))
+            object.__setattr__(self, "simulation", _set_duration(self.simulation, lasts))
         longest = MOST_STEPS * self.simulation.control_period
         if self.delay and self.delay.dead_time > longest:
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
