@@ -56,8 +56,10 @@ mutants: ## change the core's physics and control here and there, and list what 
 	@$(ENVIRONMENT) requirements/mutation.txt $(IN_311)
 	@rm -f .reports/mutants.txt; .venv/bin/python tools/mutants.py --report .reports/mutants.txt --count 150 --limit 600 --most 0.25 $(MODULES)
 
+# Some of them: make test-matrix BLENDERS="4.2 5.2"
+BLENDERS ?= 4.2 4.5 5.0 5.2
 test-matrix: ## run tests/blender in Blender 4.2, 4.5, 5.0 and 5.2
-	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix
+	@PYTHON="$(PYTHON)" PYTHON313="$(PYTHON313)" tools/matrix $(BLENDERS)
 
 # With WHOLE=1 a skipped test is a failure, for instance where DIGICLAY_BLENDER_DISPLAY is not set.
 WHOLE ?=
@@ -76,10 +78,10 @@ guide-pictures: ## follow the guide in a window, and retake its pictures
 	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py tests/window/test_press_tool.py
 	@.venv/bin/python tools/guide_pictures.py .reports/guide
 
-test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids
+test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids; reproduce the paper
 	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
-	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids" 600 -- $(HANGS) tests/proof
+	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids, the paper" 600 -- $(HANGS) tests/proof
 
 docs: ## build the site in site/, without a warning, and check it: links, search in a browser, commands of all pages
 	@$(ENVIRONMENT) requirements/docs.txt $(IN_311)

@@ -3,7 +3,7 @@
 Started by `blender_window.played`, with the folder for the results and the script after ``--``.
 A script is a file with a generator function ``script(blender)``, which is given this module. It is
 stepped from a timer, so that Blender handles each batch of events before the next; it may
-yield how long to wait, s.
+yield how long to wait, s. The pins have few vertices, unless the script has ``FINE_PINS = True``.
 """
 
 from __future__ import annotations
@@ -278,6 +278,8 @@ def main() -> None:
     assert found.loader is not None
     played = importlib.util.module_from_spec(found)
     found.loader.exec_module(played)
+    if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
+        part("device.parts").MANY = 0  # the vertices of rounder pins cost software GL most of a frame
     steps = played.script(sys.modules[__name__])
 
     def step() -> float | None:

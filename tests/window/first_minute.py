@@ -13,6 +13,8 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from hand_strokes import catch_up, drag, finish, focus_window, hand, note, on_the_screen, to
 
+#: The pictures show the pins as a user sees them.
+FINE_PINS = True
 #: Places in the sidebar, pixels from its upper right corner at a resolution scale of 1: the tab, and in it
 #: the first button.
 TAB, START = (-10, 178), (-130, 45)

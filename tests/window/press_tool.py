@@ -9,6 +9,8 @@ import addon_utils
 import bpy
 import numpy as np
 
+#: The pictures show the pins as a user sees them.
+FINE_PINS = True
 #: A finger that is on its way moves in each of so many ticks of its session.
 TICKS = 5
 
