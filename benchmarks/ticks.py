@@ -68,9 +68,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def keep_to_one_core() -> None:
-    """Have the process and its threads use one core alone, where the system lets it."""
+    """Have all threads of the process use one core, where the system lets it; Blender has begun some."""
     if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        core = {min(os.sched_getaffinity(0))}
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), core)
 
 
 def _text(found: Sequence[Ticks], version: str) -> Iterator[str]:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,9 @@ from digiclay.live import bed_state, running, sculpting
 from benchmarks import ticks
 from benchmarks.__main__ import main
 from benchmarks.tick_times import DEPTH, PARTS, RATE, measure
+from tests.timeouts import TIMEOUT
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_every_tick_is_timed_and_its_parts_are_within_it() -> None:
@@ -64,3 +70,22 @@ def test_the_command_prints_a_table_a_bed_and_draws_the_histogram(
     assert rows[0]["part"] == "whole tick"
     assert 0.0 < whole[0] <= whole[-1]
     assert (tmp_path / "ticks.png").stat().st_size > 10_000
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system keeps no thread to a core")
+def test_threads_that_were_started_before_are_kept_to_the_core_too() -> None:
+    script = (
+        "import os, threading\n"
+        "from benchmarks.ticks import keep_to_one_core\n"
+        "over = threading.Event()\n"
+        "thread = threading.Thread(target=over.wait)\n"
+        "thread.start()\n"
+        "keep_to_one_core()\n"
+        "print(*(len(os.sched_getaffinity(each)) for each in (0, thread.native_id)))\n"
+        "over.set()\n"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT, check=True,
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "addon")))},
+    ).stdout  # fmt: skip
+    assert told.split() == ["1", "1"]
