@@ -121,6 +121,6 @@ def draw_histogram(found: Sequence[Ticks], goals: Sequence[float], out: Path) ->
             panel.axvline(share, color="#222222", linestyle=":", label=f"99 %: {share:.1f} ms")
             panel.set_title(f"{bed.name}, {len(bed.spent)} ticks")
             panel.set_ylabel("ticks in 0.25 ms")
-            panel.legend(loc="upper right")
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
         panels[-1].set_xlabel("processor time of a tick, ms")
         return write(figure, out)
