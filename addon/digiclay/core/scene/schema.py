@@ -160,7 +160,7 @@ class Simulation(Parameters):
 
 @lru_cache(maxsize=64)
 def _set_duration(simulation: Simulation, duration: float) -> Simulation:
-    """Return the same simulation with a duration, the same one for all points of a sweep."""
+    """Return a simulation with a duration; the points of a sweep get one and the same."""
     return replace(simulation, duration=duration)
 
 
