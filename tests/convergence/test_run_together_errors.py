@@ -13,7 +13,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
 from digiclay.core.session.run_scene import Result, run
 
-from tests.assemble import STACKABLE, sample
+from tests.assemble import STACKABLE, begun_apart, moved, sample
 
 #: An estimate is the difference of two integrations under the same commands. Alone and in a stack both end in
 #: other last bits (sums in another order), some 1e-17 m and 1e-14 N, of heights of 4 cm and forces of 0.4 N.
@@ -44,18 +44,7 @@ def assert_estimated_as_alone(scenes: Sequence[Scene]) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_are_as_exact_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=1.5")
-    first, *others = known.section("trajectory").waypoints
-    scenes = []
-    for i in range(3):
-        x, y, z = first.position
-        way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
-        lasting = replace(known.simulation, duration=0.7 + 0.2 * i)
-        scenes.append(
-            known.with_sections(
-                trajectory=replace(known.section("trajectory"), waypoints=way), simulation=lasting
-            )
-        )
-    assert_estimated_as_alone(scenes)
+    assert_estimated_as_alone(begun_apart(known, (0.7, 0.9, 1.1)))
 
 
 @pytest.mark.parametrize(
@@ -90,11 +79,7 @@ def test_runs_of_any_stepper_are_as_exact_as_alone(stepper: str, step: str) -> N
 def test_pins_on_their_end_stops_are_as_exact_as_alone() -> None:
     settings = ("control.method=elastic", "control.stiffness=5")
     known = sample("tap", "actuator.rest_height=1.5e-3", *settings)
-    points = tuple(
-        replace(point, position=(*point.position[:2], point.position[2] - 39e-3))
-        for point in known.section("trajectory").waypoints
-    )
-    low = known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
+    low = moved(known, 0.0, -39e-3)
     assert_estimated_as_alone([low, replace(low, actuator=replace(low.actuator, rest_height=1e-3))])
 
 

@@ -9,8 +9,8 @@ import pytest
 from digiclay.core.control.methods import METHODS
 from digiclay.core.scene.schema import Scene
 
-from tests.assemble import STACKABLE, sample
-from tests.scenes.test_run_together import assert_as_alone, moved, together
+from tests.assemble import STACKABLE, moved, sample
+from tests.scenes.test_run_together import assert_as_alone, together
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states", "elastic"])

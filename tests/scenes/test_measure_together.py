@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,7 +13,7 @@ from digiclay.core.metrics.summary import METRICS
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
 
-from tests.assemble import STACKABLE, sample
+from tests.assemble import STACKABLE, begun_apart, moved, sample
 
 #: Sums in another order. By unit: heights agree to 1e-12 m and forces to 1e-10 N (test_run_together.py), lags
 #: are rounded to 1e-12 m; a volume adds up some hundred heights, each over 1e-5 m².
@@ -50,18 +49,7 @@ def assert_as(found: Any, alone: Any) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_and_ends_of_their_own_are_judged_as_alone(method: str) -> None:
     known = sample(STACKABLE[method], f"control.method={method}", "simulation.duration=2.5")
-    first, *others = known.section("trajectory").waypoints
-    scenes = []
-    for i in range(3):
-        x, y, z = first.position
-        way = (replace(first, position=(x + 1e-3 * i, y, z)), *others)
-        lasting = replace(known.simulation, duration=1.5 - 0.2 * i)
-        scenes.append(
-            known.with_sections(
-                trajectory=replace(known.section("trajectory"), waypoints=way), simulation=lasting
-            )
-        )
-    assert_judged_as_alone(scenes)
+    assert_judged_as_alone(begun_apart(known, (1.5, 1.3, 1.1)))
 
 
 def test_the_papers_session_is_judged_as_alone() -> None:
@@ -111,11 +99,7 @@ def test_a_run_without_a_history_has_none() -> None:
 def test_a_run_that_diverges_is_told_and_the_others_are_judged() -> None:
     long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
     known = sample("slow_press", "simulation.stepper=euler", *long)
-    points = tuple(
-        replace(point, position=(*point.position[:2], point.position[2] + 20e-3))
-        for point in known.section("trajectory").waypoints
-    )
-    away = known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
+    away = moved(known, 0.0, 20e-3)
     found = judged([away, known])
     assert isinstance(found[1], DivergenceError)
     assert_as(found[0], run(away))

@@ -16,19 +16,10 @@ from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result, run
 
-from tests.assemble import STACKABLE, sample
+from tests.assemble import STACKABLE, moved, sample
 
 #: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a newton.
 HEIGHT, FORCE = 1e-12, 1e-10
-
-
-def moved(known: Scene, x: float, z: float) -> Scene:
-    """Return a scene whose finger takes the same way elsewhere, m."""
-    points = tuple(
-        replace(point, position=(point.position[0] + x, point.position[1], point.position[2] + z))
-        for point in known.section("trajectory").waypoints
-    )
-    return known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
 
 
 def together(scenes: Sequence[Scene]) -> list[Any]:
