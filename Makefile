@@ -41,13 +41,12 @@ test-convergence: ## run tests/convergence: errors of the integration against re
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- $(HANGS) -n auto --dist loadfile tests/convergence
 
-lint: ## check style, format, types and docstrings
+lint: ## check style, format and types
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@status=0; \
 	.venv/bin/ruff check . || status=1; \
 	.venv/bin/ruff format --check . || status=1; \
 	.venv/bin/mypy || status=1; \
-	.venv/bin/python tools/docstrings.py || status=1; \
 	exit $$status
 
 # All mutants of some modules: make mutants MODULES="valve steppers.bernoulli"

@@ -1,18 +1,11 @@
-"""Every label and tooltip has a translation."""
+"""Translations of labels and tooltips; a missing entry is English."""
 
 from __future__ import annotations
 
-import bpy
 import pytest
 from digiclay import translations
 
 pytestmark = pytest.mark.usefixtures("extension")
-
-
-def test_every_label_and_tooltip_has_a_translation() -> None:
-    texts = translations.collect_strings()
-    assert len(texts) > 200
-    assert sorted(text for text in texts if translations.translate(text, "de") is None) == []
 
 
 @pytest.mark.parametrize(
@@ -41,10 +34,3 @@ def test_a_label_is_found_among_operators_and_elsewhere() -> None:
 def test_a_brush_has_the_name_of_what_it_does_where_other_things_are_smooth() -> None:
     entries = translations.make_entries({"Smooth"}, "de")
     assert (entries["*", "Smooth"], entries["Brush", "Smooth"]) == ("Glatt", "Glätten")
-
-
-def test_every_brush_has_a_translation_among_brushes() -> None:
-    known = bpy.ops.digiclay.press.get_rna_type().properties["brush"]
-    entries = translations.make_entries(translations.collect_strings(), "de")
-    names = [known.name, *(item.name for item in known.enum_items)]
-    assert [name for name in names if (known.translation_context, name) not in entries] == []

@@ -36,7 +36,7 @@ ROOMS = {
 }
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}
-MAX_LINES = 300
+MAX_LINES = 500
 
 # Written in pieces, because this file is searched as well.
 HOSTS = tuple(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import io
 import json
 import re
@@ -22,7 +21,6 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.snapshot import START
 from digiclay.core.session.take import Take, from_bytes, to_bytes, to_scene
 
-ROOT = Path(__file__).parents[2]
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
 #: A thumb and a finger without relaxation.
 TWO = """
@@ -37,7 +35,6 @@ relaxation = "absent"
 interpolation = "linear"
 waypoints = [{ time = 0.0, position = [0.004, 0.0, 0.042] }, { time = 0.7, position = [0.004, 0.0, 0.038] }]
 """
-FILES = sorted((ROOT / "addon").rglob("*.py"))
 ONE = TWO[: TWO.rindex("[[finger]]")]
 
 
@@ -161,39 +158,3 @@ def test_a_take_from_rest_is_a_scene_with_its_path() -> None:
     system = assemble(made)
     (finger,) = to_scene(replace(take_of(made), start=snapshot.dump(system, begin(system))), "take").fingers
     assert [point.time for point in finger.trajectory.waypoints] == [0.0, pytest.approx(0.015)]
-
-
-def callers(path: Path, names: set[str]) -> set[str]:
-    """Return ``file: function`` for the functions of a file that call one of some others."""
-    found = set()
-    for outer in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(outer, ast.FunctionDef):
-            called = {
-                node.func.id
-                for node in ast.walk(outer)
-                if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-            }
-            if called & names:
-                found.add(f"{path.relative_to(ROOT / 'addon' / 'digiclay').as_posix()}: {outer.name}")
-    return found
-
-
-def test_the_places_where_there_is_one_finger_are_ten_at_most_and_named_in_the_docs() -> None:
-    places = set().union(*(callers(path, {"require_one", "wrap_one"}) for path in FILES))
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    part = page[page.index("### Fingers") :].split("\n#", 1)[0]
-    named = {f"{file}: {name}" for file, name in re.findall(r"\| `([\w/.]+)`: `(\w+)` \|", part)}
-    assert places == named
-    assert 0 < len(places) <= 10
-
-
-def test_no_module_takes_a_finger_by_its_number() -> None:
-    hits = [
-        f"{path.name}: {line.strip()}"
-        for path in FILES
-        for line in path.read_text(encoding="utf-8").splitlines()
-        if re.search(
-            r"fingers\[\d|trajectories\(\)\[|section\(\"(fingertip|contact|relaxation|trajectory)\"\)", line
-        )
-    ]
-    assert hits == []
