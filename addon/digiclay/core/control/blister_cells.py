@@ -110,7 +110,7 @@ class BlisterRule:
         limit = behind * cells.distance
         frozen: Flags = cells.ahead < limit
         froze = seen.mode == CODES[seen.mode.shape][2]
-        if np.any(uneven):
+        if uneven is not False and np.any(uneven):
             flat_radius = np.where(uneven, HELD, 1.0) * flat_radius
             froze &= (cells.ahead < FREED * limit) | ~np.asarray(uneven)
         frozen &= cells.distance > flat_radius

@@ -21,12 +21,13 @@ from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
 from .bernoulli_plan import BernoulliPlan, make_plan
-from .closed_form import solve_crossing, solve_pressed
+from .closed_form import LARGE, solve_crossing, solve_pressed
 from .near_overflow import LoadedPath, StepStart, find_loaded_path
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "StepWorkspace"]
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -162,8 +163,9 @@ class StepWorkspace:
             end = np.add(exponent, slip, self.end)
             bent = np.add(exponent, deviation, self.bent)
             self.deviation[:] = deviation
-            if any_true(guarded >= self.limits):
-                risen[:], end, mean[:] = self._move_near_overflow(s, exponent, deviation, idle)
+            beyond = guarded >= self.limits
+            if any_true(beyond) and any_true(self._find_near_overflow(s, beyond)):
+                risen[:], end, mean[:] = self._move_near_overflow(s, beyond, exponent, deviation, idle)
                 _tension(end, zero, most, last)
                 rise += height
             else:
@@ -203,13 +205,20 @@ class StepWorkspace:
         seen: Floats = apply_map(self.plan.path[row : row + 1], self.under)[0]
         return seen
 
+    def _find_near_overflow(self, s: int, beyond: Flags) -> Flags:
+        """Clear the cells (5, k[, b]) beyond the limits of step s that only a flow would take there."""
+        # Through a shut valve none turns turbulent: its pin is locked, at any load that does not overflow.
+        shut = ~self.opening[self.plan.nodes[s], : len(self.near)].any(axis=0)
+        beyond[:3] &= ~shut | (self.guarded[:3] >= 0.5 * LARGE)
+        return beyond
+
     def _move_near_overflow(
-        self, s: int, exponent: Floats, deviation: Floats, idle: NDArray[np.bool_]
+        self, s: int, beyond: Flags, exponent: Floats, deviation: Floats, idle: Flags
     ) -> LoadedPath:
-        """Return the paths over step s, some of whose cells `pressed` is not for."""
+        """Return the paths over step s, some of whose cells `solve_pressed` is not for."""
         plan, nodes, count = self.plan, self.plan.nodes[s], len(self.steps)
         # Their path bends with the load, not as it would without; or so much that its mean says nothing.
-        deviation[(self.guarded >= self.limits).any(axis=0)] = 0.0
+        deviation[beyond.any(axis=0)] = 0.0
         openings = self.opening[nodes, : len(self.near)]
         weights = per_row(plan.weights[nodes], openings.ndim) / plan.cell.actuator.area
         start = StepStart(
