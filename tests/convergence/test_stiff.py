@@ -163,7 +163,7 @@ def test_the_force_on_a_pin_behind_a_shut_valve_is_that_of_a_finer_step(state: s
 
 
 def forces_after(state: str, parts: int) -> NDArray[np.float64]:
-    """Return the forces (50, n) of the control periods behind a kept state, N, with a step in so many parts."""
+    """Return the forces (50, n) of the control periods behind a kept state, N."""
     path = SAMPLES / f"{state}.state"
     scene = load(path.with_suffix(".toml"))
     step = scene.simulation.physics_step / parts

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from digiclay.core.base.errors import ParameterError, SceneError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.interfaces import Sensors, Truth
 from digiclay.core.model.null_parts import PerfectSensors
-from digiclay.core.model.sensors import Delayed, Noisy, Quantized, Sensing, draw_normals
+from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_normals
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -99,6 +100,27 @@ def test_noise_of_a_cell_does_not_depend_on_which_others_are_read() -> None:
     np.testing.assert_array_equal(
         draw_normals(1, 9, some), np.array(draw_normals(1, 9, np.arange(CELLS)))[:, some]
     )
+
+
+@pytest.mark.parametrize("seed", [8, np.array([8, 3])])
+def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: Any) -> None:
+    shape = np.shape(seed)
+    drawn = NoiseAhead(seed)
+    for period, cells in [
+        (4, 9),
+        (4, 30),
+        (5, 9),
+        (19, 30),
+        (20, 30),
+        (3, 30),
+        (4, 30),
+        (4, 31),
+        (5, [2, 7]),
+        (5, 9),
+    ]:
+        numbers = np.arange(cells) if isinstance(cells, int) else np.array(cells)
+        numbers = np.broadcast_to(numbers.reshape(-1, *[1] * len(shape)), (len(numbers), *shape))
+        np.testing.assert_array_equal(drawn.draw(period, numbers), draw_normals(seed, period, numbers))
 
 
 def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,8 @@ SURE = 5.0
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
 WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
-WORD = 2**64
+#: Control periods whose noise is drawn at once.
+AHEAD = 16
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Sensing(Parameters):
                 raise ParameterError("Sensing", name, rule, f"{getattr(self, name):g} N")
 
 
-def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def draw_normals(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """Return two independent standard normal numbers a cell, a pure function of the arguments.
 
     A counter is hashed instead of drawing from a generator: what a cell reads does not depend
@@ -102,17 +104,18 @@ def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Float
     ----------
     seed : int or ndarray of int (b,)
         Not negative.
-    period : int
+    period : int or ndarray of int (t,)
         Not negative.
     cells : ndarray of int (m,) or (m, b)
 
     Returns
     -------
-    first, second : ndarray (m,) or (m, b)
+    first, second : ndarray ([t,] m[, b])
         By Box and Muller's method; no farther from 0 than 8.6.
     """
+    periods = np.asarray(period, np.uint64)
     start = _mix(np.array(seed, np.uint64, ndmin=1))
-    start = _mix(start + np.uint64(period % WORD))
+    start = _mix(start + periods.reshape(*periods.shape, *[1] * cells.ndim))
     counter = start + np.uint64(WEYL) * (2 * cells.astype(np.uint64))
     radius = np.sqrt(-2.0 * np.log(_draw_uniform(counter)))
     angle = 2.0 * np.pi * _draw_uniform(counter + np.uint64(WEYL))
@@ -131,6 +134,30 @@ def _draw_uniform(counter: Words) -> Floats:
     """Return numbers spread evenly in (0, 1), without both ends."""
     uniform: Floats = ((_mix(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
     return uniform
+
+
+class NoiseAhead:
+    """Normal numbers of the coming periods, drawn at once for the cells read last.
+
+    They depend on seed, period and cell alone, so that any leading part of the cells is served with them.
+
+    Parameters
+    ----------
+    seed : int or ndarray of int (b,)
+        Not negative.
+    """
+
+    def __init__(self, seed: Any) -> None:
+        self._seed, self._first = seed, 0
+        self._cells, self._drawn = np.empty(0, np.intp), np.empty((2, 0, 0))
+
+    def draw(self, period: int, cells: NDArray[np.intp]) -> Floats:
+        """Return `draw_normals` of a period, shape (2, m[, b])."""
+        late, count = period - self._first, len(cells)
+        if not 0 <= late < self._drawn.shape[1] or cells.tobytes() != self._cells[:count].tobytes():
+            self._first, self._cells, late = period, cells.copy(), 0
+            self._drawn = np.array(draw_normals(self._seed, period + np.arange(AHEAD), cells))
+        return self._drawn[:, late, :count]
 
 
 @dataclass(frozen=True)
@@ -158,12 +185,17 @@ class Noisy:
     def measure(self, own: Floats, truth: Truth) -> tuple[Floats, Floats]:
         """Return forces and heights with noise; a force may read below 0."""
         force, height = self.inner.measure(own, truth)
-        first, second = draw_normals(self.seed, truth.period, truth.cells)
+        first, second = self._ahead.draw(truth.period, truth.cells)
         return force + self.force * first, height + self.height * second
 
     def update(self, own: Floats, truth: Truth) -> None:
         """Nothing of its own to remember."""
         self.inner.update(own, truth)
+
+    @cached_property
+    def _ahead(self) -> NoiseAhead:
+        """Numbers drawn ahead; keeping them changes no reading."""
+        return NoiseAhead(self.seed)
 
 
 @dataclass(frozen=True)
