@@ -34,7 +34,7 @@ class Batch(System):
 
 def begin(batch: Batch) -> State:
     """Return the state before the sessions."""
-    memory = [system.controller.begin() if system.controller else None for system in batch.systems]
+    memory = [system.controller.begin() for system in batch.systems]
     heights = list_numbers([system.cell.actuator.rest_height for system in batch.systems])
     return make_initial_state(batch.rows, batch.grid.count, heights, memory)
 

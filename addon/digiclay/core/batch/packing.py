@@ -125,10 +125,8 @@ def make_batch(systems: Sequence[System]) -> Batch:
     return Batch(
         grid=first.grid,
         cell=cell,
-        sensors=merge_parts([system.sensors for system in systems]) if first.sensors else None,
-        controller=join_controllers([system.controller for system in systems], by_set=first.by_set)
-        if first.controller
-        else None,
+        sensors=merge_parts([system.sensors for system in systems]),
+        controller=join_controllers([system.controller for system in systems], by_set=first.by_set),
         stepper=stepper,
         plan=plan,
         period=period,

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..control.runs import BatchControl
 from ..model.control_interface import Commands, Controller, Measurement
+from ..model.null_parts import Uncontrolled
 from .broadcasting import merge_parts
 
 __all__ = ["RunByRun", "join_controllers"]
@@ -62,11 +63,12 @@ def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any
     by_set : bool
         See `System.by_set`.
     """
-    if isinstance(controllers[0], BatchControl) and not by_set:
+    first = controllers[0]
+    if isinstance(first, BatchControl) and not by_set:
         merged = merge_parts(controllers)
         parts = {part.name: getattr(merged, part.name) for part in fields(merged)}
         return merged.batch_class(**parts | {"runs": tuple(controllers)})
-    return RunByRun(tuple(controllers))
+    return first if isinstance(first, Uncontrolled) else RunByRun(tuple(controllers))
 
 
 def _take_run(seen: Measurement, run: int) -> Measurement:

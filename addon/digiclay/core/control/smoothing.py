@@ -25,6 +25,7 @@ from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
 from ..model.layout import Disc, Grid, enclose_discs
+from ..model.null_parts import Uncontrolled
 from ..model.physics import Cell
 from .drive import Drive, DriveParameters, make_drive
 from .exchange import Exchange, make_exchange
@@ -54,7 +55,7 @@ class SmoothingControl:
 
     Attributes
     ----------
-    method : Controller or None
+    method : Controller
     drive : Drive
         Of the pins that are smoothed.
     exchange : Exchange
@@ -69,7 +70,7 @@ class SmoothingControl:
         From 0 to 1.
     """
 
-    method: Controller | None
+    method: Controller
     drive: Drive
     exchange: Exchange
     actuator: Actuator
@@ -80,32 +81,29 @@ class SmoothingControl:
     @property
     def name(self) -> str:
         """The method's name."""
-        return self.method.name if self.method else "smoothing"
+        return self.method.name
 
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
-        return self.method.rows if self.method else 0
+        return self.method.rows
 
     def begin(self) -> Any:
         """Return the memory before a session."""
-        return self.method.begin() if self.method else None
+        return self.method.begin()
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
         """Request the disc and the neighbors of its cells, and the method's disc; see `Controller`."""
-        if self.method is None:
-            return memory, self.reach
         memory, disc = self.method.locate(memory, touched)
         return memory, self.reach if disc is None else enclose_discs(disc, self.reach)
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Smooth, and drive the pins there; the method commands all others. See `Controller`."""
         moved = seen.mode == Mode.BLISTER
-        if self.method:
-            memory, orders = self.method.command(memory, seen)
-        else:
-            still = np.where(moved, np.int8(Mode.HOLD), seen.mode)
-            orders = Commands(seen.target, still, np.zeros(seen.height.size))
+        memory, orders = self.method.command(memory, seen)
+        if isinstance(self.method, Uncontrolled):
+            # What has arrived holds: no method takes it over.
+            orders = orders._replace(mode=np.where(moved, np.int8(Mode.HOLD), seen.mode))
         weight = self._weigh(seen)
         # What the method moves itself, as part of its blister, is not on its way from a disc.
         own = (weight > 0.0) | (moved & (orders.mode <= Mode.HOLD))
@@ -140,13 +138,13 @@ class SmoothingControl:
 
 
 def order_periods(
-    method: Controller | None, grid: Grid, cell: Cell, period: float, orders: Floats
-) -> Iterator[Controller | None]:
+    method: Controller, grid: Grid, cell: Cell, period: float, orders: Floats
+) -> Iterator[Controller]:
     """Yield the controller of each control period: the method itself where nothing is ordered.
 
     Parameters
     ----------
-    method : Controller or None
+    method : Controller
     grid : Grid
     cell : Cell
     period : float

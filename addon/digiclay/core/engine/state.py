@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.modes import Mode
+from ..model.control_interface import Commands, Measurement
+from ..model.interfaces import Movement
 
-__all__ = ["ActiveSet", "CellGroup", "Rows", "State", "make_initial_state"]
+__all__ = ["ActiveSet", "Rows", "State", "make_initial_state"]
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -124,27 +127,27 @@ class ActiveSet:
     # Parts of the block, all of them views. Each is made once: a set lives for many periods.
 
     @cached_property
-    def all(self) -> CellGroup:
+    def all(self) -> Measurement:
         """All cells."""
         return self._part(len(self.cells), [len(one.cells) for one in self.own])
 
     @cached_property
-    def touched(self) -> CellGroup:
+    def touched(self) -> Measurement:
         """The cells the finger may touch."""
         return self._part(self.near, [one.near for one in self.own])
 
-    def _part(self, count: int, present: list[int]) -> CellGroup:
+    def _part(self, count: int, present: list[int]) -> Measurement:
         """Return the rows of the first `count` cells; the first `present` of them are the runs' own."""
         rows, block = self.rows, self.block[:, :count]
-        return CellGroup(
-            self.cells[:count],
+        return Measurement(
             self.quadratic_basis[:, :count],
-            self.mode[:count],
             block[0],
-            block[rows.command],
-            block[rows.target],
             block[rows.force],
+            block[rows.target],
+            self.mode[:count],
             block[rows.controlled],
+            self.cells[:count],
+            block[rows.command],
             block[rows.sensed],
             tuple(present),
         )
@@ -155,14 +158,26 @@ class ActiveSet:
         return self.block[self.rows.driven]
 
     @cached_property
-    def ready(self) -> dict[Any, Any]:
-        """What a simulation works with on just these cells, by the stepper's plan; made when first needed."""
+    def movements(self) -> dict[Any, Movement]:
+        """Steppers prepared for these cells, by their plans."""
         return {}
 
     @cached_property
     def queue(self) -> tuple[Floats, ...]:
         """The commands on their way, oldest first."""
         return tuple(self.block[self.rows.commands])
+
+    def queue_commands(self, newest: Floats) -> None:
+        """Put valve commands (m,) or (m, b), 1, behind those on their way, in place."""
+        for older, newer in pairwise(self.queue):
+            older[:] = newer
+        self.queue[-1][:] = newest
+
+    def follow(self, orders: Commands) -> None:
+        """Take over targets, modes and valve commands, in place."""
+        self.all.target[:] = orders.target
+        self.all.mode[:] = orders.mode
+        self.queue_commands(orders.command)
 
     @cached_property
     def flat(self) -> Cells:
@@ -176,21 +191,6 @@ class ActiveSet:
     def numbers(self) -> Floats:
         """All numbers of the block in a row."""
         return self.block.reshape(-1)
-
-
-class CellGroup(NamedTuple):
-    """Rows of the first active cells, as `Rows` and `ActiveSet` define them."""
-
-    cells: Cells
-    quadratic_basis: Floats
-    mode: NDArray[np.int8]
-    height: Floats
-    command: Floats
-    target: Floats
-    force: Floats
-    controlled: Floats
-    sensed: Floats
-    present: tuple[int, ...]
 
 
 class State(NamedTuple):
@@ -221,6 +221,10 @@ class State(NamedTuple):
     peak: Any
     active: ActiveSet
     memory: Any
+
+    def end_period(self, memory: Any) -> State:
+        """Return the state one control period later, with the controller's memory."""
+        return State(self.period + 1, self.rows, self.modes, self.aged, self.peak, self.active, memory)
 
     def row(self, index: int) -> Floats:
         """Return one row of all cells, shape (n,) or (n, b), as a new array; `Rows` names them."""

@@ -14,7 +14,7 @@ from ..model.interfaces import Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
 from .active_set import Selection
-from .state import Rows
+from .state import ActiveSet, Rows
 
 __all__ = ["System", "make_segments"]
 
@@ -29,10 +29,8 @@ class System:
     ----------
     grid : Grid
     cell : Cell
-    sensors : Sensors or None
-        None: the controller knows all there is.
-    controller : Controller or None
-        None: every valve stays shut.
+    sensors : Sensors
+    controller : Controller
     stepper : Stepper
     plan : object
         What the stepper works out once for all periods.
@@ -52,8 +50,8 @@ class System:
 
     grid: Grid
     cell: Cell
-    sensors: Sensors | None
-    controller: Controller | None
+    sensors: Sensors
+    controller: Controller
     stepper: Stepper
     plan: Any
     period: Any
@@ -62,6 +60,21 @@ class System:
     instants: Floats
     rows: Rows
     by_set: bool
+
+    def move(self, active: ActiveSet, finger: Any) -> None:
+        """Move active cells through a control period under their queued commands, in place."""
+        movement = active.movements.get(self.plan)
+        if movement is None:
+            movement = self.stepper.prepare(self.plan, active.driven, active.near)
+            active.movements[self.plan] = movement
+        active.touched.force[:] = movement(self._trace_underside(active, finger))
+
+    def _trace_underside(self, active: ActiveSet, finger: Any) -> Floats:
+        """Return the fingertip's underside over the near cells at `instants`, (p, k[, b]), m."""
+        if finger is None or not active.near:
+            return np.empty((self.instants.size, 0, *active.cells.shape[1:]))
+        under: Floats = finger.under(active.touched.quadratic_basis)
+        return under
 
 
 def make_segments(

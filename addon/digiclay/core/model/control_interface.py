@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 __all__ = ["Commands", "Controller", "Measurement"]
 
 Floats = NDArray[np.float64]
+NONE: Floats = np.empty(0)
 
 
 class Measurement(NamedTuple):
@@ -28,6 +29,10 @@ class Measurement(NamedTuple):
         What the controller remembers of each cell; brought up to date in place.
     cells : ndarray of int (m,)
         Their numbers in the bed.
+    command : ndarray (m,)
+        Valve command of the period before, 1.
+    sensed : ndarray (rows, m)
+        What the sensors remember of each cell.
     present : tuple of int
         In a batch how many of the cells, the first, take part in each run; empty: all do.
     """
@@ -39,6 +44,8 @@ class Measurement(NamedTuple):
     mode: NDArray[np.int8]
     own: Floats
     cells: NDArray[np.intp]
+    command: Floats = NONE
+    sensed: Floats = NONE
     present: tuple[int, ...] = ()
 
 

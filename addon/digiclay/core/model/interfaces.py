@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .control_interface import Measurement
 from .delay import Queue
 
 __all__ = [
@@ -178,14 +179,17 @@ class Sensors(Protocol):
         ...
 
     def update(self, own: Floats, truth: Truth) -> None:
-        """Bring `own` up to date, in place, with what there is at the end of a period.
-
-        Parameters
-        ----------
-        own : ndarray (rows, m)
-        truth : Truth
-        """
+        """Bring `own`, (rows, m), up to date, in place, with what there is at the end of a period."""
         ...
+
+    def read(self, seen: Measurement, period: int) -> Measurement:
+        """Return cells, as they are after so many control periods, with measured forces and heights."""
+        force, height = self.measure(seen.sensed, find_truth(seen, period))
+        return seen._replace(force=force, height=height)
+
+    def note(self, seen: Measurement, period: int) -> None:
+        """Bring the sensors' rows of cells up to date, in place."""
+        self.update(seen.sensed, find_truth(seen, period))
 
 
 class Truth(NamedTuple):
@@ -207,6 +211,11 @@ class Truth(NamedTuple):
     force: Floats
     height: Floats
     command: Floats
+
+
+def find_truth(seen: Measurement, period: int) -> Truth:
+    """Return what there is to be measured of some cells."""
+    return Truth(seen.cells, period, seen.force, seen.height, seen.command)
 
 
 class Stepper(Protocol):

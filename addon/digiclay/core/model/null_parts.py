@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .control_interface import Commands, Measurement
 from .delay import Queue
-from .interfaces import Truth
+from .interfaces import Sensors, Truth
 
-__all__ = ["InstantValve", "PerfectSensors", "Unrelaxed"]
+__all__ = ["InstantValve", "PerfectSensors", "Uncontrolled", "Unrelaxed"]
 
 Floats = NDArray[np.float64]
 
@@ -88,7 +90,7 @@ class Unrelaxed:
 
 
 @dataclass(frozen=True)
-class PerfectSensors:
+class PerfectSensors(Sensors):
     """No sensor model: measured forces and heights are the true ones."""
 
     rows = 0
@@ -99,3 +101,28 @@ class PerfectSensors:
 
     def update(self, own: Floats, truth: Truth) -> None:
         """Nothing to remember."""
+
+    def read(self, seen: Measurement, period: int) -> Measurement:
+        """Return the cells as they are."""
+        return seen
+
+    def note(self, seen: Measurement, period: int) -> None:
+        """Nothing to remember."""
+
+
+class Uncontrolled:
+    """No control method: every valve stays shut."""
+
+    name = "none"
+    rows = 0
+
+    def begin(self) -> None:
+        """Nothing to remember."""
+
+    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
+        """Control no disc."""
+        return memory, None
+
+    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+        """Leave targets and modes, and shut the valves."""
+        return memory, Commands(seen.target, seen.mode, np.zeros(seen.target.shape))

@@ -28,7 +28,7 @@ ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class ValveObserver:
+class ValveObserver(Sensors):
     """Force observer from the law of the valve.
 
     In a control period a pin moves by ``A ΔH = ∫ α(K) (P_s(K) - F/A) dt``, where α is the

@@ -161,7 +161,7 @@ class NoiseAhead:
 
 
 @dataclass(frozen=True)
-class Noisy:
+class Noisy(Sensors):
     """Normal noise, white from cell to cell and from period to period.
 
     Attributes
@@ -199,7 +199,7 @@ class Noisy:
 
 
 @dataclass(frozen=True)
-class Quantized:
+class Quantized(Sensors):
     """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing.
 
     Attributes
@@ -237,7 +237,7 @@ def _round_to_step(values: Floats, step: Any) -> Floats:
 
 
 @dataclass(frozen=True)
-class Delayed:
+class Delayed(Sensors):
     """Readings that arrive some whole control periods late; before the first arrives, those of the start.
 
     A cell that takes no part is not read, and does not change: its readings of that time are

@@ -79,7 +79,7 @@ def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
     return _count_rows(motion, *_make_control(scene, bed, motion))
 
 
-def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller | None, Sensors | None]:
+def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors]:
     """Build the control method and the sensors."""
     return (
         _make_controller(scene, bed, motion.cell),
@@ -87,10 +87,9 @@ def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller |
     )
 
 
-def _count_rows(motion: Motion, controller: Controller | None, sensors: Sensors | None) -> Rows:
+def _count_rows(motion: Motion, controller: Controller, sensors: Sensors) -> Rows:
     """Return the rows of each part's memory."""
-    own = controller.rows if controller else 0, sensors.rows if sensors else 0
-    return Rows(motion.cell.rows, motion.line.length, *own)
+    return Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
 
 
 def assemble(scene: Scene) -> System:
@@ -166,15 +165,16 @@ def _make_pulp(finger: Finger) -> Pulp:
     return Unrelaxed()
 
 
-def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
+def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     """Return the sensor chain of a scene."""
-    known = scene.sensors
-    if known is None:
-        return None
     from ..model.null_parts import PerfectSensors
-    from ..model.sensors import Delayed, Noisy, Quantized
 
     sensors: Sensors = PerfectSensors()
+    known = scene.sensors
+    if known is None:
+        return sensors
+    from ..model.sensors import Delayed, Noisy, Quantized
+
     if known.noisy:
         sensors = Noisy(sensors, known.force_noise, known.height_noise, known.seed)
     if known.force_step or known.height_step:
@@ -189,10 +189,12 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors | None:
     return sensors
 
 
-def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
-    """Return the control method, before it the display of a shape; or None: every valve stays shut."""
+def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller:
+    """Return the control method, before it the display of a shape."""
     if scene.control is None and scene.shape is None:
-        return None
+        from ..model.null_parts import Uncontrolled
+
+        return Uncontrolled()
     from ..control.device_info import DeviceInfo
 
     known = scene.sensors
@@ -211,4 +213,5 @@ def _make_controller(scene: Scene, bed: Grid, cell: Cell) -> Controller | None:
 
         recovers = find_method(scene.method).recovers
         controller = make_handover(scene.shape, device, controller, recovers=recovers)
+    assert controller is not None
     return controller

@@ -118,7 +118,7 @@ def load(system: System, data: bytes) -> State:
     _check_same("control period", header["control_period"], system.period)
     _check_same("number of fingers", len(header["gathered"]["fingers"]), 1)
     _check_limits(system, kept)
-    template = system.controller.begin() if system.controller else None
+    template = system.controller.begin()
     gathered = header["gathered"]
     cells = kept.arrays["cells"].astype(np.intp)
     held = ActiveSet(
