@@ -11,6 +11,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
+from digiclay.core.model.interfaces import Sensors
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import SAMPLES, find, load
 from digiclay.core.scene.schema import Scene
@@ -191,7 +192,7 @@ def test_a_pin_that_is_not_pushed_stays_at_rest_while_it_listens() -> None:
 
 def test_push_pull_runs_alike_whatever_the_force_sensors_say() -> None:
     @dataclass(frozen=True)
-    class Blind:
+    class Blind(Sensors):
         rows = 0
 
         def measure(self, own: Any, truth: Any) -> Any:
