@@ -9,7 +9,7 @@ from digiclay.core.model.finger_range import (
     MOST_FORCE,
     MOST_INDENTATION,
     describe_excess,
-    find_largest_indentation,
+    find_indentations,
 )
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
@@ -68,7 +68,7 @@ def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
     # Beyond the rim of a finger that is lifted: no force, whatever the heights.
     assert shallow.history is not None
     free = {**shallow.history, "force": np.zeros_like(shallow.history["force"])}
-    assert find_largest_indentation(Fingertip(), free) == 0.0
+    assert find_indentations(Fingertip(), free).max() == 0.0
 
 
 @pytest.mark.parametrize(
