@@ -140,7 +140,7 @@ def _limit_way(start: Floats, goal: Floats, most: float) -> Floats:
     """Return the pose (7,) on the way to another at which no point of the fingertip has gone farther, m."""
     turn = 2.0 * math.acos(min(1.0, abs(float(start[3:] @ goal[3:]))))
     way = math.dist(start[:3], goal[:3]) + ARM * turn
-    if way <= most:
+    if way <= most * (1.0 + 1e-9):  # rounding
         return goal
     return interpolate_poses(np.array([[start], [goal]]), np.array([most / way]))[0, 0, 0]
 

@@ -5,25 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
-from digiclay.core.model.finger_range import (
-    MOST_FORCE,
-    MOST_INDENTATION,
-    describe_excess,
-    find_indentations,
-)
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
+from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
+from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import Result, run
 from digiclay.overlay.sections import force_message
 
 from tests.assemble import sample, under
 
 
-def pressed(depth: float, **parts: object) -> Result:
-    """Return a run whose finger comes down to `depth` below the tops within 0.1 s, m."""
+def pressed(depth: float, tilt: float = 0.0, **parts: object) -> Result:
+    """Return a run whose finger comes down to `depth` below the tops within 0.1 s, m, tilted, rad."""
     points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
-    way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z)) for time, z in points))
+    turn = (np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)
+    way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z), turn) for time, z in points))
     known: Scene = sample("tap", "simulation.duration=0.15")
     return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
 
@@ -52,16 +53,25 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line(through
     assert through.summary().endswith(f"; {said}")
 
 
-def test_the_indentation_is_that_of_the_pin_that_stands_deepest(shallow: Result) -> None:
-    history = shallow.history
-    assert history is not None
-    outline = Fingertip().outline(history["fingertip"])
-    depth = history["height"] - under(outline, *history["position"].T)
-    expected = depth[history["force"] > 0.0].max()
-    assert shallow.metrics["max_indentation"] == pytest.approx(expected, rel=1e-12)
-    assert shallow.metrics["units"]["max_indentation"] == "m"
-    # Under the middle of the finger stands a pin, and no valve is open.
-    assert expected == pytest.approx(1.5e-3, rel=1e-9)
+@pytest.mark.parametrize(
+    ("depth", "tilt", "stiffness"),
+    [(1.5e-3, 0.0, 250.0), (3.5e-3, 0.0, 250.0), (3.5e-3, 0.0, 0.01), (4e-3, 0.6, 0.01), (2.9e-3, 0.6, 0.01)],
+    ids=["within", "force and depth", "depth alone", "depth of a tilted finger", "a tilted finger within"],
+)
+def test_rows_and_live_states_beyond_the_law_are_marked(depth: float, tilt: float, stiffness: float) -> None:
+    result = pressed(depth, tilt, contact=Contact(stiffness=stiffness))
+    history, system = result.history, assemble(result.scene)
+    unders = under(Fingertip().outline(history["fingertip"]), *history["position"].T)
+    depths = (history["height"] - unders).max(axis=1, where=history["force"] > 0.0, initial=0.0)
+    assert result.metrics["max_indentation"] == pytest.approx(depths.max(), rel=1e-12)
+    # Under the lowest point of the finger stands a pin, and no valve is open.
+    assert (depths.max(), result.metrics["units"]["max_indentation"]) == (pytest.approx(depth, rel=1e-9), "m")
+    wanted = (history["total_force"] > MOST_FORCE) | (depths > MOST_INDENTATION)
+    assert wanted.any() == (depth > MOST_INDENTATION) == ("beyond_a_finger" in history)
+    np.testing.assert_array_equal(history.get("beyond_a_finger", wanted), wanted)
+    states = simulate_path(system, begin(system), history["fingertip"][:, None])
+    live = [exceeds_law(system, *one) for one in zip(states, history["fingertip"][1:], strict=True)]
+    assert live == wanted[1:].tolist()
 
 
 def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
@@ -89,6 +99,7 @@ def test_the_overlay_says_when_no_finger_presses_so_hard() -> None:
     assert [force_message(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
         "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
     ]  # fmt: skip
+    assert force_message(0.7, beyond=True) == "0.70 N: beyond 3 mm"
 
 
 def test_errors_are_estimates_wherever_a_batch_names_them() -> None:
