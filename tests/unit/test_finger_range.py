@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
 from digiclay.core.engine.simulation import begin
+from digiclay.core.model import finger_range
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
 from digiclay.core.model.fingertip import Fingertip
@@ -20,11 +21,11 @@ from digiclay.overlay.sections import force_message
 from tests.assemble import sample, under
 
 
-def pressed(depth: float, tilt: float = 0.0, **parts: object) -> Result:
-    """Return a run whose finger comes down to `depth` below the tops within 0.1 s, m, tilted, rad."""
+def pressed(depth: float, tilt: float = 0.0, x: float = 0.0, **parts: object) -> Result:
+    """Return a run whose finger, tilted, rad, comes down at x to `depth` below the tops within 0.1 s, m."""
     points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
     turn = (np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)
-    way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z), turn) for time, z in points))
+    way = Path("linear", tuple(Waypoint(time, (x, 0.0, z), turn) for time, z in points))
     known: Scene = sample("tap", "simulation.duration=0.15")
     return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
 
@@ -54,18 +55,25 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line(through
 
 
 @pytest.mark.parametrize(
-    ("depth", "tilt", "stiffness"),
-    [(1.5e-3, 0.0, 250.0), (3.5e-3, 0.0, 250.0), (3.5e-3, 0.0, 0.01), (4e-3, 0.6, 0.01), (2.9e-3, 0.6, 0.01)],
-    ids=["within", "force and depth", "depth alone", "depth of a tilted finger", "a tilted finger within"],
-)
-def test_rows_and_live_states_beyond_the_law_are_marked(depth: float, tilt: float, stiffness: float) -> None:
-    result = pressed(depth, tilt, contact=Contact(stiffness=stiffness))
+    ("depth", "tilt", "x", "stiffness"),
+    [
+        (1.5e-3, 0, 0, 250), (3.5e-3, 0, 0, 250),
+        # By depth alone: above a pin, between pins, and tilted.
+        (3.5e-3, 0, 0, 0.01), (3.2e-3, 0, 1.5e-3, 0.01), (2.9e-3, 0.6, 0, 0.01), (4e-3, 0.6, 0, 0.01),
+    ],
+)  # fmt: skip
+def test_rows_and_live_states_beyond_the_law_are_marked(
+    depth: float, tilt: float, x: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(finger_range, "ROWS", 1)
+    result = pressed(depth, tilt, x, contact=Contact(stiffness=stiffness))
     history, system = result.history, assemble(result.scene)
     unders = under(Fingertip().outline(history["fingertip"]), *history["position"].T)
     depths = (history["height"] - unders).max(axis=1, where=history["force"] > 0.0, initial=0.0)
-    assert result.metrics["max_indentation"] == pytest.approx(depths.max(), rel=1e-12)
-    # Under the lowest point of the finger stands a pin, and no valve is open.
-    assert (depths.max(), result.metrics["units"]["max_indentation"]) == (pytest.approx(depth, rel=1e-9), "m")
+    told = result.metrics["max_indentation"], result.metrics["units"]["max_indentation"]
+    assert told == (pytest.approx(depths.max(), rel=1e-12), "m")
+    # No valve is open, and the underside is an ellipse of 10 and 8 mm.
+    assert depths.max() == pytest.approx(depth - 8e-3 * (1.0 - np.sqrt(1.0 - (x / 10e-3) ** 2)), rel=1e-9)
     wanted = (history["total_force"] > MOST_FORCE) | (depths > MOST_INDENTATION)
     assert wanted.any() == (depth > MOST_INDENTATION) == ("beyond_a_finger" in history)
     np.testing.assert_array_equal(history.get("beyond_a_finger", wanted), wanted)

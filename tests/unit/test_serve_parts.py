@@ -99,7 +99,6 @@ def test_the_session_follows_a_pose_and_tells_its_number() -> None:
 @pytest.mark.parametrize(
     ("most", "height", "flags"),
     [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)],
-    ids=["a press", "a jump of 10 mm", "a ceiling of its own", "a ceiling within the law"],
 )
 def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
     session, seen = begin_session(SCENE, replace(LIMITS, force=most)), 0

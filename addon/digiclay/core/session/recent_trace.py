@@ -117,10 +117,12 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
     force, felt = near.force.sum(), near.force > 0.0
     if force > MOST_FORCE:
         return True
-    # The fingertip is within the ball of its largest radius of curvature that touches it at the lowest point.
-    x, y, z = pose[:3].tolist()
-    aside = (near.quadratic_basis[1] - x) ** 2 + (near.quadratic_basis[2] - y) ** 2
-    if not (near.height - aside / (2.0 * fingertip.flattest) > z + MOST_INDENTATION)[felt].any():
+    # Two bounds that cost little: the fingertip is above its lowest point, and within a ball that touches it.
+    depth = near.height[felt] - pose[2]
+    if depth.max(initial=0.0) > MOST_INDENTATION:
+        aside = near.quadratic_basis[1:3, felt].T - pose[:2]
+        depth -= (aside**2).sum(axis=1) / (2.0 * fingertip.flattest)
+    if depth.max(initial=0.0) <= MOST_INDENTATION:
         return False
     row = {"height": near.height[None], "force": near.force[None], "fingertip": pose[None]}
     row["position"] = system.grid.positions[near.cells]
