@@ -72,8 +72,7 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: Frame) -> None:
     said = json.loads(format_frame(frame))
     datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
     told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
-    assert list(told) == ["flags", "state", "heights", "forces"]
-    assert told["flags"] == [2**40, frame.flags] == [2**40, read.flags]
+    assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
     assert said["flags"] == [flag.name.lower() for flag in Flag if frame.flags & flag]
     state = told["state"]
     for found in (

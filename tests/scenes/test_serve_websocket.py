@@ -219,8 +219,7 @@ def test_a_thousand_silent_connections_shut_out_nobody_with_the_token(server: Se
         try:
             client.send(pack_pose(Pose(PRESS, 20)))
             frame_after(client, 20)
-            # All but the newest 512 are cut.
-            while server.count("connections beyond the limit") < 488:
+            while server.count("connections beyond the limit") < 488:  # all but the newest 512 are cut
                 frame_after(client, 20)
         finally:
             for one in silent:
