@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from digiclay.core.engine.system import System
 from digiclay.core.scene.schema import Scene
 
+from .protocol import LIMITS, Limits
+
 __all__ = ["Bed", "describe_bed"]
 
 #: Most pins whose positions are told: libraries refuse messages of a megabyte.
@@ -28,6 +30,8 @@ class Bed:
         Control period, s.
     positions : tuple of (float, float)
         Of the pins, m; none of a bed of more than 10,000.
+    most_force, most_speed : float
+        Largest total force handed out, N, and largest speed of the fingertip, m/s.
     """
 
     name: str
@@ -37,20 +41,15 @@ class Bed:
     stroke: float
     period: float
     positions: tuple[tuple[float, float], ...]
+    most_force: float = LIMITS.force
+    most_speed: float = LIMITS.speed
 
 
-def describe_bed(scene: Scene, system: System) -> Bed:
-    """Return what clients are told of a bed.
-
-    Parameters
-    ----------
-    scene : Scene
-    system : System
-        Of the scene.
-    """
+def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
+    """Return what clients are told of the bed of a scene."""
     layout, grid = scene.layout, system.grid
     told = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
     return Bed(
         scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
-        tuple((float(x), float(y)) for x, y in told),
+        tuple((float(x), float(y)) for x, y in told), limits.force, limits.speed,
     )  # fmt: skip

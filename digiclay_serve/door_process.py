@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import os
 import sys
 from contextlib import suppress
@@ -37,10 +38,9 @@ def main() -> None:
     _allow_many_files()
     settings = json.loads(_read_exactly(int.from_bytes(_read_exactly(LENGTH), "little")))
     try:
-        told = asyncio.run(_serve(settings))
+        asyncio.run(_serve(settings))
     except DigiclayError as error:
-        told = {"error": str(error)}
-    _tell(told)
+        _tell({"error": str(error)})
 
 
 def _allow_many_files() -> None:
@@ -70,10 +70,23 @@ def _tell(value: dict[str, Any]) -> None:
         sys.stdout.flush()
 
 
-async def _serve(settings: dict[str, Any]) -> dict[str, Any]:
-    """Open the doors and serve; return the counts."""
+class _ErrorCount(logging.Handler):
+    """Counts errors of the libraries; nothing is printed, since clients could print without end."""
+
+    def __init__(self, link: DoorLink) -> None:
+        super().__init__(logging.ERROR)
+        self._link = link
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Count an error."""
+        self._link.counts[f"errors of {record.name}"] += 1
+
+
+async def _serve(settings: dict[str, Any]) -> None:
+    """Open the doors and serve; tell the addresses, and the counts in the end."""
     orders, frames = (open_slot(Path(name)) for name in settings["slots"])
     link = DoorLink(Bed(**settings["bed"]), orders, frames, settings["token"])
+    logging.getLogger().addHandler(_ErrorCount(link))
     host = settings["host"]
     ended = asyncio.Event()
     asyncio.get_running_loop().add_reader(0, _take_wake, link, ended)
@@ -88,11 +101,11 @@ async def _serve(settings: dict[str, Any]) -> dict[str, Any]:
     counts: dict[str, Any] = dict(link.counts)
     if display is not None:
         counts["display"] = display.close()
+    _tell({"counts": counts})  # before clients that take their time to close
     osc.close()
     server.close()
     with suppress(asyncio.TimeoutError):
         await asyncio.wait_for(server.wait_closed(), 3.0)
-    return {"counts": counts}
 
 
 async def _opened(opening: Any, host: str, port: int) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import subprocess
 import sys
 from contextlib import AbstractContextManager, suppress
@@ -22,8 +23,8 @@ __all__ = ["LENGTH", "DoorSettings", "Doors"]
 
 #: Bytes of the length in front of the settings.
 LENGTH = 8
-#: Time for the process to say how many clients and errors there were, s.
-ENDING = 10.0
+#: Time for the process to open the doors; to tell its counts, and then to end; to heed a signal, s.
+OPENING, ENDING, HEEDING = 60.0, 4.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,9 @@ class Doors(AbstractContextManager["Doors"]):
         with suppress(BrokenPipeError):  # its answer says why
             self._process.stdin.write(len(said).to_bytes(LENGTH, "little") + said)
             self._process.stdin.flush()
-        answer = self._read_line()
+        answer = self._read_line(OPENING)
         if "port" not in answer:
-            self._end()
+            self._end(HEEDING)
             raise OutputError(answer.get("error", "The process of the doors has ended: see above."))
         self.port, self.osc_port = int(answer["port"]), int(answer["osc_port"])
         self._wake = self._process.stdin.fileno()
@@ -126,30 +127,33 @@ class Doors(AbstractContextManager["Doors"]):
 
     def close(self) -> dict[str, Any]:
         """Close the doors, and return what they have counted."""
-        counts: dict[str, Any] = {}
-        if self._process.poll() is None and self._process.stdin and not self._process.stdin.closed:
-            self._process.stdin.close()
-            counts = self._read_line().get("counts", {})
-        self._end()
-        return counts
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        answer = self._read_line(ENDING)
+        # A process that has not answered is stopped, or hangs.
+        self._end(ENDING if answer else 0.0)
+        return dict(answer.get("counts", {"doors that did not answer": 1}))
 
     def __exit__(self, *raised: object) -> None:
-        self._end()
+        self._end(HEEDING)
 
-    def _read_line(self) -> dict[str, Any]:
-        """Read a line of JSON; an empty answer when there is none."""
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+    def _read_line(self, patience: float) -> dict[str, Any]:
+        """Read a line of JSON; an empty answer when there is none in time, s."""
+        stdout = self._process.stdout
+        assert stdout is not None
+        line = stdout.readline() if select.select([stdout], [], [], patience)[0] else b""
         return dict(json.loads(line)) if line else {}
 
-    def _end(self) -> None:
-        """Have the process end."""
+    def _end(self, patience: float) -> None:
+        """Have the process end, by itself within a time, s, or by signals."""
         for stream in (self._process.stdin, self._process.stdout):
             if stream:
                 with suppress(OSError):
                     stream.close()
-        try:
-            self._process.wait(ENDING)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        for insist in (self._process.terminate, self._process.kill):
+            try:
+                self._process.wait(patience)
+            except subprocess.TimeoutExpired:
+                insist()
+                patience = HEEDING
+        self._process.wait()

@@ -86,19 +86,16 @@ def _read_request(address: str, rest: list[object]) -> Pose | Reset | Subscripti
 
 
 def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
-    """Write the datagrams of a frame.
-
-    Parameters
-    ----------
-    frame : Frame
-    part : {"state", "pins"}
-    """
+    """Write the datagrams of a frame, of a part of `PARTS`: its flags come first."""
+    flags = OscMessageBuilder("/digiclay/flags")
+    flags.add_arg(frame.period, OscMessageBuilder.ARG_TYPE_INT64)
+    flags.add_arg(frame.flags, OscMessageBuilder.ARG_TYPE_INT)
     state = OscMessageBuilder("/digiclay/state")
     state.add_arg(frame.period, OscMessageBuilder.ARG_TYPE_INT64)
     state.add_arg(frame.number, OscMessageBuilder.ARG_TYPE_INT64)
     for value in (frame.time, frame.total_force, *frame.pose.tolist()):
         state.add_arg(value, OscMessageBuilder.ARG_TYPE_DOUBLE)
-    made = [state.build().dgram]
+    made = [flags.build().dgram, state.build().dgram]
     if part == "pins" and len(frame.heights) <= MOST_PINS:
         for name, values in (("heights", frame.heights), ("forces", frame.forces)):
             builder = OscMessageBuilder(f"/digiclay/{name}")

@@ -10,16 +10,19 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntFlag
 from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import ParameterError
+from digiclay.core.model.finger_range import MOST_FORCE
 from digiclay.core.model.fingertip import LEVEL
 from numpy.typing import NDArray
 
 __all__ = [
-    "LARGEST_REQUEST", "VERSION", "Frame", "Pose", "Reset", "Status", "check_pose", "format_error",
-    "format_frame", "pack_frame", "pack_pose", "read_binary", "read_json", "unpack_frame",
+    "LARGEST_REQUEST", "LIMITS", "VERSION", "Flag", "Frame", "Limits", "Pose", "Reset", "Status",
+    "check_pose", "format_error", "format_frame", "name_flags", "pack_frame", "pack_pose", "read_binary",
+    "read_json", "unpack_frame",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -29,7 +32,7 @@ MARK = b"DC"
 STATE, POSE, RESET = 1, 2, 3
 #: Mark, version, kind, and the pins of a frame or the number of a request.
 HEAD = struct.Struct("<2sBBI")
-#: Period, number of the last pose taken up, flags (0), time, total force, pose.
+#: Period, number of the last pose taken up, flags, time, total force, pose.
 BODY = struct.Struct("<QII9d")
 POSITION = struct.Struct("<7d")
 #: No request is larger, bytes.
@@ -64,6 +67,38 @@ class Status:
     """Request: counts of connections, refusals and frames."""
 
 
+class Flag(IntFlag):
+    """What a client has to know of a frame before it believes it."""
+
+    #: The contact law does not hold: `core.model.finger_range`.
+    BEYOND_A_FINGER = 1
+    #: Total force and forces were larger, and are reduced to the ceiling by one factor.
+    FORCE_LIMITED = 2
+    #: The fingertip is on its way to the pose asked for, at its largest speed.
+    POSE_LIMITED = 4
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of what a session hands out to clients that may drive a motor; docs/serve.md has the sources.
+
+    Attributes
+    ----------
+    force : float
+        Largest total force, N: that up to which fingerpads were measured. The paper's pins, 0.157 N each at
+        the pressure of their reservoir, reach it with 13, more than lie under the contact of a fingertip.
+    speed : float
+        Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
+        10218-1, and about three times that of fingers that explore a surface.
+    """
+
+    force: float = MOST_FORCE
+    speed: float = 0.25
+
+
+LIMITS = Limits()
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """State after a control period.
@@ -82,6 +117,8 @@ class Frame:
         The fingertip's.
     heights, forces : ndarray (n,), float32
         Of the pins, m and N.
+    flags : int
+        Of `Flag`.
     """
 
     period: int
@@ -91,21 +128,11 @@ class Frame:
     pose: Floats
     heights: NDArray[np.float32]
     forces: NDArray[np.float32]
+    flags: int = 0
 
 
 def check_pose(values: Sequence[object]) -> tuple[float, ...]:
-    """Return a pose of 7 numbers, its quaternion of length 1; a level finger where only 3 are given.
-
-    Parameters
-    ----------
-    values : sequence
-        3 or 7 numbers.
-
-    Raises
-    ------
-    ParameterError
-        When they are not finite numbers, or the quaternion has no direction.
-    """
+    """Return a pose of 7 numbers, its quaternion of length 1, from 3 (level) or 7; refuse anything else."""
     if len(values) not in (3, 7):
         rule = "must be 3 numbers, the lowest point in m, or 7 with a quaternion w, x, y, z"
         raise ParameterError("pose", "", rule, f"{len(values)} values")
@@ -187,7 +214,8 @@ def pack_pose(request: Pose) -> bytes:
 
 def pack_frame(frame: Frame) -> bytes:
     """Write a frame in binary."""
-    body = BODY.pack(frame.period, frame.number, 0, frame.time, frame.total_force, *frame.pose.tolist())
+    head = (frame.period, frame.number, frame.flags, frame.time, frame.total_force)
+    body = BODY.pack(*head, *frame.pose.tolist())
     pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
     return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins])
 
@@ -205,9 +233,14 @@ def unpack_frame(data: bytes) -> Frame:
     if (mark, version, kind) != (MARK, VERSION, STATE) or len(data) != start + 8 * pins:
         rule = f"must be a state, kind {STATE} of version {VERSION}"
         raise ParameterError("frame", "", rule, f"kind {kind} of {len(data)} bytes")
-    period, number, _, time, force, *pose = BODY.unpack_from(data, HEAD.size)
+    period, number, flags, time, force, *pose = BODY.unpack_from(data, HEAD.size)
     heights, forces = np.frombuffer(data, "<f4", offset=start).reshape(2, pins)
-    return Frame(period, number, time, force, np.array(pose), heights, forces)
+    return Frame(period, number, time, force, np.array(pose), heights, forces, flags)
+
+
+def name_flags(flags: int) -> list[str]:
+    """Return the names of the flags of a frame; those of newer servers have none."""
+    return [flag.name.lower() for flag in Flag if flag & flags and flag.name]
 
 
 def format_frame(frame: Frame) -> str:
@@ -216,7 +249,7 @@ def format_frame(frame: Frame) -> str:
         "version": VERSION, "type": "state", "period": frame.period, "number": frame.number,
         "time": frame.time, "total_force": frame.total_force, "position": frame.pose[:3].tolist(),
         "orientation": frame.pose[3:].tolist(), "heights": frame.heights.tolist(),
-        "forces": frame.forces.tolist(),
+        "forces": frame.forces.tolist(), "flags": name_flags(frame.flags),
     }  # fmt: skip
     return json.dumps(said, allow_nan=False)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from .deadlines import Schedule, TimeCounts, plan_periods
 from .doors import Doors
-from .protocol import pack_frame
+from .protocol import name_flags, pack_frame
 from .served_session import Session, follow, make_frame, record, reset
 from .take_parts import PartWriter
 
@@ -94,15 +95,14 @@ def run_session(
     room = max(1, round(part / session.system.period))
     if writer:
         session = record(session, room)
-    frame = pack_frame(make_frame(session))
-    doors.show(frame)
+    doors.show(pack_frame(make_frame(session)))
     # What is there stays: the collector need not look through it again and again.
     gc.collect()
     gc.freeze()
     times = LoopTimes(TimeCounts(BIN), TimeCounts(BIN), TimeCounts(BIN))
     period = session.system.period
     schedule = Schedule(time.perf_counter(), period, max(1, round(CATCH_UP / period)))
-    resets = 0
+    resets, flagged = 0, Counter[str]()
     while not stopped():
         wait = schedule.begins - time.perf_counter()
         if wait > 0.0:
@@ -118,8 +118,10 @@ def run_session(
             resets = order.resets
             session = _restart(session, writer, room)
         session = _advance(session, order.target, order.number, due.count, tell)
-        doors.show(pack_frame(make_frame(session)))
+        frame = make_frame(session)
+        doors.show(pack_frame(frame))
         ended = time.perf_counter()
+        flagged.update(name_flags(frame.flags))
         # A turn that makes up for late periods simulates several.
         each = (time.thread_time() - spent) / due.count
         for _ in range(due.count):
@@ -131,7 +133,7 @@ def run_session(
             session = _keep(session, writer, room, tell)
     gc.unfreeze()
     _hand_over(session, writer)
-    return replace(session, recording=None), times.describe(schedule)
+    return replace(session, recording=None), {**times.describe(schedule), "flagged": dict(flagged)}
 
 
 def _advance(

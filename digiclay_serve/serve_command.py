@@ -21,7 +21,7 @@ from digiclay.core.scene.scene_source import Setting
 from .access_token import VARIABLE, choose_token
 from .door_bed import describe_bed
 from .doors import Doors, DoorSettings
-from .protocol import pack_frame
+from .protocol import LIMITS, Limits, pack_frame
 from .real_time_loop import run_session
 from .served_session import begin_session, make_frame
 from .take_parts import PartWriter
@@ -51,7 +51,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--rate",
         metavar="HZ",
-        type=_rate,
+        type=_within(1.0, 1000.0, "Hz"),
         help="control periods a second, 1 to 1000; default: the scene's",
     )
     parser.add_argument("--host", default=HOST, help=f"address of this machine to serve at; default: {HOST}")
@@ -64,9 +64,18 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--token", metavar="T", help=f"token of the clients; default: {VARIABLE}, or one at random"
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, help="record a take into this folder")
     parser.add_argument(
-        "--part", metavar="S", type=_part, default=10.0,
+        "--most-force", metavar="N", type=_within(1e-3, 1e3, "N"), default=LIMITS.force,
+        help=f"largest total force handed out, N; default: {LIMITS.force:g}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--most-speed", metavar="MM/S", type=_within(1.0, 1e4, "mm/s"), default=1e3 * LIMITS.speed,
+        help=f"largest speed of the fingertip, mm/s; default: {1e3 * LIMITS.speed:g}",
+    )  # fmt: skip
+    parser.add_argument("--out", metavar="DIR", type=Path, help="record a take into this folder")
+    parser.add_argument("--overwrite", action="store_true", help="replace the takes in that folder")
+    parser.add_argument(
+        "--part", metavar="S", type=_within(0.1, 600.0, "s"), default=10.0,
         help="seconds of a take that a killed process loses at most; default: 10",
     )  # fmt: skip
     parser.add_argument(
@@ -74,12 +83,15 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--display", metavar="TTY", help="serial line of a pin display")
     parser.add_argument(
-        "--display-rate", metavar="HZ", type=_rate, default=30.0, help="its frames a second; default: 30"
-    )
+        "--display-rate", metavar="HZ", type=_within(1.0, 1000.0, "Hz"), default=30.0,
+        help="its frames a second; default: 30",
+    )  # fmt: skip
     parser.add_argument(
         "--display-baud", metavar="B", type=int, default=115200, help="its speed; default: 115200"
     )
-    parser.add_argument("--seconds", metavar="S", type=_seconds, help="stop after this time; default: Ctrl-C")
+    parser.add_argument(
+        "--seconds", metavar="S", type=_within(0.0, 1e9, "s"), help="stop after this time; default: Ctrl-C"
+    )
     parser.add_argument("--quiet", action="store_true", help="print addresses, errors and a random token")
     parser.set_defaults(carry_out=carry_out)
 
@@ -97,16 +109,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
         arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
     arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
-    session = begin_session(scene)
+    session = begin_session(scene, Limits(arguments.most_force, 1e-3 * arguments.most_speed))
     display = None
     if arguments.display is not None:
         display = {
             "path": arguments.display, "rate": arguments.display_rate, "baud": arguments.display_baud
         }  # fmt: skip
     settings = DoorSettings(arguments.host, arguments.port, arguments.osc_port, token, display)
-    bed, size = describe_bed(scene, session.system), len(pack_frame(make_frame(session)))
+    bed = describe_bed(scene, session.system, session.limits)
+    size, out = len(pack_frame(make_frame(session))), arguments.out
     with (
-        PartWriter(arguments.out) if arguments.out is not None else nullcontext() as writer,
+        PartWriter(out, overwrite=arguments.overwrite) if out is not None else nullcontext() as writer,
         Stop() as stop,
         Doors(settings, bed, size) as doors,
     ):
@@ -136,30 +149,19 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _rate(text: str) -> float:
-    """Read a rate in Hz."""
-    return _number(text, 1.0, 1000.0, "Hz")
+def _within(least: float, most: float, unit: str) -> Callable[[str], float]:
+    """Return a reader of numbers between two bounds."""
 
+    def read(text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.nan
+        if not least <= number <= most:
+            raise argparse.ArgumentTypeError(f"must be from {least:g} to {most:g} {unit} (got {text!r})")
+        return number
 
-def _part(text: str) -> float:
-    """Read the duration of a part of a take, s."""
-    return _number(text, 0.1, 600.0, "s")
-
-
-def _seconds(text: str) -> float:
-    """Read how long to serve, s."""
-    return _number(text, 0.0, 1e9, "s")
-
-
-def _number(text: str, least: float, most: float, unit: str) -> float:
-    """Read a number between two bounds."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not least <= number <= most:
-        raise argparse.ArgumentTypeError(f"must be from {least:g} to {most:g} {unit} (got {text!r})")
-    return number
+    return read
 
 
 def _port(text: str) -> int:
@@ -197,8 +199,10 @@ def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
         f"{figures['left_out']} of them left out; {shares}"
     )
     counts = {name: count for name, count in sorted(figures["counts"].items()) if name != "display"}
-    if counts:
-        yield ", ".join(f"{name}: {count}" for name, count in counts.items())
+    flagged = {f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()}
+    for found in (flagged, counts):
+        if found:
+            yield ", ".join(f"{name}: {count}" for name, count in found.items())
     ended = figures["counts"].get("display", {}).get("ended")
     if ended:
         yield f"The line of the pin display ended: {ended}."

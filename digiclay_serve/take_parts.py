@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from digiclay.core.base.errors import DigiclayError, OutputError
-from digiclay.core.base.run_folder import claim_folder
+from digiclay.core.base.run_folder import Content, claim_folder
 from digiclay.core.base.whole_files import write_whole
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 
@@ -22,6 +22,8 @@ __all__ = ["PartWriter", "join_parts"]
 
 #: Most parts that wait for the disk.
 WAITING = 4
+#: Names of takes, and of the parts that a killed process leaves.
+TAKE = Content("take", ("take_[0-9][0-9][0-9].npz", f"take_[0-9][0-9][0-9]_part_{5 * '[0-9]'}.npz"))
 
 
 class PartWriter(AbstractContextManager["PartWriter"]):
@@ -31,6 +33,8 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     ----------
     folder : Path
         None, or an empty one.
+    overwrite : bool, optional
+        It may hold takes; the first part that is written replaces them.
 
     Raises
     ------
@@ -38,9 +42,10 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         On entry, when the folder cannot be used.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *, overwrite: bool = False) -> None:
+        self.folder, self._overwrite = folder, overwrite
         self.failure = ""
+        self._old: list[Path] = []
         self._made = False
         self._until_the_end = ExitStack()
         self._parts: queue.Queue[tuple[Path, Take] | None] = queue.Queue(WAITING)
@@ -48,8 +53,10 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         self._session = self._part = 1
 
     def __enter__(self) -> PartWriter:
-        self._until_the_end.enter_context(claim_folder(self.folder, overwrite=False))
+        claim = claim_folder(self.folder, overwrite=self._overwrite, content=TAKE)
+        self._until_the_end.enter_context(claim)
         try:
+            self._old = TAKE.find(self.folder)
             self._made = not self.folder.exists()
             self.folder.mkdir(exist_ok=True, parents=True)
         except OSError as error:
@@ -87,7 +94,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         if self._thread.is_alive():
             self._parts.put(None)
             self._thread.join()
-        found = sorted(self.folder.glob("take_*_part_*.npz"))
+        found = sorted(set(self.folder.glob("take_*_part_*.npz")).difference(self._old))
         sessions = sorted({path.name.partition("_part_")[0] for path in found})
         written = []
         for name in sessions:
@@ -114,8 +121,10 @@ class PartWriter(AbstractContextManager["PartWriter"]):
             if self.failure:
                 continue
             try:
+                while self._old:
+                    self._old.pop().unlink()
                 write_whole(part[0], to_bytes(part[1]))
-            except DigiclayError as error:
+            except (DigiclayError, OSError) as error:
                 self.failure = f"The take ends here: {error}"
 
 

@@ -30,8 +30,8 @@ from .protocol import (
 
 __all__ = ["FLOOD", "Pace", "Wishes", "count_message", "open_websocket", "read_wishes"]
 
-#: Most connections, those included that have not said yet who they are.
-MOST_CONNECTIONS = 64
+#: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
+MOST_CLIENTS, MOST_SILENT = 64, 512
 #: Time for a client to say who it is, s; and to answer a ping.
 OPENING, PING = 5.0, 10.0
 #: Most messages of a client in a second, and most wrong ones, before it is closed.
@@ -100,33 +100,13 @@ class Pace:
 
 
 def count_message(pace: Pace, now: float) -> tuple[bool, Pace]:
-    """Return whether one more message is one of too many in a second, and the count with it.
-
-    Parameters
-    ----------
-    pace : Pace
-    now : float
-        By a clock that never goes back, s.
-    """
+    """Return whether one more message, now, s, is one of too many in a second, and the count with it."""
     after = Pace(pace.began, pace.count + 1) if now - pace.began < 1.0 else Pace(now, 1)
     return after.count > FLOOD, after
 
 
 async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
-    """Open the door.
-
-    Parameters
-    ----------
-    link : DoorLink
-    host : str
-    port : int
-        0: chosen by the system.
-
-    Raises
-    ------
-    OSError
-        When the address cannot be used.
-    """
+    """Open the door at a port, 0: chosen by the system; OSError when the address cannot be used."""
     door = _WebSocketDoor(link)
     return await serve(
         door.handle, host, port, process_request=door.admit, create_connection=door.connect,
@@ -137,39 +117,32 @@ async def open_websocket(link: DoorLink, host: str, port: int) -> Server:
 
 
 class _Connection(ServerConnection):
-    """Connection that is cut at once when there are too many."""
+    """Connection that is cut while it has not said who it is, and too many others have come since."""
 
     door: _WebSocketDoor
-    cut = False
 
     def connection_made(self, transport: Any) -> None:
-        """Begin, or cut the connection before anything is read."""
-        if len(self.door.connections) >= MOST_CONNECTIONS:
-            self.cut = True
-            self.door.link.counts["connections beyond the limit"] += 1
-            transport.abort()
-            return
-        self.door.connections.add(self)
+        """Begin, and cut the oldest of too many silent ones: whoever has the token sends it at once."""
         super().connection_made(transport)
+        silent = self.door.silent
+        silent[self] = None
+        if len(silent) > MOST_SILENT:
+            oldest = next(iter(silent))
+            del silent[oldest]
+            oldest.transport.abort()
+            self.door.link.counts["connections beyond the limit"] += 1
 
     def data_received(self, data: bytes) -> None:
         """Take in what has come; cut a client whose pings are answered faster than it reads."""
-        if self.cut:
-            return
         super().data_received(data)
         if self.transport.get_write_buffer_size() > MOST_UNSENT + 4 * len(self.door.link.packed):
             self.transport.abort()
 
-    def eof_received(self) -> None:
-        """Note the end of what comes."""
-        if not self.cut:
-            super().eof_received()
-
     def connection_lost(self, exc: Exception | None) -> None:
         """End."""
-        self.door.connections.discard(self)
-        if not self.cut:
-            super().connection_lost(exc)
+        self.door.clients.discard(self)
+        self.door.silent.pop(self, None)
+        super().connection_lost(exc)
 
 
 class _WebSocketDoor:
@@ -177,7 +150,9 @@ class _WebSocketDoor:
 
     def __init__(self, link: DoorLink) -> None:
         self.link = link
-        self.connections: set[_Connection] = set()
+        self.clients: set[ServerConnection] = set()
+        #: Oldest first.
+        self.silent: dict[ServerConnection, None] = {}
 
     def connect(self, *arguments: Any, **options: Any) -> ServerConnection:
         """Make a connection of this door."""
@@ -197,10 +172,16 @@ class _WebSocketDoor:
             header, wishes = "", Wishes()
         scheme, _, given = header.partition(" ")
         given = given.strip() if scheme.lower() == "bearer" else wishes.token
-        if is_token(given, self.link.token):
-            return None
-        self.link.counts["wrong tokens"] += 1
-        return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is missing or wrong.\n")
+        if not is_token(given, self.link.token):
+            self.link.counts["wrong tokens"] += 1
+            return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is missing or wrong.\n")
+        self.silent.pop(connection, None)
+        if len(self.clients) >= MOST_CLIENTS:
+            self.link.counts["clients beyond the limit"] += 1
+            said = f"{MOST_CLIENTS} clients at most: wait until one has left.\n"
+            return connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, said)
+        self.clients.add(connection)
+        return None
 
     async def handle(self, connection: ServerConnection) -> None:
         """Serve a client until it goes."""

@@ -42,6 +42,13 @@ class Server:
         address = f"ws://127.0.0.1:{self.port}/{wishes}"
         return connect(address, additional_headers=header, compression=None, **options)
 
+    def count(self, name: str) -> int:
+        """Return a count of the doors."""
+        with self.connect("?rate=0") as client:
+            client.recv(TIMEOUT)
+            client.send('{"type": "status"}')
+            return int(json.loads(client.recv(TIMEOUT))["counts"].get(name, 0))
+
     def stop(self, number: int = signal.SIGINT) -> dict[str, Any]:
         """Stop the server; return its report."""
         self.process.send_signal(number)

@@ -23,6 +23,7 @@ from digiclay_serve.pin_frames import (
     split_frames,
 )
 from digiclay_serve.protocol import (
+    Flag,
     Frame,
     Pose,
     check_pose,
@@ -41,10 +42,10 @@ whole = st.integers(0, 2**32 - 1)
 heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
-def frame_of(pose: list[float], values: list[float]) -> Frame:
+def frame_of(pose: list[float], values: list[float], flags: int) -> Frame:
     """Return a frame of some pins."""
     pins = np.array(values, np.float32)
-    return Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins)
+    return Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags)
 
 
 def refusal(read: Callable[[Any], Any], data: Any) -> str:
@@ -65,12 +66,15 @@ def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], n
     assert math.hypot(*wanted.pose[3:]) == pytest.approx(1.0)
 
 
-@given(poses, heights)
-def test_a_frame_is_read_as_it_was_written_in_all_formats(pose: list[float], values: list[float]) -> None:
-    frame = frame_of(pose, values)
+@given(st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1)))
+def test_a_frame_is_read_as_it_was_written_in_all_formats(frame: Frame) -> None:
     read = unpack_frame(pack_frame(frame))
     said = json.loads(format_frame(frame))
-    state = OscMessage(format_osc_frame(frame, "pins")[0]).params
+    datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
+    told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
+    assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
+    assert said["flags"] == [flag.name.lower() for flag in Flag if frame.flags & flag]
+    state = told["state"]
     for found in (
         (read.period, read.number, read.time, read.total_force, *read.pose),
         (
@@ -80,12 +84,11 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(pose: list[float], val
         ),
         tuple(state),
     ):
-        assert found == (2**40, 2**32 - 1, 12.5, 0.75, *pose)
+        assert found == (2**40, 2**32 - 1, 12.5, 0.75, *frame.pose)
     np.testing.assert_array_equal(read.heights, frame.heights)
     np.testing.assert_array_equal(read.forces, frame.forces)
     np.testing.assert_array_equal(np.array(said["heights"], np.float32), frame.heights)
-    blob = OscMessage(format_osc_frame(frame, "pins")[2]).params[1]
-    np.testing.assert_array_equal(np.frombuffer(blob, ">f4"), frame.forces)
+    np.testing.assert_array_equal(np.frombuffer(told["forces"][1], ">f4"), frame.forces)
 
 
 @given(st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)))

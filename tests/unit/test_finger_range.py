@@ -5,25 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from digiclay.commands.batch_folder import FACTS
-from digiclay.core.model.finger_range import (
-    MOST_FORCE,
-    MOST_INDENTATION,
-    describe_excess,
-    find_largest_indentation,
-)
+from digiclay.core.engine.simulation import begin
+from digiclay.core.model import finger_range
+from digiclay.core.model.contact import Contact
+from digiclay.core.model.finger_range import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.trajectory import Path, Waypoint
+from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
+from digiclay.core.session.live_periods import simulate_path
+from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import Result, run
 from digiclay.overlay.sections import force_message
 
 from tests.assemble import sample, under
 
 
-def pressed(depth: float, **parts: object) -> Result:
-    """Return a run whose finger comes down to `depth` below the tops within 0.1 s, m."""
+def pressed(depth: float, tilt: float = 0.0, x: float = 0.0, **parts: object) -> Result:
+    """Return a run whose finger, tilted, rad, comes down at x to `depth` below the tops within 0.1 s, m."""
     points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
-    way = Path("linear", tuple(Waypoint(time, (0.0, 0.0, z)) for time, z in points))
+    turn = (np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)
+    way = Path("linear", tuple(Waypoint(time, (x, 0.0, z), turn) for time, z in points))
     known: Scene = sample("tap", "simulation.duration=0.15")
     return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
 
@@ -52,23 +54,39 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line(through
     assert through.summary().endswith(f"; {said}")
 
 
-def test_the_indentation_is_that_of_the_pin_that_stands_deepest(shallow: Result) -> None:
-    history = shallow.history
-    assert history is not None
-    outline = Fingertip().outline(history["fingertip"])
-    depth = history["height"] - under(outline, *history["position"].T)
-    expected = depth[history["force"] > 0.0].max()
-    assert shallow.metrics["max_indentation"] == pytest.approx(expected, rel=1e-12)
-    assert shallow.metrics["units"]["max_indentation"] == "m"
-    # Under the middle of the finger stands a pin, and no valve is open.
-    assert expected == pytest.approx(1.5e-3, rel=1e-9)
+@pytest.mark.parametrize(
+    ("depth", "tilt", "x", "stiffness"),
+    [
+        (1.5e-3, 0, 0, 250), (3.5e-3, 0, 0, 250),
+        # By depth alone: above a pin, between pins, and tilted.
+        (3.5e-3, 0, 0, 0.01), (3.2e-3, 0, 1.5e-3, 0.01), (2.9e-3, 0.6, 0, 0.01), (4e-3, 0.6, 0, 0.01),
+    ],
+)  # fmt: skip
+def test_rows_and_live_states_beyond_the_law_are_marked(
+    depth: float, tilt: float, x: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(finger_range, "ROWS", 1)
+    result = pressed(depth, tilt, x, contact=Contact(stiffness=stiffness))
+    history, system = result.history, assemble(result.scene)
+    unders = under(Fingertip().outline(history["fingertip"]), *history["position"].T)
+    depths = (history["height"] - unders).max(axis=1, where=history["force"] > 0.0, initial=0.0)
+    told = result.metrics["max_indentation"], result.metrics["units"]["max_indentation"]
+    assert told == (pytest.approx(depths.max(), rel=1e-12), "m")
+    # No valve is open, and the underside is an ellipse of 10 and 8 mm.
+    assert depths.max() == pytest.approx(depth - 8e-3 * (1.0 - np.sqrt(1.0 - (x / 10e-3) ** 2)), rel=1e-9)
+    wanted = (history["total_force"] > MOST_FORCE) | (depths > MOST_INDENTATION)
+    assert wanted.any() == (depth > MOST_INDENTATION) == ("beyond_a_finger" in history)
+    np.testing.assert_array_equal(history.get("beyond_a_finger", wanted), wanted)
+    states = simulate_path(system, begin(system), history["fingertip"][:, None])
+    live = [exceeds_law(system, *one) for one in zip(states, history["fingertip"][1:], strict=True)]
+    assert live == wanted[1:].tolist()
 
 
 def test_a_pin_that_is_not_felt_does_not_count(shallow: Result) -> None:
     # Beyond the rim of a finger that is lifted: no force, whatever the heights.
     assert shallow.history is not None
     free = {**shallow.history, "force": np.zeros_like(shallow.history["force"])}
-    assert find_largest_indentation(Fingertip(), free) == 0.0
+    assert find_indentations(Fingertip(), free).max() == 0.0
 
 
 @pytest.mark.parametrize(
@@ -89,6 +107,7 @@ def test_the_overlay_says_when_no_finger_presses_so_hard() -> None:
     assert [force_message(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
         "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
     ]  # fmt: skip
+    assert force_message(0.7, beyond=True) == "0.70 N: beyond 3 mm"
 
 
 def test_errors_are_estimates_wherever_a_batch_names_them() -> None:

@@ -74,6 +74,7 @@ def test_it_tells_method_speed_error_force_set_point_heights_and_modes() -> None
         "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister",
     ):  # fmt: skip
         assert part in words
+    assert "N: beyond 3 mm" in said(lay_out(session(beyond=True), choose_colors(DARK, LIGHT), ROOM, 1.0))
 
 
 def test_a_hard_knock_does_not_flatten_the_force_about_the_set_point() -> None:

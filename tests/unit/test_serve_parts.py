@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from digiclay_serve.latest_slot import make_slot, open_slot
 from digiclay_serve.order_slot import Order, pack_order, unpack_order
 from digiclay_serve.pin_frames import LOST, WINDOW, Ledger, acknowledge, expire, send, split_frames
 from digiclay_serve.pin_frames import pack_acknowledgement as acknowledged
+from digiclay_serve.protocol import LIMITS, Flag, Limits
 from digiclay_serve.served_session import Session, begin_session, follow, make_frame, record, reset
 from digiclay_serve.take_parts import PartWriter, join_parts
 
@@ -92,6 +94,39 @@ def test_the_session_follows_a_pose_and_tells_its_number() -> None:
     assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-6)
     assert frame.total_force > 0.0
     assert frame.heights.min() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("most", "height", "flags"),
+    [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)],
+)
+def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
+    session, seen = begin_session(SCENE, replace(LIMITS, force=most)), 0
+    for _ in range(30):
+        session = follow(session, np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]), 3, 1)
+        frame = make_frame(session)
+        seen |= frame.flags
+        assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-5)  # 32 bits
+        assert (frame.total_force >= most) == bool(frame.flags & Flag.FORCE_LIMITED)
+        assert frame.total_force <= most
+    assert (seen, frame.pose[2]) == (flags, height)
+
+
+@pytest.mark.parametrize(
+    ("place", "turn", "way", "count"),
+    [
+        ([0.0, 0.0, 0.062], [1.0, 0.0, 0.0, 0.0], 0.012, 1),
+        ([0.003, 0.004, 0.05], [1.0, 0.0, 0.0, 0.0], 0.005, 1),
+        ([0.0, 0.0, 0.05], [0.0, 0.0, 0.0, 1.0], 0.02 * np.pi, 3),  # by 180°, of points 20 mm apart
+    ],
+)
+def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, count: int) -> None:
+    session, turns, each = begin_session(SCENE, Limits(speed=0.1)), 0, 0.1 * 5e-3 * count
+    while turns == 0 or session.behind:
+        before = session.pose[:3]
+        session, turns = follow(session, np.array(place + turn), 3, count), turns + 1
+        assert np.linalg.norm(session.pose[:3] - before) <= each * (1.0 + 1e-9)  # rounding
+    assert (session.pose.tolist(), turns) == (place + turn, np.ceil(way / each - 1e-9))
 
 
 def test_a_reset_session_is_the_one_that_began() -> None:
@@ -171,11 +206,19 @@ def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -
     assert from_bytes(path.read_bytes()).periods == 3
 
 
-def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "other").write_text("mine", encoding="utf-8")
-    with pytest.raises(OutputError, match="other things"), PartWriter(tmp_path):
+def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path: Path) -> None:
+    held = ["mine.npz", "take_001_part_00007.npz", "take_004.npz"]
+    for name in held:
+        (tmp_path / name).write_text("old", encoding="utf-8")
+    with pytest.raises(OutputError, match="replace the take in it with --overwrite"), PartWriter(tmp_path):
         pass
-    assert [path.name for path in tmp_path.iterdir()] == ["other"]
+    for part in (None, taken(pressed(record(begin_session(SCENE), 10), 3))):
+        assert sorted(path.name for path in tmp_path.iterdir()) == held
+        with PartWriter(tmp_path, overwrite=True) as writer:
+            if part:
+                writer.put(part)
+            assert len(writer.finish()) == bool(part)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "take_001.npz"]
 
 
 def test_a_take_of_parts_is_the_format_of_old_takes() -> None:

@@ -74,6 +74,11 @@ def test_a_client_that_answers_no_ping_is_closed_and_leaves_the_fingertip(
     assert link.counts["poses"] == 2
 
 
+def test_a_client_beyond_the_limit_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(websocket_door, "MOST_CLIENTS", 0)
+    assert asyncio.run(connect(make_link(), REQUEST.encode())).startswith(b"HTTP/1.1 503")
+
+
 def test_a_client_that_is_silent_before_the_token_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(websocket_door, "OPENING", 0.1)
     link = make_link()

@@ -1,4 +1,4 @@
-"""Stop of a session by Ctrl-C or SIGTERM, with the computed rows kept."""
+"""Stop of a session by Ctrl-C, SIGTERM or a closed terminal, with the computed rows kept."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from types import FrameType
 from typing import Any
 
 __all__ = ["Stop", "allow_interrupt", "defer_interrupt"]
+
+#: What asks to stop; Windows has no SIGHUP.
+ASKING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Stop:
@@ -36,12 +39,14 @@ class Stop:
 
 
 def _handle(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
-    """Handle Ctrl-C and SIGTERM; return the former handlers, none where signals cannot be handled."""
+    """Handle what asks to stop; return the former handlers, none where signals cannot be handled."""
     former: dict[int, Any] = {}
     # Python takes signals in its main thread only; elsewhere nobody can ask.
     with suppress(ValueError):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            former[number] = signal.signal(number, handler)
+        for number in ASKING:
+            # A closed terminal does not end what nohup has begun.
+            if number in ASKING[:2] or signal.getsignal(number) != signal.SIG_IGN:
+                former[number] = signal.signal(number, handler)
     return former
 
 

@@ -15,7 +15,9 @@ def _brief_height(told: Readings) -> float:
 
 def _draw_brief(told: Readings, pen: Pen, top: float) -> None:
     """Write force, set point, simulated time and state in two rows."""
-    now = force_message(float(told.force[-1])) if told.force.size else localize("no force yet")
+    now = localize("no force yet")
+    if told.force.size:
+        now = force_message(float(told.force[-1]), beyond=told.beyond)
     asked = "" if told.set_point is None else localize("of {:.2f} N", told.set_point)
     top = pen.row(top, now, asked)
     pen.row(top, f"{float(told.time[-1]) if told.time.size else 0.0:.1f} s", describe_state(told))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.base.modes import Mode
-from ..core.model.finger_range import MOST_FORCE
+from ..core.model.finger_range import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
 from .look import Color, Look
@@ -60,6 +60,8 @@ class Readings:
         How much of the past is shown, s.
     top : float or None
         Force from which on a pin has the last color, N; None while the colors tell the modes.
+    beyond : bool
+        Whether the contact law does not hold now, by `core.model.finger_range`.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Readings:
     colors: tuple[Color, ...]
     seconds: float
     top: float | None = None
+    beyond: bool = False
 
     @property
     def window(self) -> tuple[float, float]:
@@ -161,13 +164,13 @@ def error_message(errors: tuple[float, float] | None) -> str:
     return localize("Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN"))
 
 
-def force_message(force: float) -> str:
-    """Return the text of the total force, N, and its excess over `core.model.finger_range`."""
-    if force <= MOST_FORCE:
-        return f"{force:.2f} N"
+def force_message(force: float, *, beyond: bool = False) -> str:
+    """Return the text of the total force, N, and that it, or else a depth, is beyond `finger_range`."""
     if force >= 100.0:
         return localize("{:.3g} N: no finger", force)
-    return localize("{:.1f} N: beyond {:g} N", force, MOST_FORCE)
+    if force > MOST_FORCE:
+        return localize("{:.1f} N: beyond {:g} N", force, MOST_FORCE)
+    return localize("{:.2f} N: beyond {:g} mm", force, MOST_INDENTATION * 1e3) if beyond else f"{force:.2f} N"
 
 
 def describe_state(told: Readings) -> str:
@@ -196,7 +199,7 @@ def _force_height(told: Readings) -> float:
 
 def _draw_force(told: Readings, pen: Pen, top: float) -> None:
     """Draw the total force over the last seconds, its set point dashed."""
-    now = force_message(float(told.force[-1])) if told.force.size else ""
+    now = force_message(float(told.force[-1]), beyond=told.beyond) if told.force.size else ""
     asked = "" if told.set_point is None else localize("set point {:.2f} N", told.set_point)
     top = pen.row(top, localize("Total force  {}", now), asked)
     recent = told.force[told.time >= told.window[0]]

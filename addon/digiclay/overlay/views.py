@@ -15,6 +15,7 @@ from .. import preferences
 from ..compat import bpy
 from ..core.base.modes import Mode
 from ..core.model.set_point import find_set_point
+from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
 from ..live import running
 from ..press.aim import project
@@ -99,6 +100,7 @@ def read_session(
         colors=tuple(colors[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
         top=view.top_color(bed) if view.shows_force(bed) else None,
+        beyond=exceeds_law(session.system, session.state, session.pose),
     )
 
 

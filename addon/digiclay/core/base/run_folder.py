@@ -14,7 +14,7 @@ from .file_lock import hold_lock
 from .unfinished import name_unfinished, remove_abandoned
 
 __all__ = [
-    "MARK", "Claim", "check_folder", "claim_files", "claim_folder", "describe_claim", "find_lock",
+    "MARK", "Claim", "Content", "check_folder", "claim_files", "claim_folder", "describe_claim", "find_lock",
     "lock_name", "resolve_inside", "write_folder",
 ]  # fmt: skip
 
@@ -22,19 +22,25 @@ __all__ = [
 MARK = "metrics.json"
 
 
-def check_folder(out: Path, *, overwrite: bool) -> None:
+@dataclass(frozen=True)
+class Content:
+    """What a folder holds that may be replaced: its name, and patterns of files by which it is known."""
+
+    name: str
+    marks: tuple[str, ...]
+
+    def find(self, folder: Path) -> list[Path]:
+        """Return the files by which it is known; none where a folder holds something else."""
+        return [path for mark in self.marks for path in folder.glob(mark) if path.is_file()]
+
+
+RUN = Content("run", (MARK,))
+
+
+def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
     """Refuse, before any work is done, an output folder that could not be used in the end.
 
-    Parameters
-    ----------
-    out : Path
-        It may exist if it is empty; with `overwrite` also if a run left it. Any other folder
-        is nobody's to delete.
-    overwrite : bool
-
-    Raises
-    ------
-    OutputError
+    It may be empty, or with `overwrite` hold a run, or other content; any other is nobody's to delete.
     """
     try:
         filled = out.exists() and (not out.is_dir() or any(out.iterdir()))
@@ -42,12 +48,12 @@ def check_folder(out: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{out} cannot be read: {error.strerror or error}.") from None
     if filled and not out.is_dir():
         raise OutputError(f"{out} is a file: choose another folder with --out.")
-    if filled and not (out / MARK).is_file():
-        raise OutputError(f"{out} holds other things than a run: choose another folder with --out.")
+    if filled and not content.find(out):
+        what = f"holds other things than a {content.name}"
+        raise OutputError(f"{out} {what}: choose another folder with --out.")
     if filled and not overwrite:
-        raise OutputError(
-            f"{out} is not empty: choose another folder with --out, or replace it with --overwrite."
-        )
+        other = f"replace the {content.name} in it with --overwrite"
+        raise OutputError(f"{out} is not empty: choose another folder with --out, or {other}.")
     above = out.resolve().parent
     while not above.exists():
         above = above.parent
@@ -138,25 +144,14 @@ class Claim:
 
 
 @contextmanager
-def claim_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterator[Claim]:
-    """Claim a folder before any work is done: nobody else may write it until the block ends.
+def claim_folder(
+    out: Path, *, overwrite: bool, patience: float = 0.0, content: Content = RUN
+) -> Iterator[Claim]:
+    """Claim a folder before any work is done, or refuse it: nobody else may write it until the block ends.
 
-    What runs of this name have left that were killed is taken away.
-
-    Parameters
-    ----------
-    out : Path
-    overwrite : bool
-        See `check_folder`.
-    patience : float, optional
-        Seconds to wait for somebody else who is about to end.
-
-    Raises
-    ------
-    OutputError
-        When it is claimed already, or could not be used in the end.
+    Waits some seconds for somebody who is about to end; what killed runs of this name have left is removed.
     """
-    check_folder(out, overwrite=overwrite)
+    check_folder(out, overwrite=overwrite, content=content)
     target = out.resolve()
     with ExitStack() as until_the_end:
         until_the_end.enter_context(_remove_if_empty(target))
@@ -165,7 +160,7 @@ def claim_folder(out: Path, *, overwrite: bool, patience: float = 0.0) -> Iterat
         except OSError as error:
             raise OutputError(f"{out} cannot be made: {error.strerror or error}.") from None
         remove_abandoned(target.parent, target.name)
-        check_folder(out, overwrite=overwrite)  # somebody else may just have ended
+        check_folder(out, overwrite=overwrite, content=content)  # somebody else may just have ended
         yield Claim(out, overwrite)
 
 

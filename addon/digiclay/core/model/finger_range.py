@@ -1,15 +1,16 @@
-"""Range of force and depth of the contact law, and the message beyond it."""
+"""Range of force and depth of the contact law, what is beyond it, and the message then."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .fingertip import Fingertip, compute_forms, compute_underside
 
-__all__ = ["MOST_FORCE", "MOST_INDENTATION", "describe_excess", "find_largest_indentation"]
+__all__ = ["MOST_FORCE", "MOST_INDENTATION", "describe_excess", "find_indentations", "is_beyond"]
 
 Floats = NDArray[np.float64]
 
@@ -23,43 +24,37 @@ MOST_INDENTATION = 3e-3
 ROWS = 64
 
 
-def find_largest_indentation(fingertip: Fingertip, history: Mapping[str, Floats]) -> float:
-    """Return the largest indentation of a pin in contact, over all rows, m.
+def is_beyond(force: Any, indentation: Any) -> Any:
+    """Return whether the contact law does not hold at total forces, N, and indentations, m, of any shape."""
+    return (force > MOST_FORCE) | (indentation > MOST_INDENTATION)
 
-    Parameters
-    ----------
-    fingertip : Fingertip
-    history : mapping
-        The arrays of ``history.npz``: height, force, fingertip and position.
+
+def find_indentations(fingertip: Fingertip, history: Mapping[str, Floats]) -> Floats:
+    """Return the largest indentation of a pin in contact in each row of a history, (t,), m.
+
+    Rows that are neither the deepest nor deeper than `MOST_INDENTATION` may have 0 instead of theirs.
     """
     felt, height = history["force"] > 0.0, history["height"]
     # No pin stands deeper than it is above the lowest point: few rows are left to look at.
     most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]
-    deepest_first, found = np.argsort(-most, kind="stable"), 0.0
+    deepest_first, found = np.argsort(-most, kind="stable"), np.zeros(len(most))
     cells = np.flatnonzero(felt.any(axis=0))  # the only ones that are worked out: of a large bed they are few
     x, y = np.asarray(history["position"], dtype=np.float64)[cells].T
     basis = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     for start in range(0, len(most), ROWS):
         rows = deepest_first[start : start + ROWS]
-        if most[rows[0]] <= found:
+        if most[rows[0]] <= min(found.max(), MOST_INDENTATION):
             break
         under = compute_underside(
             *compute_forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis
         )
         part = np.ix_(rows, cells)
-        depth = np.max(height[part] - under, where=felt[part], initial=0.0)
-        found = max(found, float(depth))
+        found[rows] = np.max(height[part] - under, axis=1, where=felt[part], initial=0.0)
     return found
 
 
 def describe_excess(force: float | None, indentation: float | None) -> str:
-    """Return the message on values beyond the contact law; empty without any.
-
-    Parameters
-    ----------
-    force, indentation : float or None
-        The largest total force, N, and indentation, m; None where it is not known.
-    """
+    """Return the message on a total force, N, and indentation, m, beyond the law; None: not known; or ""."""
     said = []
     if force is not None and force > MOST_FORCE:
         said.append(f"{force:.3g} N (fingers were measured up to {MOST_FORCE:g} N)")

@@ -82,6 +82,12 @@ class Fingertip(Parameters):
         8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="C, Microsoft", above=0.0
     )
 
+    @property
+    def flattest(self) -> float:
+        """Largest radius of curvature, m."""
+        axes = (self.length, self.width, self.height)
+        return max(axes) ** 2 / min(axes)
+
     def outline(self, poses: Floats) -> Floats:
         """Work out, for each pose, what its underside needs.
 

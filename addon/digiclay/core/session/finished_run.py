@@ -28,6 +28,7 @@ HISTORY = "history.npz"
 SHAPES: dict[str, tuple[str | int, ...]] = {
     "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
     "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
+    "beyond_a_finger": ("t",),
 }  # fmt: skip
 
 
@@ -80,7 +81,7 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
         shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
-        if head.kind.kind not in "if" or head.kind.itemsize > 8:
+        if head.kind.kind not in "bif" or head.kind.itemsize > 8:
             raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
     size, free = sum(head.size for head in held.values()), measure_available_memory()
     if size > free:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ..base.modes import Mode
 from ..engine.state import State
 from ..engine.system import System
+from ..model.finger_range import MOST_FORCE, MOST_INDENTATION, find_indentations, is_beyond
 from ..model.set_point import SetPoint, find_set_point
 
 __all__ = [
-    "PICKED", "ROWS", "SPAN", "RecentTrace", "extend", "measure_total_force", "pick", "sample", "start",
+    "PICKED", "ROWS", "SPAN", "RecentTrace", "exceeds_law", "extend", "measure_total_force", "pick", "sample",
+    "start",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -102,15 +104,29 @@ def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
 
 
 def measure_total_force(system: System, state: State) -> float:
-    """Return the total force on the bed, N.
-
-    Parameters
-    ----------
-    system : System
-    state : State
-    """
+    """Return the total force on the bed, N."""
     held = state.active
     return float(held.block[system.rows.force, : held.near].sum())
+
+
+def exceeds_law(system: System, state: State, pose: Floats) -> bool:
+    """Return whether the contact law does not hold, with the fingertip at a pose (7,): see `finger_range`."""
+    if system.cell.touch is None:
+        return False
+    near, fingertip = state.active.touched, system.cell.touch.fingertip
+    force, felt = near.force.sum(), near.force > 0.0
+    if force > MOST_FORCE:
+        return True
+    # Two bounds that cost little: the fingertip is above its lowest point, and within a ball that touches it.
+    depth = near.height[felt] - pose[2]
+    if depth.max(initial=0.0) > MOST_INDENTATION:
+        aside = near.quadratic_basis[1:3, felt].T - pose[:2]
+        depth -= (aside**2).sum(axis=1) / (2.0 * fingertip.flattest)
+    if depth.max(initial=0.0) <= MOST_INDENTATION:
+        return False
+    row = {"height": near.height[None], "force": near.force[None], "fingertip": pose[None]}
+    row["position"] = system.grid.positions[near.cells]
+    return bool(is_beyond(force, find_indentations(fingertip, row))[0])
 
 
 def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..engine.system import System
 from ..metrics.summary import METRICS, compute_metrics
-from ..model.finger_range import describe_excess, find_largest_indentation
+from ..model.finger_range import describe_excess, find_indentations, is_beyond
 from ..model.fingertip import require_one
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT
@@ -158,8 +158,11 @@ def evaluate(
     }
     found: dict[str, Any] = compute_metrics(history, scene.set_point)
     if system.cell.touch is not None:
-        found["max_indentation"] = find_largest_indentation(system.cell.touch.fingertip, history)
+        depth = find_indentations(system.cell.touch.fingertip, history)
+        found["max_indentation"] = float(depth.max())
         found["beyond_a_finger"] = describe_excess(found["max_total_force"], found["max_indentation"])
+        if found["beyond_a_finger"]:
+            history["beyond_a_finger"] = is_beyond(history["total_force"], depth)
     return replace(report(scene, ended, found, versions), history=history)
 
 
