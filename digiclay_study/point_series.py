@@ -133,7 +133,7 @@ class Evaluation:
 
         todo = find_unfinished(bundles, self.records)
         if todo:
-            self._pool.evaluate(todo, keep, fail)
+            self._pool(todo, keep, fail)
         return {index: record for index, record in failed.items() if index not in self.records}
 
 

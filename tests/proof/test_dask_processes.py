@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
+from digiclay.commands.executors import finish
 from digiclay.core.base.whole_files import read_json
-from digiclay.core.studies.series import finish
 from distributed import Client
 
 from tests.own_methods import forgotten, write_method

@@ -16,10 +16,10 @@ from digiclay.cli import main
 from digiclay.commands import cluster as cluster_module
 from digiclay.commands.cluster import open_cluster
 from digiclay.commands.cluster_task import Versions, describe_versions, evaluate_on_worker
+from digiclay.commands.executors import finish
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
-from digiclay.core.studies.series import finish
 from distributed import Client, LocalCluster
 
 from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text

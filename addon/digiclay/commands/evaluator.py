@@ -9,16 +9,21 @@ import os
 import pickle
 import subprocess
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record, evaluate_bundle
+from .evaluation_pool import Pool
+from .executors import finish
 from .worker import Process, Processes
 
-__all__ = ["Evaluator", "evaluate_elsewhere", "serve"]
+__all__ = ["Evaluator", "evaluate_elsewhere", "open_evaluators", "serve"]
 
 #: How often a bundle is begun whose process dies.
 TRIES = 2
@@ -46,6 +51,16 @@ class Evaluator(Process):
         except (OSError, ValueError, pickle.UnpicklingError):  # it died, or was stopped, in the middle
             raise EOFError from None
         return records
+
+
+@contextmanager
+def open_evaluators(
+    count: int, stop: Callable[[], bool], draw: Callable[[], None], *, errors: bool
+) -> Iterator[Pool]:
+    """Yield an evaluation of bundles in processes, each waited for by a thread."""
+    with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
+        task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
+        yield partial(finish, threads, task, stopped=processes.stopped)
 
 
 def evaluate_elsewhere(
