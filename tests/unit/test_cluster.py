@@ -211,6 +211,25 @@ def test_a_bad_address_is_refused_in_one_line(
     assert said.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("address", "host"),
+    [
+        ("tcp://127.0.0.1:8786", ""),
+        ("127.0.0.1:8786", ""),
+        ("tcp://localhost:8786", ""),
+        ("tcp://[::1]:8786", ""),
+        ("tls://10.0.0.1:8786", ""),
+        ("tcp://10.0.0.1:8786", "10.0.0.1"),
+        ("10.0.0.1:8786", "10.0.0.1"),
+        ("tcp://[fe80::1]:8786", "fe80::1"),
+        ("tcp://login.example:8786", "login.example"),
+    ],
+)
+def test_an_address_without_encryption_beyond_this_machine_is_warned_of(address: str, host: str) -> None:
+    said = cluster_module._describe_exposure(address)
+    assert said.partition(",")[0] == (f"Other machines can reach {host}" if host else "")
+
+
 def test_processes_of_this_machine_and_a_cluster_exclude_each_other(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
