@@ -104,7 +104,7 @@ def add_options(parser: argparse.ArgumentParser, exclusive: argparse._MutuallyEx
     )  # fmt: skip
     parser.add_argument(
         "--program", metavar="PATH",
-        help="with --submit: digiclay, its Python or Blender on the farm's machines; default: the one running",
+        help="with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
     )  # fmt: skip
     parser.add_argument(
         "--chunk", metavar="N", type=read_count,
