@@ -39,7 +39,7 @@ COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmar
 
 
 #: Files of the user: a method of one's own, and its copy beside a run.
-USERS = ("mine.py", "method.py")
+USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 

@@ -10,28 +10,17 @@ from functools import partial
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
-from ..core.studies.evaluation import Record, evaluate_bundle
+from ..core.studies.evaluation import Pool, Record, evaluate_bundle
 from ..core.studies.series import finish_here
 from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
 from .progress import Counted
 from .refusals import refuse_without
 from .worker import count_cores, in_blender
 
-__all__ = ["Pool", "add_pool", "finish_points", "open_pool", "read_count"]
+__all__ = ["add_pool", "finish_points", "open_pool", "read_count"]
 
 #: The most processes of a command.
 MOST = 61
-#: Evaluation of bundles, in any order, until all are done or somebody asks to stop. It tells of each bundle
-#: that is done, with its records, None for a point that was stopped; and of each that no worker survives, and
-#: why in one line. OutputError when there is nobody any more to evaluate them.
-Pool = Callable[
-    [
-        Sequence[Sequence[Point]],
-        Callable[[Sequence[Point], Sequence[Record | None]], None],
-        Callable[[Sequence[Point], str], None],
-    ],
-    None,
-]
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:

@@ -18,8 +18,7 @@ from typing import Any
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
-from ..core.studies.evaluation import Record, evaluate_bundle
-from .evaluation_pool import Pool
+from ..core.studies.evaluation import Pool, Record, evaluate_bundle
 from .executors import finish
 from .worker import Process, Processes
 
