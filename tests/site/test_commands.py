@@ -22,13 +22,9 @@ ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
 #: Commands that make a folder or file, its name without --out, and those that go on with it.
 OWN = {
-    "run": "{}",
-    "form": "{}",
-    "batch": "{}",
-    "new-method": "{}.py",
-    "compare": "{}_compare",
-    "paper": "paper",
-} | (dict.fromkeys(("serve", "study", "sweep", "tune"), ""))
+    "run": "{}", "form": "{}", "batch": "{}", "new-method": "{}.py", "compare": "{}_compare",
+    "paper": "paper", "serve": "", "study": "", "sweep": "", "tune": "",
+}  # fmt: skip
 SERIES = ("batch", "study", "sweep", "tune")
 #: Beyond this a command hangs, s.
 LONGEST = 1200.0

@@ -186,9 +186,6 @@ def test_versions_that_differ_are_named_with_who_has_them() -> None:
         DigiclayError, match=r"^b has digiclay 0\.0\.9, numpy .* \(and 1 more like it\); here it"
     ):
         _refuse_others({"a": here, "b": older, "c": older}, here)
-    lacking = ModuleNotFoundError("No module named 'digiclay'", name="digiclay")
-    with pytest.raises(DigiclayError, match=r"^The scheduler x lacks digiclay; here it is digiclay "):
-        _refuse_others({"The scheduler x": lacking}, here)
 
 
 @pytest.mark.parametrize(
@@ -215,11 +212,9 @@ def test_a_bad_address_is_refused_in_one_line(
     ("address", "host"),
     [
         ("tcp://127.0.0.1:8786", ""),
-        ("127.0.0.1:8786", ""),
         ("tcp://localhost:8786", ""),
         ("tcp://[::1]:8786", ""),
         ("tls://10.0.0.1:8786", ""),
-        ("tcp://10.0.0.1:8786", "10.0.0.1"),
         ("10.0.0.1:8786", "10.0.0.1"),
         ("tcp://[fe80::1]:8786", "fe80::1"),
         ("tcp://login.example:8786", "login.example"),

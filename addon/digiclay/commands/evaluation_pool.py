@@ -61,25 +61,7 @@ def open_pool(
     *,
     errors: bool = False,
 ) -> Iterator[Pool]:
-    """Open what the options of `add_pool` name; at the end of the block nothing of it runs any more.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    pieces : int
-        Most bundles at a time: there are no more processes than that.
-    stop : callable
-        Whether somebody asks to stop; processes and tasks end then.
-    draw : callable
-        Called again and again, with a note for the end of the progress line.
-    errors : bool, optional
-        Whether errors of the points are estimated.
-
-    Raises
-    ------
-    DigiclayError
-        When the scheduler cannot be used, see `cluster.open_cluster`.
-    """
+    """Open what the options of `add_pool` name, for `pieces` bundles; nothing of it runs on at the end."""
     # What has threads is not part of the extension's zip, where there is one process.
     if arguments.scheduler is not None:
         from .cluster import open_cluster
@@ -121,23 +103,7 @@ def finish_points(
     *,
     errors: bool = False,
 ) -> dict[int, Record]:
-    """Run the points that are not in a folder yet, with a progress line; return the records of all.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        With the options of `add_pool`, and `quiet`.
-    label : str
-        At the beginning of the line.
-    folder : Folder
-    bundles : sequence of sequence of Point
-    keys : sequence of str
-        The varied parameters.
-    stop : callable
-        Whether somebody asks to stop.
-    errors : bool, optional
-        Whether errors of the points are estimated.
-    """
+    """Run the points that are not in a folder yet, with a progress line; return the records of all."""
     records = select_done(folder.read_records(), errors=errors)
     todo, total = find_unfinished(bundles, records), sum(len(bundle) for bundle in bundles)
     bar = Counted(sys.stderr, label, "points", len(records))

@@ -35,14 +35,7 @@ class Evaluator(Process):
         super().__init__([], ".commands.evaluator", stdout=subprocess.PIPE)
 
     def evaluate(self, bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
-        """Return the records of a bundle; EOFError when the process has died.
-
-        Parameters
-        ----------
-        bundle : sequence of Point
-        errors : bool
-            Whether their errors are estimated.
-        """
+        """Return the records of a bundle; EOFError when the process has died."""
         try:
             pickle.dump((tuple(bundle), errors), self.input)
             self.input.flush()
@@ -65,23 +58,7 @@ def open_evaluators(
 def evaluate_elsewhere(
     processes: Processes, idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
 ) -> list[Record | None]:
-    """Evaluate a bundle in a process that has nothing to do; in another one, when that dies.
-
-    Parameters
-    ----------
-    processes : Processes
-        Of the sweep.
-    idle : list of Evaluator
-        Those of them that have nothing to do.
-    bundle : sequence of Point
-    errors : bool
-        Whether their errors are estimated.
-
-    Raises
-    ------
-    DigiclayError
-        When the other one dies as well.
-    """
+    """Evaluate a bundle in an idle process; in another one when that dies, DigiclayError when both do."""
     how = ""
     for _ in range(TRIES):
         try:

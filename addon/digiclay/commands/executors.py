@@ -32,30 +32,7 @@ def finish(
     *,
     stopped: Callable[[], bool],
 ) -> None:
-    """Have an executor do what is left of a series.
-
-    Results come back by value: who does the work needs nothing of this machine.
-
-    Parameters
-    ----------
-    executor : Executor
-        Any.
-    task : callable
-        What it runs, in a form it can hand on.
-    pieces : iterable
-        What the task gets, one at a time.
-    keep : callable
-        Told of each piece that is done, and of what the task returned.
-    fail : callable
-        Told of each piece for which the task raised an error, and of that error in one line.
-    stopped : callable
-        Asked all the time; after a stop nothing more is begun, and what runs is waited for.
-
-    Raises
-    ------
-    OutputError
-        When the executor itself breaks down.
-    """
+    """Have an executor do what is left of a series, by value; OutputError when it breaks down itself."""
     arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
     waiting: dict[Future[Outcome], Piece] = {}
     looked = -PAUSE

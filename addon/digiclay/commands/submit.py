@@ -169,14 +169,7 @@ def find_full(path: Path) -> str:
 
 
 def find_start(program: str | None) -> list[str]:
-    """Return a program and its arguments before those of digiclay.
-
-    Parameters
-    ----------
-    program : str or None
-        Path of digiclay's command, of its Python, or of Blender with the extension; None: as this process
-        was started.
-    """
+    """Return a program of the farm, or this process's, and its arguments before those of digiclay."""
     if program is None:
         return find_program()[0]
     if not program.strip():

@@ -21,17 +21,7 @@ PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
 
 
 def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) -> str:
-    """Return the template of a series.
-
-    Parameters
-    ----------
-    name : str
-        A safe one.
-    tasks : sequence of Task
-        Each after those it needs.
-    leading : sequence of str
-        Arguments of the program before those of digiclay.
-    """
+    """Return the template of a series; `leading` are the program's arguments before those of digiclay."""
     steps, program = name_steps(tasks), name_program(leading)
     template = {
         "specificationVersion": "jobtemplate-2023-09",
