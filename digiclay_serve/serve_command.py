@@ -14,6 +14,7 @@ from typing import Any
 from digiclay.commands.arguments import add_command, add_scene, scene_of
 from digiclay.commands.refusals import refuse_unwritable, refuse_without
 from digiclay.commands.stop import Stop
+from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
 from digiclay.core.base.whole_files import format_json, write_whole
 from digiclay.core.scene.scene_source import Setting
@@ -37,8 +38,6 @@ examples:
 Ctrl-C stops. Other programs send poses of the fingertip and receive forces and heights, by WebSocket and
 OSC; both need the token, which is printed once, or given by --token or {VARIABLE}.
 """
-#: Addresses of this machine alone.
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
 HOST, PORT, OSC_PORT = "127.0.0.1", 8765, 8766
 SCENE = "ridge_mound_valley"
 
@@ -129,8 +128,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
         _tell(f"OSC       {_bracket(arguments.host)}:{doors.osc_port} (UDP)")
         if made:
             _tell(f"token     {token}")
-        if arguments.host not in LOOPBACK:
-            _tell("Other machines can reach this address, and the token is sent without encryption.")
+        if exposure := describe_exposure(arguments.host, "the token is"):
+            _tell(exposure)
         stopped = _until(stop, arguments.seconds)
         try:
             session, figures = run_session(session, doors, writer, arguments.part, stopped, _tell)

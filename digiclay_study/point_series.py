@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.commands.evaluation_pool import Pool, open_pool
+from digiclay.commands.evaluation_pool import open_pool
 from digiclay.commands.progress import Counted
 from digiclay.commands.stop import Stop
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.base.whole_files import write_whole
 from digiclay.core.studies.axes import Point, find_value
-from digiclay.core.studies.evaluation import Record
+from digiclay.core.studies.evaluation import Pool, Record
 from digiclay.core.studies.series import Kind, open_series
 from digiclay.core.studies.sweep_plan import (
     POINTS,
@@ -133,7 +133,7 @@ class Evaluation:
 
         todo = find_unfinished(bundles, self.records)
         if todo:
-            self._pool.evaluate(todo, keep, fail)
+            self._pool(todo, keep, fail)
         return {index: record for index, record in failed.items() if index not in self.records}
 
 

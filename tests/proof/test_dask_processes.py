@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
+from digiclay.commands.executors import finish
 from digiclay.core.base.whole_files import read_json
-from digiclay.core.studies.series import finish
 from distributed import Client
 
 from tests.own_methods import forgotten, write_method
@@ -23,6 +23,8 @@ from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text
 from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
+#: Libraries of this Python; as a path, and with -S, without an installed digiclay.
+LIBRARIES = Path(pytest.__file__).parents[1]
 #: Twelve batches of four, some tenths of a second each.
 AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=20:31:12"]
 SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
@@ -41,9 +43,9 @@ def start(here: Path) -> Iterator[Start]:
     """Start processes of Python that end with the test."""
     running: list[subprocess.Popen[str]] = []
 
-    def start(*arguments: str, addon: Path = ADDON, **settings: str) -> subprocess.Popen[str]:
+    def start(*arguments: str, addon: Path = ADDON, bare: bool = False, **settings: str) -> Any:
         process = subprocess.Popen(
-            [sys.executable, "-m", *arguments], stderr=subprocess.PIPE, text=True,
+            [sys.executable, *["-S"] * bare, "-m", *arguments], stderr=subprocess.PIPE, text=True,
             env={**os.environ, "PYTHONPATH": str(addon), **settings},
         )  # fmt: skip
         running.append(process)
@@ -56,7 +58,7 @@ def start(here: Path) -> Iterator[Start]:
         process.communicate()
 
 
-def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: str) -> tuple[Any, str]:
+def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: Any) -> tuple[Any, str]:
     """Start a scheduler; return its process and its address."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
@@ -165,6 +167,48 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Pa
     assert sweep.returncode == 2
     assert " has digiclay 9." in said
     assert said.endswith("Install the same there.\n")
+
+
+@pytest.mark.parametrize(
+    ("place", "line"),
+    [
+        ("scheduler", "The scheduler {} lacks digiclay; here it is digiclay 0"),
+        ("worker", "Worker tcp://127.0.0.1:"),
+        ("late worker", "A worker of {} lacks digiclay. What is done is kept"),
+    ],
+)
+def test_a_place_without_digiclay_is_named_in_one_line(
+    place: str, line: str, here: Path, start: Start
+) -> None:
+    bare = {"addon": LIBRARIES, "bare": True}
+    _, address = start_scheduler(start, here, **(bare if place == "scheduler" else {}))
+    start_worker(start, address, "--no-nanny", **(bare if place == "worker" else {}))
+    hours = ["--set", "simulation.duration=1e5", "--set", "recorder.every=1000"]
+    sweep = start("digiclay", *SWEEP, *hours, "--scheduler", address, "--out", "far")
+    if place == "late worker":
+        with Client(address, set_as_default=False) as client:
+            wait_until(lambda: any(client.processing().values()))
+        start_worker(start, address, "--no-nanny", **bare)
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    (told,) = [each for each in said.splitlines() if "no workers yet" not in each]
+    assert (sweep.returncode, told.startswith(line.format(address))) == (2, True)
+    assert " lacks digiclay" in told
+
+
+def test_libraries_that_differ_without_effect_are_not_mentioned(here: Path, start: Start) -> None:
+    made = here / "other" / "lz4-0.0.dist-info" / "METADATA"
+    made.parent.mkdir(parents=True)
+    made.write_text("Metadata-Version: 2.1\nName: lz4\nVersion: 0.0\n", encoding="utf-8")
+    _, address = start_scheduler(start, here)
+    start_worker(start, address, "--no-nanny", PYTHONPATH=os.pathsep.join((str(ADDON), str(here / "other"))))
+    with Client(address, set_as_default=False) as client:
+        wait_until(lambda: client.scheduler_info()["workers"])
+        with pytest.warns(UserWarning, match="lz4"):
+            client.get_versions(check=True)
+    words = ["digiclay", "sweep", "tap", "--vary", "control.force_gain=1,2", "--out", "far", "--quiet"]
+    sweep = start(*words, "--scheduler", address)
+    _, said = sweep.communicate(timeout=TIMEOUT)
+    assert (sweep.returncode, said) == (0, "")
 
 
 def test_a_worker_elsewhere_gets_the_code_of_a_method_with_its_points(here: Path, start: Start) -> None:

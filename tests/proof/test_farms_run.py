@@ -24,6 +24,10 @@ height = 40
 rate = 10
 """
 
+QUICK = 'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.05\n'
+#: The command beside this Python.
+COMMAND = str(Path(sys.executable).with_name("digiclay"))
+
 
 def openjd(*arguments: str | Path) -> str:
     """Run openjd and return all it says; it must end well."""
@@ -42,7 +46,7 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(
     )
     template = out / "openjd.json"
     assert "passes validation checks" in openjd("check", template)
-    said = openjd("run", template, "-p", f"Program={sys.executable}")
+    said = openjd("run", template, "-p", f"Python={sys.executable}")
     steps = re.findall(r"Running step '(.*)'", said)
     assert steps == ["tap-short: run", "tap-short: frames of film", "tap-short: film", "page"]
     assert re.findall(r"frames (\S+) of .*film.mp4 (.*)", said) == [("0+3", "drawn"), ("3+3", "drawn")]
@@ -52,7 +56,7 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(
     assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
     # A task that is sent again ends well and changes nothing.
     before = {path: path.stat().st_mtime_ns for path in run.iterdir()}
-    again = openjd("run", template, "-p", f"Program={sys.executable}", "--step", "tap-short: film")
+    again = openjd("run", template, "-p", f"Python={sys.executable}", "--step", "tap-short: film")
     assert "was done already" in again
     assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
 
@@ -62,7 +66,7 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> Non
     jobs.write_text(JOBS.replace("0.3", "0.05"), encoding="utf-8")
     assert main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"]) == 0
     (tmp_path / "out" / "jobs" / "tap-short" / "scene.toml").write_text("name = 3\n", encoding="utf-8")
-    template, program = tmp_path / "out" / "openjd.json", f"Program={sys.executable}"
+    template, program = tmp_path / "out" / "openjd.json", f"Python={sys.executable}"
     done = subprocess.run(
         [sys.executable, "-m", "openjd", "run", template, "-p", program],
         capture_output=True, text=True, check=False, timeout=TIMEOUT,
@@ -74,12 +78,27 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> Non
     assert "0 of 1 jobs done, 1 failed." in page
 
 
+@pytest.mark.parametrize(
+    ("program", "name"),
+    [
+        ("", f"Python={sys.executable}"),
+        (sys.executable, f"Python={sys.executable}"),
+        (COMMAND, f"Digiclay={COMMAND}"),
+    ],
+)
+def test_the_program_of_a_template_is_named_by_its_kind(program: str, name: str, tmp_path: Path) -> None:
+    jobs, out = tmp_path / "two.toml", tmp_path / "out"
+    jobs.write_text(QUICK, encoding="utf-8")
+    words = ["--program", program] if program else []
+    assert main(["batch", str(jobs), "--out", str(out), "--submit", "openjd", *words, "--quiet"]) == 0
+    openjd("run", out / "openjd.json", "-p", name)
+    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
+
+
 def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path: Path) -> None:
     """As a frame of cuecmd does."""
     jobs, out = tmp_path / "two.toml", tmp_path / "schöne 'Tasten' $HOME; #"
-    jobs.write_text(
-        'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.05\n', encoding="utf-8"
-    )
+    jobs.write_text(QUICK, encoding="utf-8")
     assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0
     for path in sorted((out / "cuecmd").iterdir()):
         for line in path.read_text(encoding="utf-8").splitlines():

@@ -20,6 +20,12 @@ from tests.unit.test_docs import PAGES
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
+#: Commands that make a folder or file, its name without --out, and those that go on with it.
+OWN = {
+    "run": "{}", "form": "{}", "batch": "{}", "new-method": "{}.py", "compare": "{}_compare",
+    "paper": "paper", "serve": "", "study": "", "sweep": "", "tune": "",
+}  # fmt: skip
+SERIES = ("batch", "study", "sweep", "tune")
 #: Beyond this a command hangs, s.
 LONGEST = 1200.0
 
@@ -96,6 +102,28 @@ def test_a_file_of_a_page_is_there_for_its_commands(tmp_path: Path) -> None:
     text = '```python title="a.py"\nopen("made", "w").close()\n```\n\n    .venv/bin/python a.py\n'
     assert play(text, tmp_path, set()) == []
     assert (tmp_path / "made").exists()
+
+
+def _find_made(command: str) -> tuple[str, str]:
+    """Return what a command makes, "" for nothing, and what it may go on with."""
+    program, *words = shlex.split(command)
+    if program != "digiclay" or words[0] not in OWN or {"--help", "--overwrite"} & set(words):
+        return "", command
+    series = f"batch {words[1]}" if words[0] == "batch" else command
+    named = words[words.index("--out") + 1] if "--out" in words else OWN[words[0]].format(Path(words[1]).stem)
+    return named, series if words[0] in SERIES or "--suite" in words else ""
+
+
+def test_pages_copied_one_after_the_other_into_a_folder_meet_nothing_that_exists_already() -> None:
+    made: dict[str, list[str]] = {}
+    for page in (page for page in PAGES if page.parent.name in (ROOT.name, "docs")):
+        commands = find_commands(page.read_text(encoding="utf-8"))
+        for text in dict.fromkeys(one.text for one in commands if one.block):
+            name, series = _find_made(text)
+            if name and not (series and series in made.get(name, [])):
+                made.setdefault(name, []).append(series or f"{page.name}: {text}")
+    assert len(made) > 30
+    assert {name: found for name, found in made.items() if len(found) > 1} == {}
 
 
 def test_every_listed_command_is_on_a_page_and_has_a_reason_and_something_that_shows_it() -> None:

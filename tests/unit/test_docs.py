@@ -6,6 +6,7 @@ import ast
 import functools
 import re
 import shlex
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,7 +39,7 @@ COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmar
 
 
 #: Files of the user: a method of one's own, and its copy beside a run.
-USERS = ("mine.py", "method.py")
+USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 
@@ -176,3 +177,11 @@ def test_every_command_is_one_that_its_program_takes(page: Path, capsys: pytest.
 
 def test_the_pages_have_commands_to_check() -> None:
     assert sum(len(_commands(page)) for page in PAGES) > 25
+
+
+def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / project["readme"]).read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\| `digiclay\[(\w+)\]` \|", page, re.MULTILINE)) == sorted(
+        project["optional-dependencies"].keys() - {"dev"}
+    )

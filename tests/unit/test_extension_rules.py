@@ -18,7 +18,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
 MANIFEST: dict[str, Any] = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
-PAGE = (ROOT / "docs" / "release.md").read_text(encoding="utf-8")
 #: Longest tagline and reason of a permission.
 LONGEST = 64
 #: Tags that the platform has for add-ons, of those that could ever fit.
@@ -27,15 +26,9 @@ TAGS = {"3D View", "Add Mesh", "Animation", "Import-Export", "Mesh", "Modeling",
 LICENSES = {"GPL-2.0-or-later", "GPL-3.0-or-later", "LGPL-2.1-or-later", "LGPL-3.0-or-later", "CC0-1.0"} | {
     "BSD-1-Clause", "BSD-2-Clause", "BSD-3-Clause", "BSL-1.0", "MIT", "MIT-0", "MPL-2.0", "Pixar", "Zlib",
 }  # fmt: skip
-#: Blender crashes where threads run beside it, so each module that may start or meet one states its need.
+#: What the platform's reviewers refuse: threads, beside which Blender crashes, and text that is executed.
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
-NEEDS = {
-    "core/studies/series.py": "types of the executors that commands hand to it; starts none",
-    "commands/batch.py": "waits for several processes",
-    "commands/evaluation_pool.py": "waits for several processes",
-    "commands/job.py": "a process without a window: reads the end of its input while it works",
-    "commands/worker.py": "a lock around processes that several threads start",
-}
+EXECUTED = {"exec", "eval"}
 #: What reaches other machines needs the permission `network`.
 NETWORK = {"asyncio", "distributed", "ftplib", "http", "pythonosc", "requests", "socket", "socketserver"} | {
     "ssl", "telnetlib", "urllib.request", "websockets", "xmlrpc",
@@ -129,22 +122,31 @@ def test_every_holder_of_a_copyright_has_a_year_and_a_name() -> None:
     assert any("Michael Dawson-Haggerty" in line for line in lines)
 
 
-def test_every_module_with_threads_states_its_need() -> None:
-    found = {path for path, text in modules() if imported(text) & THREADS}
-    assert found == set(NEEDS)
+def find_refused(text: str) -> set[str]:
+    """Return what reviewers refuse in a module: libraries of threads, and text that is executed."""
+    names = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    return imported(text) & THREADS | names & EXECUTED
 
 
-def test_no_module_of_blenders_window_has_a_thread() -> None:
-    """Threads are for commands, which run in a process without a window."""
-    assert [path for path in NEEDS if not path.startswith(("commands/", "core/studies/"))] == []
-    lazily = {"cli.py", "__main__.py"}
-    importing = re.compile(r"^\s*from \.+(digiclay\.)?commands\b|^\s*import .*\bcommands\b", re.MULTILINE)
-    inside = [path for path, text in modules() if not path.startswith("commands/") and importing.search(text)]
-    assert set(inside) <= lazily
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import threading as t",
+        "def f():\n    from threading import Lock",
+        "import _thread",
+        "from concurrent.futures import ThreadPoolExecutor",
+        "import multiprocessing.pool",
+        "exec(compile('1', 'a', 'exec'))",
+        "run = eval",
+    ],
+)
+def test_code_that_reviewers_refuse_is_found(text: str) -> None:
+    assert find_refused(text)
 
 
-def test_the_page_lists_the_modules_with_threads() -> None:
-    assert [path for path in NEEDS if f"`{path}`" not in PAGE] == []
+def test_the_zip_has_no_threads_and_executes_no_text() -> None:
+    assert find_refused("import subprocess\nmodule.exec_module(it)\nbed.eval(3)") == set()
+    assert {path: found for path, text in modules() if (found := find_refused(text))} == {}
 
 
 def test_the_permissions_are_those_that_are_used() -> None:

@@ -88,18 +88,18 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
     assert submit("openjd", JOBS + FILMS, "--program", WINDOWS) == 0
     template = decode_job_template(template=json.loads(Path("out/openjd.json").read_text(encoding="utf-8")))
     values = preprocess_job_parameters(
-        job_template=template, job_parameter_values={"Program": "/p"},
+        job_template=template, job_parameter_values={"Blender": "/p"},
         job_template_dir=here / "out", current_working_dir=here,
     )  # fmt: skip
     job = create_job(job_template=template, job_parameter_values=values)
     series = str(here / "out")
-    assert {name: value.value for name, value in values.items()} == {"Series": series, "Program": "/p"}
+    assert {name: value.value for name, value in values.items()} == {"Series": series, "Blender": "/p"}
     order = [step.name for step in StepDependencyGraph(job=job).topo_sorted()]
     wanted, seen = planned(), []
     for name in order:
         (step,) = (one for one in job.steps if one.name == name)
         action = step.script.actions.onRun
-        assert str(action.command) == "{{Param.Program}}"
+        assert str(action.command) == "{{Param.Blender}}"
         blender = ["--background", "--addons", "bl_ext.user_default.digiclay", "--command", "digiclay"]
         given = [str(one) for one in action.args]
         assert given[:5] == blender

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.commands.evaluation_pool import Pool
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.evaluation import Record
+from digiclay.core.studies.series import finish_here
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
@@ -48,11 +48,8 @@ def run_study(out: Path, samples: int, seed: int, *, second: bool) -> Indices:
     points = [Point(index, row, None) for index, row in enumerate(words, 1)]
     bundles = [points[first : first + 64] for first in range(0, len(points), 64)]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
-    with (
-        open_folder(out, "study", subject, {"samples": samples}) as folder,
-        ThreadPoolExecutor(2) as threads,
-    ):
-        pool = Pool(threads, evaluate_ishigami, lambda: False)
+    with open_folder(out, "study", subject, {"samples": samples}) as folder:
+        pool = partial(finish_here, evaluate_ishigami, stopped=lambda: False)
         assert Evaluation(subject, folder, pool, {}).evaluate(bundles, subject.keys) == {}
         records = folder.read_records()
     reference: Record = {"figures": {}}
@@ -93,14 +90,13 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path: Path)
     points = [Point(index, ("0.5", "0.5", "0.5"), None) for index in range(1, 5)]
     bundles = [points[:2], points[2:]]
     subject = Subject(find("slow_press"), (), load(find("slow_press")), ANGLES, ("rfd",))
-    with open_folder(tmp_path / "out", "study", subject, {}) as folder, ThreadPoolExecutor(1) as thread:
-        failed = Evaluation(subject, folder, Pool(thread, die, lambda: False), {}).evaluate(
-            bundles, subject.keys
+    with open_folder(tmp_path / "out", "study", subject, {}) as folder:
+        dying, sound = (
+            partial(finish_here, task, stopped=lambda: False) for task in (die, evaluate_ishigami)
         )
+        failed = Evaluation(subject, folder, dying, {}).evaluate(bundles, subject.keys)
         assert failed == {index: {"error": "A worker died twice of this."} for index in (1, 2)}
-        again = Evaluation(
-            subject, folder, Pool(thread, evaluate_ishigami, lambda: False), folder.read_records()
-        )
+        again = Evaluation(subject, folder, sound, folder.read_records())
         assert set(again.records) == {3, 4}
         assert again.evaluate(bundles, subject.keys) == {}
         assert set(folder.read_records()) == {1, 2, 3, 4}

@@ -18,12 +18,12 @@ from typing import Any
 import pytest
 from digiclay.cli import main
 from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere
+from digiclay.commands.executors import finish
 from digiclay.commands.worker import Processes
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.studies.axes import Point, make_points, read_axis
 from digiclay.core.studies.evaluation import Record, evaluate, evaluate_bundle
-from digiclay.core.studies.series import finish
 
 from tests.timeouts import TIMEOUT, wait_until
 

@@ -119,8 +119,8 @@ def test_a_series_for_a_farm_is_run_by_blender(
     done = command("digiclay", *words, "--program", str(BLENDER))
     assert done.returncode == 0, done.stdout + done.stderr
     # As the line that was printed says.
-    assert f"-p Program={BLENDER}" in done.stdout
-    run = ["run", str(out / "openjd.json"), "-p", f"Program={BLENDER}"]
+    assert f"-p Blender={BLENDER}" in done.stdout
+    run = ["run", str(out / "openjd.json"), "-p", f"Blender={BLENDER}"]
     done = subprocess.run(
         [sys.executable, "-m", "openjd", *run],
         env=environment, capture_output=True, text=True, timeout=TIMEOUT,

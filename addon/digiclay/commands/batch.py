@@ -7,14 +7,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.base.errors import DigiclayError, one_line
+from ..core.base.errors import one_line
 from ..core.studies.job_table import Job, find_jobs_file, read_jobs
-from ..core.studies.series import finish
 from ..plugins.method_copy import find_word
 from .arguments import add_command, load_by_option
 from .batch_folder import Folder, open_batch
@@ -152,9 +149,17 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
                 folder.write_index(failed, f"{said}, {len(failed)} failed." if failed else f"{said}.")
                 due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
 
-        def keep(job: Job, _: None) -> None:
-            ended.append(job)
-            refresh()
+        def begin(job: Job) -> JobProcess:
+            running[job.name] = process = _start_job(folder, job)
+            return process
+
+        def end(job: Job) -> None:
+            process = running.pop(job.name)
+            if not folder.is_done(job):
+                fail(job, process.read_error())
+            else:
+                ended.append(job)
+                refresh()
 
         def fail(job: Job, error: str) -> None:
             ended.append(job)
@@ -165,14 +170,11 @@ def _finish(arguments: argparse.Namespace, folder: Folder) -> int:
 
         def draw() -> None:
             if not arguments.quiet:
-                done = (
-                    before + len(ended) + sum(process.read_fraction() for process in list(running.values()))
-                )
+                done = before + len(ended) + sum(process.read_fraction() for process in running.values())
                 bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
 
-        with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
-            task = partial(_do_job, processes, running, folder)
-            finish(threads, task, todo, keep, fail, stopped=processes.stopped)
+        with Processes(stop, draw) as processes:
+            processes.finish(count, todo, begin, end, fail)
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
     done = before - sum(bool(job.error) for job in made.jobs) + now
@@ -201,19 +203,12 @@ def _tell_failed(failed: Mapping[str, str], count: int) -> int:
     return FAILED
 
 
-def _do_job(processes: Processes, running: dict[str, JobProcess], folder: Folder, job: Job) -> None:
-    """Run a job in a process of its own; DigiclayError states the reason of a failure."""
+def _start_job(folder: Folder, job: Job) -> JobProcess:
+    """Run a job in a process of its own."""
     arguments = [
         "job", str(folder.find_job(job).resolve()), "--out", str(folder.find_run(job).resolve()),
         "--follow", "--since", repr(time.time()),
     ]  # fmt: skip
     if job.scene is not None and (word := find_word(job.scene)):
         arguments += ["--method", word]
-    process = processes.start(partial(JobProcess, arguments, folder.find_log(job)))
-    if process is None:
-        return
-    running[job.name] = process
-    processes.wait(process)
-    del running[job.name]
-    if not folder.is_done(job):
-        raise DigiclayError(process.read_error())
+    return JobProcess(arguments, folder.find_log(job))

@@ -11,13 +11,16 @@ import logging
 import pickle
 import sys
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
+from urllib.parse import urlsplit
 
+from ..core.base.addresses import describe_exposure
 from ..core.base.errors import DigiclayError, one_line
 from .cluster_task import UnfitWorkerError, Versions, call_on_worker, describe_versions
 from .stop import allow_interrupt
@@ -32,6 +35,8 @@ FETCH = 30.0
 LOOK, ALONE = 1.0, 10.0
 #: Packages whose loggers are silenced.
 NOISY = ("distributed", "tornado", "asyncio")
+#: Schemes of addresses that are encrypted or stay within a process; tcp:// is the default.
+ENCRYPTED = ("tls", "wss", "inproc")
 
 
 class Cluster(Executor):
@@ -67,7 +72,8 @@ class Cluster(Executor):
     def _send(self, future: Future[Any], packed: bytes, *, alone: bool = False) -> None:
         """Send a task to the scheduler; `alone` after workers died that had it."""
         try:
-            remote = self._client.submit(call_on_worker, packed, self._versions, pure=False)
+            call = _pack_call(call_on_worker, packed, self._versions)
+            remote = self._client.submit(pickle.loads, call, pure=False)
             self._remote.add(remote)
             remote.add_done_callback(partial(self._hand_back, future, packed, alone))
         except Exception:  # Dask's client is closed when it has given up
@@ -159,12 +165,13 @@ class Cluster(Executor):
 
     def refuse_other_versions(self) -> None:
         """Refuse a cluster of which a part runs another digiclay, numpy or Python."""
+        call = _pack_call(describe_versions)
         try:
-            scheduler: Any = self._client.run_on_scheduler(describe_versions)
+            scheduler: Any = self._client.run_on_scheduler(pickle.loads, call)
         except Exception as error:
             scheduler = error
         found = {f"The scheduler {self._address}": scheduler}
-        workers = self._client.run(describe_versions, on_error="return")
+        workers = self._client.run(pickle.loads, call, on_error="return")
         found |= {f"Worker {name}": versions for name, versions in workers.items()}
         _refuse_others(found, self._versions)
 
@@ -195,6 +202,25 @@ def _refuse_others(found: Mapping[str, Any], here: Versions) -> None:
     else:
         has = f"cannot run digiclay ({type(versions).__name__}: {versions})"
     raise DigiclayError(one_line(f"{name} {has}{more}; here it is {here}. Install the same there."))
+
+
+def _describe_exposure(address: str) -> str:
+    """Return a warning of an address that is neither encrypted nor of this machine alone."""
+    scheme, _, place = address.rpartition("://")
+    if scheme in ENCRYPTED:
+        return ""
+    exposure = describe_exposure(urlsplit(f"//{place}").hostname or "", "points, code and results are")
+    return exposure and f"{exposure} tls:// encrypts."
+
+
+def _pack_call(function: Callable[..., Any], *arguments: Any) -> bytes:
+    """Return what `pickle.loads` makes a call of: there a module that is missing is an error of the call."""
+
+    class Call:
+        def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+            return function, arguments
+
+    return pickle.dumps(Call(), pickle.HIGHEST_PROTOCOL)
 
 
 def _tell(line: str) -> None:
@@ -233,6 +259,8 @@ def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], N
             cluster.wait_for_workers(stop, draw)
             if not stop():
                 cluster.refuse_other_versions()
+                if exposure := _describe_exposure(address):
+                    _tell(exposure)
             yield cluster
     finally:
         with suppress(Exception):
@@ -267,10 +295,12 @@ async def _try_address(address: str) -> None:
 
 
 def _silence_log() -> None:
-    """Keep Dask's log off the terminal: what matters is told in lines of this program.
+    """Keep Dask's log and warnings off the terminal: what matters is told in lines of this program.
 
     For good: its threads still write when a client has been closed whose scheduler is gone.
     """
     for name, logger in logging.root.manager.loggerDict.items():
         if name.partition(".")[0] in NOISY and isinstance(logger, logging.Logger):
             logger.disabled = True
+    # It draws a table of all libraries that differ; those that results depend on are compared here.
+    warnings.filterwarnings("ignore", "Mismatched versions found")

@@ -40,20 +40,7 @@ def describe_versions() -> Versions:
 
 
 def call_on_worker(packed: bytes, wanted: Versions) -> Any:
-    """Call a function in a task of a Dask worker, and return its result.
-
-    Parameters
-    ----------
-    packed : bytes
-        The function and its arguments, pickled: the scheduler need not read them.
-    wanted : Versions
-        Those of the session that asks.
-
-    Raises
-    ------
-    UnfitWorkerError
-        When the worker has joined since the session compared the versions, and has others.
-    """
+    """Call a pickled function in a task of a Dask worker; UnfitWorkerError where the versions differ."""
     here = describe_versions()
     if here != Versions(*wanted):
         from distributed import get_worker

@@ -5,66 +5,22 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
-from ..core.studies.evaluation import Record, evaluate_bundle
-from ..core.studies.series import finish
+from ..core.studies.evaluation import Pool, Record, evaluate_bundle
+from ..core.studies.series import finish_here
 from ..core.studies.sweep_plan import Folder, find_unfinished, select_done
 from .progress import Counted
 from .refusals import refuse_without
-from .worker import Processes, count_cores, in_blender
+from .worker import count_cores, in_blender
 
-__all__ = ["Pool", "add_pool", "finish_points", "open_pool", "read_count"]
+__all__ = ["add_pool", "finish_points", "open_pool", "read_count"]
 
 #: The most processes of a command.
 MOST = 61
-
-
-@dataclass(frozen=True)
-class Pool:
-    """Evaluation of bundles, for one or several series of them.
-
-    Attributes
-    ----------
-    executor : Executor
-    task : callable
-        What the executor calls for a bundle; it returns the records.
-    stopped : callable
-        Whether somebody asks to stop; draws the progress.
-    """
-
-    executor: Executor
-    task: Callable[[Sequence[Point]], list[Record | None]]
-    stopped: Callable[[], bool]
-
-    def evaluate(
-        self,
-        bundles: Sequence[Sequence[Point]],
-        keep: Callable[[Sequence[Point], Sequence[Record | None]], None],
-        fail: Callable[[Sequence[Point], str], None],
-    ) -> None:
-        """Evaluate bundles, in any order, until all are done or somebody asks to stop.
-
-        Parameters
-        ----------
-        bundles : sequence of sequence of Point
-            See `core.studies.evaluation.make_bundles`.
-        keep : callable
-            Told of each bundle that is done, and of its records, None for a point that was stopped.
-        fail : callable
-            Told of each bundle that no worker survives, and why in one line.
-
-        Raises
-        ------
-        OutputError
-            When there is nobody any more to evaluate them, as after the end of the scheduler.
-        """
-        finish(self.executor, self.task, bundles, keep, fail, stopped=self.stopped)
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:
@@ -105,28 +61,12 @@ def open_pool(
     *,
     errors: bool = False,
 ) -> Iterator[Pool]:
-    """Open what the options of `add_pool` name; at the end of the block nothing of it runs any more.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-    pieces : int
-        Most bundles at a time: there are no more processes than that.
-    stop : callable
-        Whether somebody asks to stop; processes and tasks end then.
-    draw : callable
-        Called again and again, with a note for the end of the progress line.
-    errors : bool, optional
-        Whether errors of the points are estimated.
-
-    Raises
-    ------
-    DigiclayError
-        When the scheduler cannot be used, see `cluster.open_cluster`.
-    """
+    """Open what the options of `add_pool` name, for `pieces` bundles; nothing of it runs on at the end."""
+    # What has threads is not part of the extension's zip, where there is one process.
     if arguments.scheduler is not None:
         from .cluster import open_cluster
         from .cluster_task import evaluate_on_worker
+        from .executors import finish
 
         with open_cluster(arguments.scheduler, stop, draw) as cluster:
 
@@ -134,19 +74,23 @@ def open_pool(
                 draw(cluster.describe())
                 return stop()
 
-            yield Pool(cluster, partial(evaluate_on_worker, errors=errors), stopped)
+            yield partial(finish, cluster, partial(evaluate_on_worker, errors=errors), stopped=stopped)
         return
     count = max(1, min(arguments.workers or count_cores(), MOST, pieces)) if not in_blender() else 1
-    with ThreadPoolExecutor(count) as threads, Processes(stop, partial(draw, "")) as processes:
-        task: Callable[[Sequence[Point]], list[Record | None]]
-        if count == 1:
-            task = partial(evaluate_bundle, stopped=processes.stopping, errors=errors)
-        else:
-            # Not part of the extension's zip, where there is one process.
-            from .evaluator import Evaluator, evaluate_elsewhere
+    if count > 1:
+        from .evaluator import open_evaluators
 
-            task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
-        yield Pool(threads, task, processes.stopped)
+        with open_evaluators(count, stop, partial(draw, ""), errors=errors) as pool:
+            yield pool
+        return
+
+    def draw_and_ask() -> bool:
+        draw("")
+        return stop()
+
+    yield partial(
+        finish_here, partial(evaluate_bundle, stopped=draw_and_ask, errors=errors), stopped=draw_and_ask
+    )
 
 
 def finish_points(
@@ -159,23 +103,7 @@ def finish_points(
     *,
     errors: bool = False,
 ) -> dict[int, Record]:
-    """Run the points that are not in a folder yet, with a progress line; return the records of all.
-
-    Parameters
-    ----------
-    arguments : argparse.Namespace
-        With the options of `add_pool`, and `quiet`.
-    label : str
-        At the beginning of the line.
-    folder : Folder
-    bundles : sequence of sequence of Point
-    keys : sequence of str
-        The varied parameters.
-    stop : callable
-        Whether somebody asks to stop.
-    errors : bool, optional
-        Whether errors of the points are estimated.
-    """
+    """Run the points that are not in a folder yet, with a progress line; return the records of all."""
     records = select_done(folder.read_records(), errors=errors)
     todo, total = find_unfinished(bundles, records), sum(len(bundle) for bundle in bundles)
     bar = Counted(sys.stderr, label, "points", len(records))
@@ -198,5 +126,5 @@ def finish_points(
 
     if todo:
         with bar, open_pool(arguments, len(todo), stop, draw, errors=errors) as pool:
-            pool.evaluate(todo, keep, fail)
+            pool(todo, keep, fail)
     return records

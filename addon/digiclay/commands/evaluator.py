@@ -9,16 +9,20 @@ import os
 import pickle
 import subprocess
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
 from ..core.base.errors import DigiclayError
 from ..core.studies.axes import Point
-from ..core.studies.evaluation import Record, evaluate_bundle
+from ..core.studies.evaluation import Pool, Record, evaluate_bundle
+from .executors import finish
 from .worker import Process, Processes
 
-__all__ = ["Evaluator", "evaluate_elsewhere", "serve"]
+__all__ = ["Evaluator", "evaluate_elsewhere", "open_evaluators", "serve"]
 
 #: How often a bundle is begun whose process dies.
 TRIES = 2
@@ -31,14 +35,7 @@ class Evaluator(Process):
         super().__init__([], ".commands.evaluator", stdout=subprocess.PIPE)
 
     def evaluate(self, bundle: Sequence[Point], *, errors: bool) -> list[Record | None]:
-        """Return the records of a bundle; EOFError when the process has died.
-
-        Parameters
-        ----------
-        bundle : sequence of Point
-        errors : bool
-            Whether their errors are estimated.
-        """
+        """Return the records of a bundle; EOFError when the process has died."""
         try:
             pickle.dump((tuple(bundle), errors), self.input)
             self.input.flush()
@@ -48,26 +45,20 @@ class Evaluator(Process):
         return records
 
 
+@contextmanager
+def open_evaluators(
+    count: int, stop: Callable[[], bool], draw: Callable[[], None], *, errors: bool
+) -> Iterator[Pool]:
+    """Yield an evaluation of bundles in processes, each waited for by a thread."""
+    with ThreadPoolExecutor(count) as threads, Processes(stop, draw) as processes:
+        task = partial(evaluate_elsewhere, processes, list[Evaluator](), errors=errors)
+        yield partial(finish, threads, task, stopped=processes.stopped)
+
+
 def evaluate_elsewhere(
     processes: Processes, idle: list[Evaluator], bundle: Sequence[Point], *, errors: bool
 ) -> list[Record | None]:
-    """Evaluate a bundle in a process that has nothing to do; in another one, when that dies.
-
-    Parameters
-    ----------
-    processes : Processes
-        Of the sweep.
-    idle : list of Evaluator
-        Those of them that have nothing to do.
-    bundle : sequence of Point
-    errors : bool
-        Whether their errors are estimated.
-
-    Raises
-    ------
-    DigiclayError
-        When the other one dies as well.
-    """
+    """Evaluate a bundle in an idle process; in another one when that dies, DigiclayError when both do."""
     how = ""
     for _ in range(TRIES):
         try:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import select
 import shutil
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -87,10 +88,9 @@ def carry_out(arguments: argparse.Namespace) -> int:
         if not arguments.quiet:
             print(said)
         return 0
-    ended = watch_input()
     try:
         _do_job(
-            arguments, ended.is_set, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True)
+            arguments, has_input_ended, lambda step, share: print(f"{PROGRESS}{step} {share:.4f}", flush=True)
         )
         return 0
     except KeyboardInterrupt:
@@ -107,18 +107,17 @@ def carry_out(arguments: argparse.Namespace) -> int:
         return 1
 
 
-def watch_input() -> threading.Event:
-    """Return an event that is set when standard input ends."""
-    ended = threading.Event()
+def has_input_ended() -> bool:
+    """Return whether standard input, on which nobody writes, has ended."""
+    if sys.platform == "win32":  # where select is for sockets alone
+        import _winapi
+        import msvcrt
 
-    def watch() -> None:
-        # Not sys.stdin: a thread that waits in it would keep Python from shutting down.
-        while os.read(0, 1):
-            pass
-        ended.set()
-
-    threading.Thread(target=watch, daemon=True).start()
-    return ended
+        with suppress(BrokenPipeError):
+            _winapi.PeekNamedPipe(msvcrt.get_osfhandle(0), 0)
+            return False
+        return True
+    return bool(select.select([0], [], [], 0.0)[0])
 
 
 def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> str:

@@ -52,7 +52,7 @@ def _write_openjd(made: Submission) -> Written:
     """Return the job template."""
     name = "openjd.json"
     template = openjd.format_template(made.name, made.tasks, made.program[1:])
-    given = ["-p", f"Program={made.program[0]}"]
+    given = ["-p", f"{openjd.name_program(made.program[1:])}={made.program[0]}"]
     return {name: template}, [
         f"check: {made.show('openjd', 'check', made.find(name))}",
         f"run on this machine: {made.show('openjd', 'run', made.find(name), *given)}",
@@ -104,7 +104,7 @@ def add_options(parser: argparse.ArgumentParser, exclusive: argparse._MutuallyEx
     )  # fmt: skip
     parser.add_argument(
         "--program", metavar="PATH",
-        help="with --submit: digiclay or Blender on the machines of the farm; default: the one running now",
+        help="with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
     )  # fmt: skip
     parser.add_argument(
         "--chunk", metavar="N", type=read_count,
@@ -169,18 +169,13 @@ def find_full(path: Path) -> str:
 
 
 def find_start(program: str | None) -> list[str]:
-    """Return a program and its arguments before those of digiclay.
-
-    Parameters
-    ----------
-    program : str or None
-        Path of digiclay's command, or of Blender with the extension; None: as this process was started.
-    """
+    """Return a program of the farm, or this process's, and its arguments before those of digiclay."""
     if program is None:
         return find_program()[0]
     if not program.strip():
         raise OutputError("--program must be the path of digiclay or Blender (got an empty one).")
     # The paths of the farm need not be those of this system; this kind knows both separators.
-    if PureWindowsPath(program).stem.lower().startswith("blender"):
+    kind = PureWindowsPath(program).stem.lower()
+    if kind.startswith("blender"):
         return start_blender(program)
-    return [program]
+    return [program, "-m", "digiclay"] if kind.startswith("python") else [program]

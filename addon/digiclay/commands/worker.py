@@ -11,25 +11,30 @@ import math
 import os
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..core.base.errors import DigiclayError
+from ..core.studies.series import describe_error
 
 __all__ = ["Process", "Processes", "count_cores", "find_program", "in_blender", "start_blender"]
 
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
+#: Seconds between two looks at whether one has ended.
+PAUSE = 0.05
 #: The package, as an extension in Blender or installed with pip.
 PACKAGE = __name__.removesuffix(".commands.worker")
 #: Where Blender keeps the extension when it was installed from a file.
 EXTENSION = "bl_ext.user_default.digiclay"
 
 Started = TypeVar("Started", bound="Process")
+Piece = TypeVar("Piece")
 
 
 def in_blender() -> bool:
@@ -132,7 +137,6 @@ class Processes:
         self._stop, self._draw = stop, draw
         self._alive: list[Process] = []
         self._deadline = math.inf
-        self._lock = threading.Lock()
 
     def __enter__(self) -> Processes:
         return self
@@ -150,26 +154,53 @@ class Processes:
 
     def _stop_all(self) -> None:
         """Request all to stop, or kill them."""
-        with self._lock:
-            self._deadline = min(self._deadline, time.monotonic() + GRACE)
-            for process in self._alive:
-                process.kill() if time.monotonic() >= self._deadline else process.stop()
+        self._deadline = min(self._deadline, time.monotonic() + GRACE)
+        for process in list(self._alive):
+            process.kill() if time.monotonic() >= self._deadline else process.stop()
 
     def start(self, make: Callable[[], Started]) -> Started | None:
         """Start a process; None after a stop."""
-        with self._lock:
-            if self.stopping():
-                return None
-            process = make()
-            self._alive.append(process)
-            return process
+        if self.stopping():
+            return None
+        process = make()
+        self._alive.append(process)
+        if self.stopping():  # since then: evaluators are started by several threads
+            process.stop()
+        return process
 
     def wait(self, process: Process) -> str:
         """Wait for a process to end, remove it, and return its outcome."""
         how = process.wait()
-        with self._lock:
-            self._alive.remove(process)
+        self._alive.remove(process)
         return how
+
+    def finish(
+        self,
+        count: int,
+        pieces: Iterable[Piece],
+        begin: Callable[[Piece], Process],
+        end: Callable[[Piece], None],
+        fail: Callable[[Piece, str], None],
+    ) -> None:
+        """Begin a process for each piece, `count` at a time; tell of each that ended or could not begin."""
+        waiting, running = deque(pieces), list[tuple[Piece, Process]]()
+        while waiting or running:
+            if self.stopped():
+                waiting.clear()
+            while waiting and len(running) < count:
+                piece = waiting.popleft()
+                try:
+                    process = self.start(partial(begin, piece))
+                except Exception as error:  # the other pieces are worth having
+                    fail(piece, describe_error(error))
+                else:
+                    running += [(piece, process)] if process else []
+            ended = [found for found in running if found[1].process.poll() is not None]
+            for piece, process in ended:
+                running.remove((piece, process))
+                self.wait(process)
+                end(piece)
+            time.sleep(0.0 if ended else PAUSE)
 
     def __exit__(self, *raised: object) -> None:
         self._stop_all()

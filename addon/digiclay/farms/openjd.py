@@ -12,25 +12,17 @@ from typing import Any
 
 from .series_plan import FRAME_OPTION, Task
 
-__all__ = ["format_template", "name_steps"]
+__all__ = ["format_template", "name_program", "name_steps"]
 
 #: Characters of a step's name, and seconds a task gets to stop by itself.
 LONGEST, GRACE = 64, 30
+#: Names of the parameter that is the program, by the first of its arguments: the others fit that kind alone.
+PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
 
 
 def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) -> str:
-    """Return the template of a series.
-
-    Parameters
-    ----------
-    name : str
-        A safe one.
-    tasks : sequence of Task
-        Each after those it needs.
-    leading : sequence of str
-        Arguments of the program before those of digiclay.
-    """
-    steps = name_steps(tasks)
+    """Return the template of a series; `leading` are the program's arguments before those of digiclay."""
+    steps, program = name_steps(tasks), name_program(leading)
     template = {
         "specificationVersion": "jobtemplate-2023-09",
         "name": name,
@@ -42,13 +34,18 @@ def format_template(name: str, tasks: Sequence[Task], leading: Sequence[str]) ->
                 "description": "The folder of the series, on a drive that all machines share.",
             },
             {
-                "name": "Program", "type": "PATH", "objectType": "FILE", "dataFlow": "NONE",
-                "description": f"The program that is started with: {' '.join([*leading, 'job'])}",
+                "name": program, "type": "PATH", "objectType": "FILE", "dataFlow": "NONE",
+                "description": f"The path of {program}; it is started with: {' '.join([*leading, 'job'])}",
             },
         ],
-        "steps": [_make_step(task, steps, leading) for task in tasks],
+        "steps": [_make_step(task, steps, program, leading) for task in tasks],
     }  # fmt: skip
     return json.dumps(template, indent=1, ensure_ascii=False) + "\n"
+
+
+def name_program(leading: Sequence[str]) -> str:
+    """Return the name of the parameter that is the program, by its arguments before those of digiclay."""
+    return PROGRAMS[leading[0] if leading else ""]
 
 
 def name_steps(tasks: Sequence[Task]) -> dict[str, str]:
@@ -61,7 +58,7 @@ def name_steps(tasks: Sequence[Task]) -> dict[str, str]:
     return steps
 
 
-def _make_step(task: Task, steps: dict[str, str], leading: Sequence[str]) -> dict[str, Any]:
+def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequence[str]) -> dict[str, Any]:
     """Return a step, with a parameter space where it draws frames."""
     arguments = [*leading, *task.list_arguments("{{Param.Series}}")]
     step: dict[str, Any] = {"name": steps[task.name]}
@@ -74,5 +71,5 @@ def _make_step(task: Task, steps: dict[str, str], leading: Sequence[str]) -> dic
         }
         arguments += [FRAME_OPTION, f"{{{{Task.Param.Frame}}}}+{task.frames.chunk}"]
     stop = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": GRACE}
-    run = {"command": "{{Param.Program}}", "args": arguments, "cancelation": stop}
+    run = {"command": f"{{{{Param.{program}}}}}", "args": arguments, "cancelation": stop}
     return {**step, "script": {"actions": {"onRun": run}}}

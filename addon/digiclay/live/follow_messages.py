@@ -11,6 +11,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.addresses import is_loopback
 from ..core.base.errors import DigiclayError
 from ..ui_text import localize
 
@@ -46,12 +47,12 @@ def parse_address(text: str, *, online: bool) -> tuple[str, int]:
     host, _, port = text.strip().rpartition(":")
     host = "127.0.0.1" if host == LOCAL else host.removeprefix("[").removesuffix("]")
     try:
-        found = ipaddress.ip_address(host)
+        ipaddress.ip_address(host)
     except ValueError:
         raise DigiclayError(localize(RULE, repr(text[:60]))) from None
     if not (port.isascii() and port.isdecimal() and len(port) < 6 and 0 < int(port) < 65536):
         raise DigiclayError(localize(RULE, repr(text[:60])))
-    if not (found.is_loopback or online):
+    if not (is_loopback(host) or online):
         raise DigiclayError(localize(OFFLINE, host))
     return host, int(port)
 

@@ -21,12 +21,23 @@ from .axes import Point
 from .series import describe_error
 
 __all__ = [
-    "ERRORS", "FIGURES", "RUNS", "TIMES", "BatchWarning", "Bundles", "Record", "evaluate",
+    "ERRORS", "FIGURES", "RUNS", "TIMES", "BatchWarning", "Bundles", "Pool", "Record", "evaluate",
     "evaluate_bundle", "explain_failed_batches", "find_figure", "make_bundles",
 ]  # fmt: skip
 
 #: What is kept of a point: its ``figures``, or the ``error`` it ended in.
 Record = dict[str, Any]
+#: Evaluation of bundles, in any order, until all are done or somebody asks to stop. It tells of each bundle
+#: that is done, with its records, None for a point that was stopped; and of each that no worker survives, and
+#: why in one line. OutputError when there is nobody any more to evaluate them.
+Pool = Callable[
+    [
+        Sequence[Sequence[Point]],
+        Callable[[Sequence[Point], Sequence[Record | None]], None],
+        Callable[[Sequence[Point], str], None],
+    ],
+    None,
+]
 
 #: How exact a session is: unit and meaning. It is integrated once more for them, where they are asked for.
 ERRORS: dict[str, tuple[str, str]] = {

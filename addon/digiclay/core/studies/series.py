@@ -1,19 +1,16 @@
 """Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
 
-Its folder is made once, gone on with after a stop, and worked in by one process at a time. What is left
-of its pieces is done by an executor; each is kept as soon as it is done.
+Its folder is made once, gone on with after a stop, and worked in by one process at a time. Each of its
+pieces is kept as soon as it is done.
 """
 
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from ..base.errors import DigiclayError, OutputError, one_line
@@ -22,12 +19,10 @@ from ..base.run_folder import describe_claim, lock_name, resolve_inside
 from ..base.unfinished import is_unfinished, remove_abandoned
 from ..base.whole_files import format_json, read_json, write_whole
 
-__all__ = ["Kind", "describe_error", "finish", "open_series"]
+__all__ = ["Kind", "describe_error", "finish_here", "open_series"]
 
 #: The lock of whoever works in the folder.
 LOCK = ".lock"
-#: Seconds between two looks at whether somebody asked to stop.
-PAUSE = 0.1
 
 Piece = TypeVar("Piece")
 Outcome = TypeVar("Outcome")
@@ -122,8 +117,7 @@ def _is_bare(path: Path, kind: Kind) -> bool:
     return True
 
 
-def finish(
-    executor: Executor,
+def finish_here(
     task: Callable[[Piece], Outcome],
     pieces: Iterable[Piece],
     keep: Callable[[Piece, Outcome], None],
@@ -131,67 +125,16 @@ def finish(
     *,
     stopped: Callable[[], bool],
 ) -> None:
-    """Have an executor do what is left of a series.
-
-    Results come back by value: who does the work needs nothing of this machine.
-
-    Parameters
-    ----------
-    executor : Executor
-        Any.
-    task : callable
-        What it runs, in a form it can hand on.
-    pieces : iterable
-        What the task gets, one at a time.
-    keep : callable
-        Told of each piece that is done, and of what the task returned.
-    fail : callable
-        Told of each piece for which the task raised an error, and of that error in one line.
-    stopped : callable
-        Asked all the time; after a stop nothing more is begun, and what runs is waited for.
-
-    Raises
-    ------
-    OutputError
-        When the executor itself breaks down.
-    """
-    arrived: SimpleQueue[Future[Outcome]] = SimpleQueue()
-    waiting: dict[Future[Outcome], Piece] = {}
-    looked = -PAUSE
-    try:
-        for piece in pieces:
-            if time.monotonic() - looked >= PAUSE:  # thousands of pieces take seconds to hand over
-                if stopped():
-                    break
-                looked = time.monotonic()
-            future = executor.submit(task, piece)
-            waiting[future] = piece
-            future.add_done_callback(arrived.put)
-        while waiting:
-            if stopped():
-                for future in waiting:
-                    future.cancel()
-            try:
-                future = arrived.get(timeout=PAUSE)
-            except Empty:
-                continue
-            piece = waiting.pop(future)
-            if future.cancelled():
-                continue
-            try:
-                outcome = future.result()
-            except BrokenExecutor:
-                raise
-            except Exception as error:  # the other pieces are worth having
-                fail(piece, describe_error(error))
-            else:
-                keep(piece, outcome)
-    except BrokenExecutor as error:
-        rule = "What is done is kept, and the same command goes on from there."
-        raise OutputError(f"{one_line(error)} {rule}") from None
-    finally:
-        for future in waiting:
-            future.cancel()
+    """Do what is left of a series in this process, piece by piece, until somebody asks to stop."""
+    for piece in pieces:
+        if stopped():
+            return
+        try:
+            outcome = task(piece)
+        except Exception as error:  # the other pieces are worth having
+            fail(piece, describe_error(error))
+        else:
+            keep(piece, outcome)
 
 
 def describe_error(error: Exception) -> str:

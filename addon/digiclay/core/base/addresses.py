@@ -1,0 +1,22 @@
+"""Hosts of network addresses: this machine, or one that others reach."""
+
+from __future__ import annotations
+
+import ipaddress
+
+__all__ = ["describe_exposure", "is_loopback"]
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host is this machine, reached by nobody else; other names are not looked up."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def describe_exposure(host: str, sent: str) -> str:
+    """Return a warning of what is sent without encryption; "" on this machine alone."""
+    if is_loopback(host):
+        return ""
+    return f"Other machines can reach {host}, and {sent} sent without encryption."
