@@ -131,7 +131,22 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(
         (ordering("Orders(mode=np.full(cells.height.size, 8))"), "codes of Mode, from 0 to 7 (got 8)"),
         (ordering("Orders(rows=cells.height)"), "rows of the shape (0, "),
         (ordering("cells.height"), "must return Orders as its second result (got ndarray)"),
-        (bad("def command(self, memory, cells, device):\n    pass"), "command must not raise (got TypeError"),
+        (bad("def command(self, memory, cells, device):\n    pass"),
+            "command must return two results, memory and orders (got NoneType)."),
+        (ordering("__import__('sys').exit(3)"), "command must not raise (got SystemExit in line 11: 3)."),
+        (
+            bad("def build(self, device):\n    raise SystemExit(3)"),
+            "build must not raise (got SystemExit in line 11: 3).",
+        ),
+        (
+            bad("command = lambda *_: None\nset_point = property(lambda self: exit(3))"),
+            "the class must not raise (got SystemExit: 3).",
+        ),
+        (bad("command = lambda *_: None\nset_point = 3"), "set_point must be a SetPoint or None (got int)."),
+        (
+            bad("def check(self):\n    raise SystemExit(3)\ncommand = lambda *_: None"),
+            "the class must pass its own check (got SystemExit: 3).",
+        ),
         (ordering("1 / 0"), "command must not raise (got ZeroDivisionError in line 11: division by zero)"),
         (ordering("cells.force.sort() or Orders()"), "got ValueError in line 11: sort array is read-only"),
         (bad("def begin(self, device):\n    return []\ncommand = lambda *_: None"), "begin must return a"),
@@ -207,7 +222,8 @@ def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.Capture
         ("seen.target, seen.mode, seen.height * 0 + 1.5", "must return commands from -1 to 1 (got 1.5)."),
         ("seen.target, seen.mode, seen.height * 0 - 1.5", "must return commands from -1 to 1 (got 1.5)."),
         ("seen.target, seen.mode + 9, seen.height * 0", "must return mode as codes of Mode, from 0 to 7"),
-        ("seen.target, seen.height", "must not raise (got ValueError"),
+        ("seen.height.sort() or 3", "sort array is read-only"),
+        ("seen.target, seen.height", "must return three results, target, mode and command (got 2 results)"),
         (
             "seen.target, seen.mode, seen.own.__setitem__(0, np.nan) or seen.height * 0",
             "rows as finite numbers",

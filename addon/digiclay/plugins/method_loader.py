@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import copy
 import copyreg
 import dataclasses
 import importlib
@@ -10,6 +11,9 @@ import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.abc import ExecutionLoader
+from importlib.machinery import ModuleSpec
+from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any
 
@@ -50,8 +54,8 @@ class OwnRow(Method):
 
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
-        source = self.source
-        return guard(lambda: parameters.build(device), self.name, source.label, source.file, device.period)
+        source, own = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
+        return guard(lambda: parameters.build(own), self.name, source.label, source.file, own.period)
 
     def describe(self) -> str:
         """Return what it does, in the first line of its class, where it has one of its own."""
@@ -181,9 +185,26 @@ def _import(source: MethodSource) -> ModuleType:
         return run_code(source)
     try:
         return importlib.import_module(source.module)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         why = describe_failure(error, source.file)
         raise MethodError(f"{source.label}: {source.module} {why}.") from error
+
+
+class MethodCode(ExecutionLoader):
+    """Loader of code kept as text, which other processes have without the file; it keeps no bytecode."""
+
+    def __init__(self, source: MethodSource) -> None:
+        self.source = source
+
+    def get_filename(self, fullname: str) -> str:
+        """Return the file as tracebacks have it."""
+        return self.source.file
+
+    def get_source(self, fullname: str) -> str:
+        """Return the code as text."""
+        return self.source.text
 
 
 def run_code(source: MethodSource) -> ModuleType:
@@ -200,16 +221,19 @@ def run_code(source: MethodSource) -> ModuleType:
     MethodError
         When it cannot be run.
     """
-    module = ModuleType(f"digiclay_own_{source.digest[:16]}")
+    name, loader = f"digiclay_own_{source.digest[:16]}", MethodCode(source)
+    module = module_from_spec(ModuleSpec(name, loader, origin=source.file))
     module.__file__ = source.file
     module.__dict__["__builtins__"] = {**vars(builtins), "__import__": _import_for_methods}
-    sys.modules[module.__name__] = module
+    sys.modules[name] = module
     try:
-        exec(compile(source.text, source.file, "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:
-        del sys.modules[module.__name__]
-        name = source.label.partition(":")[0]
-        raise MethodError(f"{name}: the code {describe_failure(error, source.file)}.") from error
+        loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[name]
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        file = source.label.partition(":")[0]
+        raise MethodError(f"{file}: the code {describe_failure(error, source.file)}.") from error
     return module
 
 

@@ -13,6 +13,7 @@ from ..core.control.blister import Blister
 from ..core.control.guarded import MOST_ROWS, describe_failure
 from ..core.control.methods import ControlParameters
 from ..core.control.own_method import OwnMethod
+from ..core.model.set_point import SetPoint
 
 __all__ = ["check_class", "list_classes"]
 
@@ -68,10 +69,15 @@ def check_class(label: str, kind: Any) -> None:
         refuse("the class must have a function command(self, memory, cells, device)")
     _check_settings(kind, refuse)
     try:
-        kind()
+        asked = getattr(kind(), "set_point", None)
+        if not (asked is None or isinstance(asked, SetPoint)):
+            refuse("set_point must be a SetPoint or None", type(asked).__name__)
     except ParameterError as error:
-        refuse(f"the default of {error.field} {error.rule}", error.value)
-    except Exception as error:
+        name = f"the default of {error.field}" if error.field else "the class"
+        refuse(f"{name} {error.rule}", error.value)
+    except (MethodError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
         refuse(f"the class {describe_failure(error, '')}")
 
 

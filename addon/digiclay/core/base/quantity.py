@@ -14,7 +14,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import ParameterError
+from .errors import DigiclayError, ParameterError
 
 __all__ = [
     "EXTENTS", "UNITS", "Parameters", "Quantity", "find_nearest_name", "list_quantities", "parse", "quantity",
@@ -139,7 +139,13 @@ class Parameters:
                 rule = known.broken_rule(item)
                 if rule:
                     raise ParameterError(type(self).__name__, field.name, rule, known.show(item))
-        self.check()
+        try:
+            self.check()
+        except (DigiclayError, MemoryError, KeyboardInterrupt):
+            raise
+        except BaseException as error:  # of a method of one's own
+            said = f"{type(error).__name__}: {error}"
+            raise ParameterError(type(self).__name__, "", "must pass its own check", said) from error
 
     def check(self) -> None:
         """Check the rules that join several fields; parts override this."""
