@@ -135,6 +135,7 @@ def test_a_run_gives_every_figure(press: Result) -> None:
         (((0.0, 0.3),), 0),  # touched before the phase
         (((0.6, 0.7),), 1),
         (((0.6, 0.61), (0.8, 0.9)), 2),
+        (((0.6, 0.61), (0.63, 0.64), (0.66, 0.67)), 1),  # bounces
         (((0.4, 0.6),), 1),  # lost before, and found again
         (((0.4, 3.0),), 1),  # never found again
         (((1.1, 3.0),), 1),  # in the 0.3 s after

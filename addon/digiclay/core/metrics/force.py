@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 #: Settled is a force this near to its set point, as a share of it.
 BAND = 0.1
+#: Ends of contact no farther apart are bounces of one parting, s: Method I's loss time.
+BOUNCE = 0.05
 
 
 def compute_rfd(
@@ -75,10 +77,10 @@ def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float
 
 
 def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
-    """Return when contact ends, s, shape (ends,): each first row without it, from times and forces (t,)."""
+    """Return when contact ends, s, shape (ends,), bounces counted once, from times, s, and forces (t,), N."""
     touching = find_contact_rows(total_force)
     ends: Floats = np.asarray(time, dtype=np.float64)[1:][touching[:-1] & ~touching[1:]]
-    return ends
+    return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
 
 
 def find_first_touch(total_force: ArrayLike) -> slice:
