@@ -71,7 +71,10 @@ def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFi
         ("class SoftPad: pass", "the class must derive from OwnMethod"),
         (PAD.replace("@dataclass(frozen=True)", ""), "must be decorated with @dataclass(frozen=True)"),
         (PAD.replace("def command", "def comand"), "must have a function command(self, "),
-        (PAD.replace('unit="m"', 'unit="inch"'), "the unit of step must be one of m, s, Pa"),
+        (
+            PAD.replace('unit="m"', 'unit="inch"'),
+            "pad.py: SoftPad.step must have one of the units m, s, Pa, ",
+        ),
         (PAD.replace("quantity(50e-6", "quantity([1]"), "mutable default"),
         (PAD.replace("quantity(50e-6", "quantity(None"), "the default of step must be a bool, int, float"),
         (PAD.replace("quantity(50e-6", "quantity(-1.0"), "the default of step must be above 0 m (got -1 m)"),

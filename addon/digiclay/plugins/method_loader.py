@@ -17,7 +17,7 @@ from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any
 
-from ..core.base.errors import MethodError
+from ..core.base.errors import MethodError, ParameterError
 from ..core.control.guarded import Guarded, describe_failure, guard
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
 from .method_rules import check_class, list_classes
@@ -232,8 +232,9 @@ def run_code(source: MethodSource) -> ModuleType:
         del sys.modules[name]
         if isinstance(error, KeyboardInterrupt):
             raise
-        file = source.label.partition(":")[0]
-        raise MethodError(f"{file}: the code {describe_failure(error, source.file)}.") from error
+        rule = f"the code {describe_failure(error, source.file)}."
+        said = str(error) if isinstance(error, ParameterError) else rule
+        raise MethodError(f"{source.label.partition(':')[0]}: {said}") from error
     return module
 
 

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from ..core.base.errors import MethodError, ParameterError
-from ..core.base.quantity import EXTENTS, Quantity
+from ..core.base.quantity import Quantity
 from ..core.control.blister import Blister
 from ..core.control.guarded import MOST_ROWS, describe_failure
 from ..core.control.methods import ControlParameters
@@ -93,8 +93,6 @@ def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
         refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
     if field.name in TAKEN or field.name.startswith("_"):
         refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
-    if known.unit not in EXTENTS:
-        refuse(f"the unit of {field.name} must be one of {', '.join(filter(None, EXTENTS))}", known.unit)
     if not isinstance(field.default, KINDS):
         kinds = ", ".join(kind.__name__ for kind in KINDS)
         refuse(f"the default of {field.name} must be a {kinds}", type(field.default).__name__)

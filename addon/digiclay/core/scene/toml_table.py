@@ -268,9 +268,10 @@ def write_part(section: str, part: Parameters | Path | None, method: str = "") -
     yield f"\n[{section}]"
     if method:
         yield f"method = {format_value(method)}"
+    idle = part.list_idle()
     for field in dataclasses.fields(part):
         known, value = field.metadata["quantity"], getattr(part, field.name)
-        if not known.later or value != field.default:
+        if not (known.later or field.name in idle) or value != field.default:
             note = f"{known.unit}: {known.doc}" if known.unit else known.doc
             yield f"{field.name} = {format_value(value)}  # {note}"
 
