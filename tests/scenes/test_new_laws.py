@@ -165,3 +165,60 @@ def test_a_new_law_is_one_file_and_one_line(
     page = (copy / "docs" / "nomenclature.md").read_text(encoding="utf-8")
     assert f"`{section}.{asked[1]}`" in page
     assert f"`{section}.law`" in page
+
+
+#: What runs in the copy: an arrangement under several methods, and what refuses it.
+BEDS = """
+import sys
+import numpy as np
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.session.run_scene import run
+from digiclay.core.surface.formed import make_formed
+from digiclay.core.surface.pin_lattice import Lattice
+from digiclay.core.surface.pins_solid import make_parts
+
+def attempt(make):
+    try:
+        return make()
+    except DigiclayError as error:
+        return str(error)
+
+said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.3", f"layout.arrangement={sys.argv[1]}")
+scene = load(find("tap"), [Setting(*one.split("=")) for one in said])
+viscous = load(find("tap"), [Setting(*one.split("=")) for one in (*said, "control.method=viscous")])
+done = run(scene)
+formed = make_formed(done.history, -1)
+print(done.figures["max_total_force"] > 0.0, scene.fingers[0].contact.share)
+print(attempt(lambda: len(run(viscous).history["time"])))
+print(attempt(lambda: Lattice.of(formed).neighbor.shape[1]))
+print(attempt(lambda: np.bincount(make_parts(formed).pin).max()))
+print(attempt(lambda: scene.layout.find_neighbors(corners=False)[60].tolist()))
+"""
+REFUSED = (
+    "layout.arrangement must have its rows in line or shifted by half a pitch, where neighbors are needed "
+    "(got a shift of 0.3 pitches)."
+)
+
+
+@pytest.mark.parametrize(
+    ("row", "share", "found"),
+    [
+        ('Arrangement(1.5, 0.0, "Wide rows")', 0.34, ["61", "8", "4", "[61, 71, 59, 49]"]),
+        (
+            'Arrangement(0.7, 0.5, "Close rows", share=0.25)',
+            0.25,
+            ["61", "6", "6", "[61, 72, 71, 59, 49, 50]"],
+        ),
+        ('Arrangement(1.0, 0.3, "No lattice")', 0.34, [REFUSED] * 4),
+    ],
+)
+def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(
+    copy: Path, row: str, share: float, found: list[str]
+) -> None:
+    layout = copy / "addon" / "digiclay" / "core" / "model" / "layout.py"
+    text = layout.read_text(encoding="utf-8")
+    layout.write_text(
+        text.replace("ARRANGEMENTS = {\n", f'ARRANGEMENTS = {{\n    "new": {row},\n'), encoding="utf-8"
+    )
+    assert run_python(copy, "-c", BEDS, "new").splitlines() == [f"True {share}", *found]

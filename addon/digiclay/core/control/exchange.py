@@ -89,7 +89,7 @@ def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
         Control period, s.
     """
     plan = grid.layout
-    if plan.arrangement == "aligned":
+    if not plan.shifted:
         along, across = diffusivity / plan.pitch**2, diffusivity / plan.row_spacing**2
         total = 2.0 * (along + across)
     else:
@@ -97,4 +97,4 @@ def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
         along = diffusivity / plan.pitch**2 - across / 2.0
         total = 2.0 * along + 4.0 * across
     limited = -math.expm1(-2.0 * total * period) / (2.0 * total) if total else 0.0
-    return Exchange(plan.columns, plan.shift > 0.0, along * limited, across * limited)
+    return Exchange(plan.columns, plan.shifted, along * limited, across * limited)

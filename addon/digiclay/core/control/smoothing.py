@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 ORDER = 4
 #: How long the diffusion of strength 1 takes to spread over the disc's radius, ``D = r² / T``, s.
 SPREADING = 1.0
-#: How far the neighbors of a cell are at most, in pitches of the bed: 1.12 where rows are shifted.
+#: How far the neighbors of a cell are at most, in pitches or distances of rows: 1.12 where rows are shifted.
 MARGIN = 1.5
 #: Least radius of an order, m, and the farthest number in one, m.
 SMALLEST, FARTHEST = 1e-6, 1e3
@@ -156,7 +156,7 @@ def order_periods(
     """
     # As quick as a display is, and never quicker than the control period allows.
     known = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
-    drive, margin = make_drive(known, cell, period), MARGIN * grid.layout.pitch
+    drive, margin = make_drive(known, cell, period), MARGIN * max(grid.layout.pitch, grid.layout.row_spacing)
     for x, y, radius, strength in orders.tolist():
         if radius == 0.0:
             yield method

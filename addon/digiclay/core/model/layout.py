@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "make_grid"]
+__all__ = [
+    "ARRANGEMENTS", "ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "find_neighbors",
+    "list_steps", "make_grid",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -21,17 +25,43 @@ Bounds = tuple[int, int, int, int]
 #: Center x, y and radius, m.
 Disc = tuple[float, float, float]
 
+
+class Arrangement(NamedTuple):
+    """Distance of rows and shift of odd ones along x, in pitches; meaning; share of the contact law.
+
+    Where rows are not shifted a pin has four neighbors beside it, where they are by half a pitch six; what
+    needs neighbors refuses all other beds. `share` is None where the default of the law holds.
+    """
+
+    spacing: float
+    shift: float
+    meaning: str
+    share: float | None = None
+
+
+#: Arrangements of the cells by name: the only place that knows them.
+ARRANGEMENTS = {
+    "aligned": Arrangement(1.0, 0.0, "A square grid"),
+    "staggered": Arrangement(1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"),
+    "hexagonal": Arrangement(
+        math.sqrt(0.75), 0.5, "Every other row shifted, six neighbors at the same distance", share=0.29
+    ),
+}
+#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid with those at the corners, in
+#: shifted ones of rows that stand back and of rows that are shifted forward along x.
+SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
+FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
+#: Those of even and of odd rows, by twice the shift of odd rows, in pitches.
+STEPS = {0: (SQUARE, SQUARE), 1: (BACK, FORWARD), -1: (FORWARD, BACK)}
+
 #: Relative slack, so that cells exactly on a limit count the same on every side of the center.
 ON_THE_SIDE = 1e-9
 
 
 @dataclass(frozen=True)
 class Layout(Parameters):
-    """Rows and columns of cells, centered on the origin of the bed.
-
-    *aligned*: a square grid. *staggered*: every other row shifted by half a pitch, rows
-    one pitch apart. *hexagonal*: shifted likewise, rows ``pitch * sqrt(3) / 2`` apart.
-    """
+    """Rows and columns of cells, centered on the origin of the bed, in one of the `ARRANGEMENTS`."""
 
     rows: int = quantity(
         25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000
@@ -46,7 +76,7 @@ class Layout(Parameters):
         "aligned",
         "offset of neighboring rows",
         source="P",
-        choices=("aligned", "staggered", "hexagonal"),
+        choices=tuple(ARRANGEMENTS),
     )
 
     def check(self) -> None:
@@ -58,12 +88,23 @@ class Layout(Parameters):
     @property
     def row_spacing(self) -> float:
         """Distance between rows, m."""
-        return self.pitch * (math.sqrt(0.75) if self.arrangement == "hexagonal" else 1.0)
+        return self.pitch * ARRANGEMENTS[self.arrangement].spacing
 
     @property
     def shift(self) -> float:
         """How far odd rows are shifted along x, m."""
-        return 0.0 if self.arrangement == "aligned" else self.pitch / 2
+        return self.pitch * ARRANGEMENTS[self.arrangement].shift
+
+    @property
+    def shifted(self) -> bool:
+        """Whether a cell has six neighbors, not four; ParameterError in a bed without a lattice."""
+        steps = list_steps(ARRANGEMENTS[self.arrangement].shift)
+        return steps.shape[1] == len(BACK)
+
+    def find_neighbors(self, *, corners: bool) -> Cells:
+        """Return the neighbors of all cells; see the function of this name."""
+        shift = ARRANGEMENTS[self.arrangement].shift
+        return find_neighbors(self.rows, self.columns, shift, corners=corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +218,27 @@ def make_grid(layout: Layout) -> Grid:
     x = column - width / 2 + (row[:, None] % 2) * layout.shift
     y = np.broadcast_to(((row - (layout.rows - 1) / 2) * layout.row_spacing)[:, None], x.shape)
     return Grid(layout, x.ravel(), y.ravel())
+
+
+def list_steps(shift: float) -> Cells:
+    """Return the steps to the neighbors of even and odd rows, (2, 8 or 6, 2), by their shift in pitches."""
+    if abs(2.0 * shift - round(2.0 * shift)) > 0.02 or round(2.0 * shift) not in STEPS:
+        rule = "must have its rows in line or shifted by half a pitch, where neighbors are needed"
+        raise ParameterError("layout", "arrangement", rule, f"a shift of {shift:.3g} pitches")
+    return np.array(STEPS[round(2.0 * shift)], np.intp)
+
+
+def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> Cells:
+    """Return each cell's neighbors, (n, 6), in a square grid (n, 4) or with corners (n, 8); -1: none.
+
+    They are counter-clockwise; `shift` is that of the odd rows, in pitches.
+    """
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    steps = list_steps(shift)
+    steps = (steps if corners or steps.shape[1] != len(SQUARE) else steps[:, ::2])[row % 2]
+    beside, along = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
+    on_bed = (beside >= 0) & (beside < rows) & (along >= 0) & (along < columns)
+    return np.where(on_bed, beside * columns + along, -1).astype(np.intp)
 
 
 def enclose_discs(one: Disc, other: Disc) -> Disc:
