@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError,
 #: All that numpy's readers raise over a head that makes no sense.
 BROKEN = (
     ValueError, TypeError, KeyError, SyntaxError, RecursionError, MemoryError, OverflowError, EOFError,
-    tokenize.TokenError,
+    tokenize.TokenError, Warning,
 )  # fmt: skip
 
 
@@ -68,14 +69,15 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
 
 
 def _head(file: IO[bytes], name: str) -> Head:
-    """Read the head of an array."""
+    """Read the head of an array; what numpy would warn of is no head of ours."""
     try:
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         readers: dict[Any, Any] = {
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }
-        shape, _, kind = readers[version](file)
+        with warnings.catch_warnings(action="error"):
+            shape, _, kind = readers[version](file)
         if kind.hasobject or not all(isinstance(side, int) and side >= 0 for side in shape):
             raise ValueError("no numbers")
         return Head(tuple(shape), kind)
@@ -108,7 +110,8 @@ def map_array(path: Path) -> NDArray[Any]:
         When it holds no array of numbers.
     """
     try:
-        read = np.load(path, allow_pickle=False, mmap_mode="r")
+        with warnings.catch_warnings(action="error"):
+            read = np.load(path, allow_pickle=False, mmap_mode="r")
     except BROKEN:
         raise ValueError("no array of numbers") from None
     if not isinstance(read, np.ndarray):

@@ -174,8 +174,8 @@ def find_fault(orders: Floats, periods: int) -> str:
     orders : ndarray (t, 4)
     periods : int
     """
-    if orders.shape != (periods, ORDER):
-        return f"an array of the shape {orders.shape}"
+    if orders.shape != (periods, ORDER) or orders.dtype != np.float64:
+        return f"an array of the shape {orders.shape} of {orders.dtype}"
     radius, strength = orders[:, 2], orders[:, 3]
     good = (np.abs(orders) <= FARTHEST).all(axis=1) & ((radius == 0.0) | (radius >= SMALLEST))
     good &= (strength >= 0.0) & (strength <= 1.0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
+from ..base.modes import Mode
 from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
 from ..base.run_folder import MARK
 from ..base.whole_files import read_json
@@ -24,6 +25,8 @@ __all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "has_files", "is_whol
 
 #: The file of the arrays.
 HISTORY = "history.npz"
+#: No number of a run is as large: sums of squares are finite.
+LARGEST = 1e100
 #: Shape of each array of a history, t rows of n cells.
 SHAPES: dict[str, tuple[str | int, ...]] = {
     "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
@@ -63,9 +66,16 @@ def read_run(folder: Path, *names: str) -> Run:
         with zipfile.ZipFile(path) as archive:
             held = read_heads(archive, ("time", *names))
             _refuse(path, scene, held)
-            return Run(scene, {name: read_array(archive, name) for name in held})
+            history = {name: read_array(archive, name) for name in held}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
+    for name, values in history.items():
+        low, high = (0, len(Mode) - 1) if name == "mode" else (-LARGEST, LARGEST)
+        if not (values.min() >= low and values.max() <= high):
+            raise OutputError(f"{path}: {name} must hold numbers from {low:g} to {high:g}, as a run leaves.")
+    if (np.diff(history["time"]) <= 0.0).any():
+        raise OutputError(f"{path}: time must increase from row to row.")
+    return Run(scene, history)
 
 
 def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
@@ -80,8 +90,9 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
         shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
-        if head.kind.kind not in "if" or head.kind.itemsize > 8:
-            raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
+        kinds, called = ("i", "whole numbers") if name == "mode" else ("if", "numbers")
+        if head.kind.kind not in kinds or head.kind.itemsize > 8:
+            raise OutputError(f"{path}: {name} must hold {called} of at most 8 bytes (got {head.kind}).")
     size, free = sum(head.size for head in held.values()), measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"

@@ -196,7 +196,7 @@ def _read(data: bytes) -> Snapshot:
         header = json.loads(data[first : first + length])
         cells, held = _read_count(header["cells"]), header["gathered"]
         if data.startswith(FIRST):
-            held["fingers"] = [{"reach": held.pop("reach")}]
+            held = header["gathered"] = {**held, "fingers": [{"reach": held["reach"]}]}
         count, taken = Rows(*map(_read_count, header["rows"])).count, _read_count(held["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),

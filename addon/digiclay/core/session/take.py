@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError, ParameterError
 from ..base.npz import BROKEN_ZIP, read_array, read_heads
 from ..base.toml_text import parse_tables
-from ..control.smoothing import find_fault
+from ..control.smoothing import FARTHEST, find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -77,12 +77,14 @@ class Take:
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
-        if self.poses.shape[1:] != (fingers, 7) or len(self.poses) < 2:
+        kind, shape = self.poses.dtype, self.poses.shape
+        if shape[1:] != (fingers, 7) or len(self.poses) < 2 or kind != np.float64:
             rule = f"must hold one control period at least, of {fingers} x 7 numbers, a pose a finger"
-            raise ParameterError("Take", "poses", rule, f"an array of the shape {self.poses.shape}")
-        if not np.isfinite(self.poses).all():
-            row = int(np.argwhere(~np.isfinite(self.poses))[0][0])
-            raise ParameterError("Take", "poses", "must be finite numbers", f"row {row} is not")
+            raise ParameterError("Take", "poses", rule, f"an array of the shape {shape} of {kind}")
+        sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[..., None]
+        if not sound.all():
+            rule = "must be finite numbers, quaternions not 0"
+            raise ParameterError("Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not")
         fault = "" if self.smoothing is None else find_fault(self.smoothing, self.periods)
         if fault:
             rule = f"must hold x, y, a radius and a strength from 0 to 1 for each of {self.periods} periods"
@@ -235,9 +237,9 @@ def from_bytes(data: bytes) -> Take:
         scene, start, poses, end = (parts[name] for name in PARTS)
         if "version" not in parts:
             poses = poses[:, None]  # the first version held one finger
-        elif not PLAIN <= int(parts["version"]) <= VERSION:
+        elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
         return Take(resolved, start.tobytes(), poses, end.tobytes(), parts.get(SMOOTHING))
-    except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
+    except (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, RecursionError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None
