@@ -64,19 +64,7 @@ class OwnRow(Method):
 
 
 def load_method(word: str) -> str:
-    """Load the method that a word of the command line names, unless it is known; return its name.
-
-    Parameters
-    ----------
-    word : str
-        Name of a method, ``path/to/mine.py:Mine``, or the name of an installed method. A word that names
-        nothing is returned as it is: `methods.find_method` refuses it with the list of those there are.
-
-    Raises
-    ------
-    MethodError
-        In one line: file and rule.
-    """
+    """Load the method that a word of the command line names; return its name, or a word that names none."""
     if word in METHODS or word in list_added():
         return word
     source = read_source(word)
@@ -99,17 +87,7 @@ def name_method(attribute: str) -> str:
 
 
 def add_source(name: str, source: MethodSource) -> OwnRow:
-    """Load a method's code and put it into the table of methods, in place of one of the same name.
-
-    Parameters
-    ----------
-    name : str
-    source : MethodSource
-
-    Raises
-    ------
-    MethodError
-    """
+    """Load a method's code and put it into the table of methods, in place of one of the same name."""
     if name in METHODS:
         raise MethodError(f"{source.label}: the class must not have the name of the built-in method {name}.")
     module = _import(source)
@@ -122,18 +100,7 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
 
 
 def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
-    """Check the class of a method, and put it into the table of methods.
-
-    Parameters
-    ----------
-    name : str
-    source : MethodSource
-    kind : type
-
-    Raises
-    ------
-    MethodError
-    """
+    """Check the class of a method, and put it into the table of methods."""
     check_class(source.label, kind)
     blister = getattr(kind, "blister", None)
     row = OwnRow(
@@ -152,21 +119,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
 
 
 def restore_parameters(name: str, source: MethodSource, values: dict[str, Any]) -> ControlParameters:
-    """Return parameters that another process has pickled, with their class: its code comes along.
-
-    Parameters
-    ----------
-    name : str
-        Of the method.
-    source : MethodSource
-    values : dict
-        SI, by field.
-
-    Raises
-    ------
-    MethodError
-        When an installed package is missing here, or is of another version.
-    """
+    """Return parameters that another process has pickled, with their class: its code comes along."""
     known = list_added().get(name)
     if not isinstance(known, OwnRow) or known.source[1:] != source[1:]:
         if source.module:
@@ -211,15 +164,6 @@ def run_code(source: MethodSource) -> ModuleType:
     """Run the code of a file as a module, without its folder: it may import what is installed.
 
     In Blender the package has another name; for the code it is ``digiclay`` everywhere.
-
-    Parameters
-    ----------
-    source : MethodSource
-
-    Raises
-    ------
-    MethodError
-        When it cannot be run.
     """
     name, loader = f"digiclay_own_{source.digest[:16]}", MethodCode(source)
     module = module_from_spec(ModuleSpec(name, loader, origin=source.file))

@@ -38,19 +38,7 @@ def list_classes(module: ModuleType) -> list[type]:
 
 
 def check_class(label: str, kind: Any) -> None:
-    """Refuse a class that is no control method.
-
-    Parameters
-    ----------
-    label : str
-        File and class, for messages.
-    kind : object
-
-    Raises
-    ------
-    MethodError
-        In one line: class, rule, what it is instead.
-    """
+    """Refuse a class that is no control method."""
 
     def refuse(rule: str, got: object = "") -> NoReturn:
         raise MethodError(f"{label}: {rule}{f' (got {got})' if got != '' else ''}.")

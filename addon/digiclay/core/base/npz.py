@@ -39,21 +39,7 @@ class Head(NamedTuple):
 
 
 def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
-    """Return what arrays of a file .npz are.
-
-    Parameters
-    ----------
-    archive : ZipFile
-    names : sequence of str
-        Of the arrays.
-
-    Raises
-    ------
-    KeyError
-        When one is not there.
-    ValueError
-        When a head cannot be read, or promises more, or less, than there is.
-    """
+    """Return what arrays of a file .npz are; KeyError without one, ValueError for a head that is untrue."""
     found = {}
     for name in names:
         entry = archive.getinfo(f"{name}.npy")
@@ -86,29 +72,14 @@ def _head(file: IO[bytes], name: str) -> Head:
 
 
 def read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Read an array whose head has been looked at.
-
-    Parameters
-    ----------
-    archive : ZipFile
-    name : str
-        Of the array.
-    """
+    """Read an array whose head has been looked at."""
     with archive.open(f"{name}.npy") as file:
         read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         return read
 
 
 def map_array(path: Path) -> NDArray[Any]:
-    """Return the array of a file .npy, still in the file: nothing is read before it is used.
-
-    Raises
-    ------
-    OSError
-        When the file cannot be read.
-    ValueError
-        When it holds no array of numbers.
-    """
+    """Return the array of a file .npy, read as it is used; OSError, or ValueError where it has no numbers."""
     try:
         with warnings.catch_warnings(action="error"):
             read = np.load(path, allow_pickle=False, mmap_mode="r")

@@ -60,11 +60,6 @@ class Exchange:
 
         What one gives the other gets, and nothing is exchanged with a cell that is not there: the
         sum stays what it was.
-
-        Parameters
-        ----------
-        cells : ndarray of int (m,)
-        values : ndarray (m,)
         """
         change = np.zeros(cells.size)
         for one, other, share in self.find_pairs(cells):
@@ -75,18 +70,10 @@ class Exchange:
 
 
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
-    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions.
+    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions, in a period, s.
 
     The rates come from matching ``D`` along x and y; their sum is limited so that no period,
     however long, makes neighbors overshoot one another.
-
-    Parameters
-    ----------
-    grid : Grid
-    diffusivity : float
-        m²/s.
-    period : float
-        Control period, s.
     """
     plan = grid.layout
     if not plan.shifted:

@@ -40,13 +40,7 @@ class Pace:
     count: int = 0
 
     def add(self, spent: float) -> float | None:
-        """Add a call; return the mean over `CALLS` of them, s, each time that these are complete.
-
-        Parameters
-        ----------
-        spent : float
-            s.
-        """
+        """Add a call; return the mean over `CALLS` of them, s, each time that these are complete."""
         self.spent, self.count = self.spent + spent, self.count + 1
         if self.count < CALLS:
             return None
@@ -142,23 +136,7 @@ class Guarded:
 
 
 def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guarded:
-    """Build a controller of unknown code, and guard it.
-
-    Parameters
-    ----------
-    build : callable
-        Returns the controller.
-    name : str
-        Of the method.
-    origin, file : str
-        See `Guarded`.
-    period : float
-        Control period, s.
-
-    Raises
-    ------
-    MethodError
-    """
+    """Build a controller of unknown code, and guard it."""
     try:
         inner = build()
         for function in ("begin", "locate", "command"):
@@ -178,12 +156,6 @@ def describe_failure(error: BaseException, file: str) -> str:
     """Return what an error of unknown code breaks, with the line of its file.
 
     A rule that a check of ours found broken is the error's own text, ``must ...``.
-
-    Parameters
-    ----------
-    error : BaseException
-    file : str
-        As tracebacks have it.
     """
     said = str(error).rstrip(".")
     if said.startswith("must ") and isinstance(error, (TypeError, ValueError)):

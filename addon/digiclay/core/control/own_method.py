@@ -240,23 +240,7 @@ def _check_orders(orders: Any, seen: Measurement) -> tuple[Any, Any, Any, Any]:
 
 
 def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fiu") -> Any:
-    """Return values as an array; None stays None.
-
-    Parameters
-    ----------
-    values : array_like or None
-    name : str
-        For messages.
-    shape : tuple of int
-        That they must have.
-    kinds : str
-        Kinds of numpy's types that they may have; floating-point numbers become those of 64 bits.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Its text is the broken rule.
-    """
+    """Return values as an array of a shape and kinds of numbers, or raise the broken rule; None stays None."""
     if values is None:
         return None
     array = np.asarray(values)

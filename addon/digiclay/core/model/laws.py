@@ -41,14 +41,7 @@ def law_parameters(section: str) -> type[Parameters]:
 
 
 def select_law(section: str, own: Any) -> Any:
-    """Return the parameters of the law that a section selects.
-
-    Parameters
-    ----------
-    section : str
-    own : Parameters
-        Of the class `law_parameters`.
-    """
+    """Return the parameters of the law that a section selects."""
     law = getattr(own, "law", "")
     if not law:  # the only one, or given without the others
         return own
@@ -62,7 +55,7 @@ def _load(section: str, law: str) -> Any:
     missing = [one.__name__ for one in (_import(*base), Parameters) if not issubclass(kind, one)]
     missing += [one for one in needed if not hasattr(kind, one)]
     if missing:
-        rule = f"must derive from {base[1]} and Parameters, and have {', '.join(needed)}"
+        rule = f"must derive from Parameters and {base[1]}, and have {', '.join(needed)}"
         raise ParameterError(section, law, rule, f"{kind.__name__} without {', '.join(missing)}")
     return kind
 

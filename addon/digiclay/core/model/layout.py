@@ -138,20 +138,7 @@ class Grid:
         return np.column_stack([self.x, self.y])
 
     def bounds(self, x: float, y: float, radius: float) -> Bounds:
-        """Return the rows and columns that hold all cells within `radius` of a point.
-
-        Parameters
-        ----------
-        x, y : float
-            Center, m.
-        radius : float
-            m; cells exactly on a side are inside. Negative: no cells.
-
-        Returns
-        -------
-        Bounds
-            First row, last row, first column, last column; a last below a first means none.
-        """
+        """Return the rows and columns of all cells within a radius of a point, m; a last below a first: none."""
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         return (
@@ -171,27 +158,13 @@ class Grid:
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too.
-
-        Parameters
-        ----------
-        x, y : float
-            Its center, m.
-        radius : float
-            m.
-        """
+        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
         cells = self.within(self.bounds(x, y, radius))
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
 
     def at(self, x: Floats, y: Floats) -> Cells:
-        """Return the cells nearest to some places, m, shape (k,).
-
-        Parameters
-        ----------
-        x, y : ndarray (k,)
-            m.
-        """
+        """Return the cells nearest to some places, m, shape (k,)."""
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
         column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
@@ -205,13 +178,7 @@ class Grid:
 
 
 def make_grid(layout: Layout) -> Grid:
-    """Lay out the cells of a bed, centered on the origin.
-
-    Returns
-    -------
-    Grid
-        With arrays of ``rows * columns`` positions.
-    """
+    """Lay out the cells of a bed, centered on the origin."""
     column = np.arange(layout.columns) * layout.pitch
     row = np.arange(layout.rows)
     width = (layout.columns - 1) * layout.pitch + (layout.shift if layout.rows > 1 else 0.0)
@@ -242,13 +209,7 @@ def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> C
 
 
 def enclose_discs(one: Disc, other: Disc) -> Disc:
-    """Return the least disc that holds two.
-
-    Parameters
-    ----------
-    one, other : (float, float, float)
-        x, y and radius, m.
-    """
+    """Return the least disc, x, y and radius in m, that holds two."""
     (x, y, radius), (other_x, other_y, other_radius) = one, other
     apart = math.hypot(other_x - x, other_y - y)
     if apart + other_radius <= radius:

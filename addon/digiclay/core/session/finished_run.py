@@ -43,19 +43,7 @@ class Run:
 
 
 def read_run(folder: Path, *names: str) -> Run:
-    """Read a run, and of its history the arrays named.
-
-    Parameters
-    ----------
-    folder : Path
-    names : str
-        Keys of `SHAPES`.
-
-    Raises
-    ------
-    OutputError
-        When there is no run, or its files do not belong together.
-    """
+    """Read a run, and of its history the arrays named, keys of `SHAPES`; OutputError when files are unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
@@ -100,14 +88,7 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
 
 
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
-    """Return whether a run's folder has all that was written into it: copies break off half way.
-
-    Parameters
-    ----------
-    folder : Path
-    sizes : mapping of str to int
-        Bytes of each file, as they were written.
-    """
+    """Return whether a run's folder has all files in their sizes, bytes: copies break off half way."""
     try:
         return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
     except OSError:
@@ -115,30 +96,14 @@ def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
 
 
 def is_whole(folder: Path, scene: Scene) -> bool:
-    """Return whether a run's folder has what belongs into each, where no sizes were noted.
-
-    Parameters
-    ----------
-    folder : Path
-    scene : Scene
-        Of the run.
-    """
+    """Return whether a run's folder has what belongs into each, where no sizes were noted."""
     whole = read_json(folder / MARK) is not None
     # The names of an archive's parts stand at its end.
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
 def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
-    """Return the row nearest to a time within the session.
-
-    Parameters
-    ----------
-    history : mapping
-    time : float
-        s.
-    called : str
-        What a message calls the time.
-    """
+    """Return the row nearest to a time within the session, s, which messages call `called`."""
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
         raise OutputError(
