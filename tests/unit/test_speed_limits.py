@@ -29,35 +29,26 @@ def device(method: str = "virtual_master", **layout: object) -> Scene:
     return resolve({"control": {"method": method}, "layout": layout})
 
 
-def test_the_bisection_finds_a_limit_to_its_resolution() -> None:
-    found = bisect(lambda value: value <= 17.3, 2.0, 40.0, 0.1)
-    assert found is not None
-    assert 17.2 <= found <= 17.3
-
-
-def test_the_bisection_returns_a_value_that_held() -> None:
+@pytest.mark.parametrize(
+    ("limit", "low", "resolution", "least", "most", "calls"),
+    [
+        (17.3, 2.0, 0.1, 17.2, 17.3, 11),  # to its resolution
+        (11.0, 0.0, 1.25, 9.75, 11.0, 7),  # both ends, then log2(32) halvings
+        (50.0, 2.0, 0.1, 40.0, 40.0, 2),  # beyond the range: its end
+    ],
+)
+def test_the_bisection_returns_a_value_that_held(
+    limit: float, low: float, resolution: float, least: float, most: float, calls: int
+) -> None:
     tried: list[float] = []
-
-    def holds(value: float) -> bool:
-        tried.append(value)
-        return value <= 11.0
-
-    assert bisect(holds, 2.0, 40.0, 1.0) in [value for value in tried if value <= 11.0]
-
-
-def test_the_bisection_halves_what_is_left() -> None:
-    tried: list[float] = []
-    bisect(lambda value: bool(tried.append(value)) or value <= 11.0, 0.0, 32.0, 1.0)
-    # Both ends, then log2(32) halvings.
-    assert len(tried) == 7
+    found = bisect(lambda value: bool(tried.append(value)) or value <= limit, low, 40.0, resolution)
+    assert found in tried
+    assert least <= found <= most
+    assert len(tried) == calls
 
 
 def test_a_limit_below_the_range_is_none() -> None:
     assert bisect(lambda value: False, 2.0, 40.0, 0.1) is None
-
-
-def test_a_limit_beyond_the_range_is_its_end() -> None:
-    assert bisect(lambda value: True, 2.0, 40.0, 0.1) == 40.0
 
 
 GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)

@@ -70,7 +70,7 @@ class Exchange:
 
 
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
-    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions, in a period, s.
+    """Return the exchange that spreads values with a diffusivity, m²/s, in all directions in a period, s.
 
     The rates come from matching ``D`` along x and y; their sum is limited so that no period,
     however long, makes neighbors overshoot one another.

@@ -240,7 +240,7 @@ def _check_orders(orders: Any, seen: Measurement) -> tuple[Any, Any, Any, Any]:
 
 
 def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fiu") -> Any:
-    """Return values as an array of a shape and kinds of numbers, or raise the broken rule; None stays None."""
+    """Return values as an array of a shape and kinds of numbers, or raise the rule; None stays None."""
     if values is None:
         return None
     array = np.asarray(values)

@@ -138,7 +138,7 @@ class Grid:
         return np.column_stack([self.x, self.y])
 
     def bounds(self, x: float, y: float, radius: float) -> Bounds:
-        """Return the rows and columns of all cells within a radius of a point, m; a last below a first: none."""
+        """Return rows and columns of all cells within a radius of a point, m; a last below a first: none."""
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         return (

@@ -43,7 +43,7 @@ class Run:
 
 
 def read_run(folder: Path, *names: str) -> Run:
-    """Read a run, and of its history the arrays named, keys of `SHAPES`; OutputError when files are unsound."""
+    """Read a run, and of its history the arrays named, keys of `SHAPES`; OutputError if unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")

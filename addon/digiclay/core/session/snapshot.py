@@ -88,7 +88,7 @@ def dump(system: System, state: State) -> bytes:
 
 
 def load(system: System, data: bytes) -> State:
-    """Return the state that bytes hold, to the last bit; StateError when they are damaged, or of another bed."""
+    """Return the state that bytes hold, bit for bit; StateError when they are damaged or of another bed."""
     kept = _read(data)
     header, rows = kept.header, system.rows
     here = [rows.physics, rows.queue, rows.control, rows.sensors]
