@@ -1,6 +1,6 @@
-"""Fuzz test of scenes and snapshots: each is accepted, or refused in one line.
+"""Fuzz test of scenes, snapshots, takes and run folders: each is accepted, or refused in one line.
 
-usage: python tools/fuzz.py {scenes,states} [--count 100000] [--seed 0] [--first 0]
+usage: python tools/fuzz.py {scenes,states,takes,runs} [--count 100000] [--seed 0] [--first 0]
 
 Case number n of a seed is always the same one, whatever the count. What was neither taken nor refused is
 told with its number, and makes the exit code 1.
@@ -11,11 +11,15 @@ from __future__ import annotations
 import argparse
 import collections
 import copy
+import io
 import json
 import sys
+import tempfile
 import warnings
+import zipfile
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path as FolderPath
 from typing import Any
 
 import numpy as np
@@ -25,6 +29,7 @@ from digiclay.core.base.toml_text import parse_tables
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.system import System
+from digiclay.core.metrics.summary import compute_metrics
 from digiclay.core.model.trajectory import Path, Waypoint, interpolate_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import (
@@ -37,8 +42,14 @@ from digiclay.core.scene.schema import (
 )
 from digiclay.core.scene.toml_table import ABSENT, FINGERS, PRESETS, format_scene, resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.run_scene import run
-from digiclay.core.session.snapshot import START
+from digiclay.core.session.finished_run import SHAPES, read_run
+from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.snapshot import FIRST, START
+from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
+from digiclay.core.surface import features
+from digiclay.core.surface.formed import make_formed
+from digiclay.core.surface.skin_grid import fit_skin
+from numpy.typing import NDArray
 
 __all__ = ["CASES", "failure", "main"]
 
@@ -196,8 +207,12 @@ def crafted(chance: np.random.Generator, data: bytes) -> bytes:
                 arrays[at : at + 8] = number.astype(kind).tobytes()
         else:
             arrays[int(chance.integers(len(arrays)))] = int(chance.integers(256))
+    start = START
+    if chance.random() < 0.2:
+        start, held = FIRST, header.get("gathered")
+        header["gathered"] = held | {"reach": None} if isinstance(held, dict) else held
     head = json.dumps(header).encode()
-    return START + len(head).to_bytes(4, "little") + head + bytes(arrays)
+    return start + len(head).to_bytes(4, "little") + head + bytes(arrays)
 
 
 def state(chance: np.random.Generator) -> None:
@@ -212,8 +227,74 @@ def state(chance: np.random.Generator) -> None:
         snapshot.dump(system, found)
 
 
+def odd_array(chance: np.random.Generator, usual: NDArray[Any]) -> NDArray[Any]:
+    """Return an array of another type or shape, or with odd numbers in it."""
+    draw = chance.random()
+    with np.errstate(all="ignore"):
+        if draw < 0.4:
+            kind = np.dtype(KINDS[chance.integers(len(KINDS))])
+            return usual.astype(kind) if kind.names is None else np.zeros(usual.shape, kind)
+        if draw < 0.6:
+            flat = usual.ravel()
+            shapes = flat, usual[None], flat[:0], flat[:1], usual.T, np.array(3.0), flat[:-1]
+            return shapes[chance.integers(len(shapes))]
+        made = usual.copy()
+        number = NUMBERS[chance.integers(len(NUMBERS))]
+        number = float(number) if abs(number) < 10**309 else float("inf")
+        made.reshape(-1)[chance.integers(made.size)] = np.float64(number).astype(made.dtype)
+        return made
+
+
+def pack(chance: np.random.Generator, arrays: dict[str, NDArray[Any]]) -> bytes:
+    """Return arrays as a file .npz, some of them odd, or their heads."""
+    file = io.BytesIO()
+    for name in chance.permutation(list(arrays))[: chance.integers(1, 3)]:
+        arrays = arrays | {name: odd_array(chance, arrays[name])}
+    words = ((b"False", b"True "), (b"), }", b"L),}"), (b"descr", b"descx"), (b"<f8", b"<M8"))
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, array in arrays.items():
+            part = io.BytesIO()
+            np.lib.format.write_array(part, np.asarray(array), allow_pickle=False)
+            data, (old, new) = part.getvalue(), words[chance.integers(4)]
+            archive.writestr(f"{name}.npy", data.replace(old, new, 1) if chance.random() < 0.05 else data)
+    return file.getvalue()
+
+
+@cache
+def recorded() -> tuple[Result, Take]:
+    """Return a short run of a small bed, and a take of the same."""
+    small = {"layout": {"rows": 6, "columns": 11}, "simulation": {"duration": 0.05}, "recorder": {}}
+    found = resolve(small)
+    rest, poses = begin(assemble(found)), np.tile([0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0], (4, 1, 1))
+    start = snapshot.dump(assemble(found), rest)
+    return run(found), Take(found, start, poses, start, np.tile([0.0, 0.0, 5e-3, 0.5], (3, 1)))
+
+
+def take(chance: np.random.Generator) -> None:
+    """Read a take with odd arrays and replay it, or have it refused."""
+    with np.load(io.BytesIO(to_bytes(recorded()[1]))) as file:
+        arrays = dict(file)
+    for _ in replay(from_bytes(pack(chance, arrays))):
+        pass
+
+
+def folder(chance: np.random.Generator) -> None:
+    """Read a run with odd arrays and evaluate it, or have it refused."""
+    done = recorded()[0]
+    with tempfile.TemporaryDirectory() as name:
+        (FolderPath(name) / "scene.toml").write_text(format_scene(done.scene), encoding="utf-8")
+        (FolderPath(name) / "history.npz").write_bytes(pack(chance, done.history))
+        found = read_run(FolderPath(name), *SHAPES)
+    json.dumps(compute_metrics(found.history, found.scene.set_point), allow_nan=False)
+    features.find(fit_skin(make_formed(found.history, -1), "bilinear", 1, 0.0))
+
+
+#: Types of arrays that no file of ours has.
+KINDS = ("M8[s]", "m8[s]", "c16", "U3", "S2", "?", "i8", "u1", "f4", "f2", "f16", ">f8", "V8", "f4,i4")
 #: What can be made, and had taken or refused.
-CASES: dict[str, Callable[[np.random.Generator], None]] = {"scenes": scene, "states": state}
+CASES: dict[str, Callable[[np.random.Generator], None]] = {
+    "scenes": scene, "states": state, "takes": take, "runs": folder,
+}  # fmt: skip
 
 
 def failure(kind: str, seed: int, number: int) -> str | None:

@@ -1,4 +1,4 @@
-"""Odd scenes and kept states are taken or refused in one line; `tools/fuzz.py` tries many more of them."""
+"""Odd scenes, states, takes and runs are taken or refused in one line; `tools/fuzz.py` tries many more."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def fuzz() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize(("kind", "count"), [("scenes", 250), ("states", 500)])
+@pytest.mark.parametrize(("kind", "count"), [("scenes", 250), ("states", 500), ("takes", 300), ("runs", 300)])
 def test_what_is_odd_is_taken_or_refused(fuzz: ModuleType, kind: str, count: int) -> None:
     told = [fuzz.failure(kind, 7, number) for number in range(count)]
     assert {number: said for number, said in enumerate(told) if said} == {}

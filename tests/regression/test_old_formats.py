@@ -54,7 +54,8 @@ def values(scene: Scene) -> dict[str, Any]:
 def known(part: Parameters, name: str) -> bool:
     """Tell whether an older version knows a parameter; a later one counts where it is not the default."""
     default = type(part).__dataclass_fields__[name].default
-    return not list_quantities(part)[name].later or getattr(part, name) != default
+    later = list_quantities(part)[name].later or name in part.list_idle()
+    return not later or getattr(part, name) != default
 
 
 def listed(value: Any) -> Any:

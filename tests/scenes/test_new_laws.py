@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.base.quantity import Parameters, quantity
+from digiclay.core.model.contact import ExponentialLaw
+from digiclay.core.model.valve import Orifice
 
-from tests.package_copy import copy_package, find_changes, run_python
+from tests.package_copy import ROOT, copy_package, find_changes, run_python
 
 #: An equal-percentage valve: the lift grows exponentially with the opening.
 VALVE = '''
@@ -131,23 +136,23 @@ def add_law(copy: Path, section: str, row: str, name: str, text: str) -> None:
     laws.write_text("".join([*lines[:place], f"        {row}\n", *lines[place:]]), encoding="utf-8")
 
 
+#: Section, row of the list of laws, file and its text.
+LAWS = (
+    (
+        "valve",
+        '"equal_percentage": ("model.valve_exponential", "EqualPercentage"),',
+        "valve_exponential.py",
+        VALVE,
+    ),
+    ("contact", '"pad": ("model.pad", "Pad"),', "pad.py", CONTACT),
+)
+
+
 @pytest.mark.parametrize(
     ("section", "row", "name", "text", "asked"),
     [
-        (
-            "valve",
-            '"equal_percentage": ("model.valve_exponential", "EqualPercentage"),',
-            "valve_exponential.py",
-            VALVE,
-            ("equal_percentage", "rangeability", "10", "20", "40"),
-        ),
-        (
-            "contact",
-            '"pad": ("model.pad", "Pad"),',
-            "pad.py",
-            CONTACT,
-            ("pad", "doubling", "0.3e-3", "0.4e-3", "0.6e-3"),
-        ),
+        (*LAWS[0], ("equal_percentage", "rangeability", "10", "20", "40")),
+        (*LAWS[1], ("pad", "doubling", "0.3e-3", "0.4e-3", "0.6e-3")),
     ],
 )
 def test_a_new_law_is_one_file_and_one_line(
@@ -165,3 +170,119 @@ def test_a_new_law_is_one_file_and_one_line(
     page = (copy / "docs" / "nomenclature.md").read_text(encoding="utf-8")
     assert f"`{section}.{asked[1]}`" in page
     assert f"`{section}.law`" in page
+
+
+#: What runs in the copy: a scene without a word of laws.
+PLAIN = """
+from digiclay.core.model.contact import Contact
+from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.session.run_scene import run
+scene = resolve({"simulation": {"duration": 0.01}})
+print("law =" in format_scene(scene), run(scene.with_sections(contact=Contact())).periods)
+"""
+
+
+def test_laws_that_no_scene_selects_change_no_file_and_no_other_test(copy: Path) -> None:
+    for law in LAWS:
+        add_law(copy, *law)
+    shutil.copytree(ROOT / "tests", copy / "tests")
+    shutil.copy(ROOT / "pyproject.toml", copy)
+    run_python(copy, str(copy / "tools" / "nomenclature.py"))
+    assert run_python(copy, "-c", PLAIN) == "False 2\n"
+    tests = ("regression/test_old_formats.py", "regression/test_nomenclature.py", "unit/test_schema.py")
+    files = [str(copy / "tests" / name) for name in (*tests, "unit/test_toml_table.py")]
+    run_python(copy, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", f"--rootdir={copy}", *files)
+
+
+@pytest.mark.parametrize(
+    ("base", "name", "said"),
+    [
+        (ExponentialLaw, "tension", "tension must be that of ExponentialLaw: the closed form"),
+        (ExponentialLaw, "_numbers", "_numbers must be that of ExponentialLaw: the closed form"),
+        (Orifice, "flow", "flow must be that of Orifice: steppers and conduits compute the flow from lam"),
+        (Orifice, "conductance", "conductance must be that of Orifice"),
+        (Parameters, "gap", "gap must have one of the units m, s, Pa, N"),
+    ],
+)
+def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base: type, name: str, said: str) -> None:
+    with pytest.raises(ParameterError, match=f"^Wrong.{said}"):
+        type("Wrong", (base,), {name: quantity(1.0, "gap", unit="1")})
+
+
+@pytest.mark.parametrize(
+    ("number", "old", "new", "said"),
+    [
+        (0, "def flow_law", "def flows", "EqualPercentage without flow_law"),
+        (
+            1,
+            "Pad(ExponentialLaw, ",
+            "Pad(",
+            "contact.pad must derive from Parameters and ExponentialLaw, and have",
+        ),
+        (1, "def exponent", "def stiffening", "got Pad without exponent"),
+    ],
+)
+def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(
+    copy: Path, number: int, old: str, new: str, said: str
+) -> None:
+    section, row, name, text = LAWS[number]
+    add_law(copy, section, row, name, text.replace(old, new))
+    make = "from digiclay.core.scene.toml_table import resolve; from digiclay.core.base.errors import *\n"
+    assert said in run_python(copy, "-c", f"{make}try: resolve({{}})\nexcept ParameterError as e: print(e)")
+
+
+#: What runs in the copy: an arrangement under several methods, and what refuses it.
+BEDS = """
+import sys
+import numpy as np
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.session.run_scene import run
+from digiclay.core.surface.formed import make_formed
+from digiclay.core.surface.pin_lattice import Lattice
+from digiclay.core.surface.pins_solid import make_parts
+
+def attempt(make):
+    try:
+        return make()
+    except DigiclayError as error:
+        return str(error)
+
+said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.3", f"layout.arrangement={sys.argv[1]}")
+scene = load(find("tap"), [Setting(*one.split("=")) for one in said])
+viscous = load(find("tap"), [Setting(*one.split("=")) for one in (*said, "control.method=viscous")])
+done = run(scene)
+formed = make_formed(done.history, -1)
+print(done.figures["max_total_force"] > 0.0, scene.fingers[0].contact.share)
+print(attempt(lambda: len(run(viscous).history["time"])))
+print(attempt(lambda: Lattice.of(formed).neighbor.shape[1]))
+print(attempt(lambda: np.bincount(make_parts(formed).pin).max()))
+print(attempt(lambda: scene.layout.find_neighbors(corners=False)[60].tolist()))
+"""
+REFUSED = (
+    "layout.arrangement must have its rows in line or shifted by half a pitch, where neighbors are needed "
+    "(got a shift of 0.3 pitches)."
+)
+
+
+@pytest.mark.parametrize(
+    ("row", "share", "found"),
+    [
+        ('Arrangement(1.5, 0.0, "Wide rows")', 0.34, ["61", "8", "4", "[61, 71, 59, 49]"]),
+        (
+            'Arrangement(0.7, 0.5, "Close rows", share=0.25)',
+            0.25,
+            ["61", "6", "6", "[61, 72, 71, 59, 49, 50]"],
+        ),
+        ('Arrangement(1.0, 0.3, "No lattice")', 0.34, [REFUSED] * 4),
+    ],
+)
+def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(
+    copy: Path, row: str, share: float, found: list[str]
+) -> None:
+    layout = copy / "addon" / "digiclay" / "core" / "model" / "layout.py"
+    text = layout.read_text(encoding="utf-8")
+    layout.write_text(
+        text.replace("ARRANGEMENTS = {\n", f'ARRANGEMENTS = {{\n    "new": {row},\n'), encoding="utf-8"
+    )
+    assert run_python(copy, "-c", BEDS, "new").splitlines() == [f"True {share}", *found]

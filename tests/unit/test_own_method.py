@@ -129,6 +129,26 @@ def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here: Path) -> None:
     assert own.metrics["losses"] == built_in.metrics["losses"]
 
 
+#: Opens the valves of pressed pins; the other one then raises all it was shown at the root of each view.
+OPEN = f"{PAD.partition('        return')[0]}        orders = Orders(cells.target, -0.2 * down, 3 * down)\n"
+CHEAT = f"""{OPEN.replace("SoftPad", "Cheat")}
+        for shown in (*cells, device.grid.x, device.grid.y):
+            while isinstance(shown.base, np.ndarray):
+                shown = shown.base
+            shown.flags.writeable = True
+            shown += shown.dtype.type(1)
+        return memory, orders
+"""
+
+
+def test_nothing_a_method_is_shown_leads_to_the_bed(here: Path) -> None:
+    write_method(here, f"{OPEN}        return memory, orders\n")
+    write_method(here, CHEAT, "cheat.py")
+    honest, cheat = (run(small(load_method(word))) for word in ("pad.py:SoftPad", "cheat.py:Cheat"))
+    for key, values in honest.history.items():
+        np.testing.assert_array_equal(cheat.history[key], values, key)
+
+
 @pytest.mark.parametrize(
     ("attribute", "name"),
     [("Mine", "mine"), ("SoftPad", "soft_pad"), ("PIDControl2", "pid_control2"), ("mine", "mine")],

@@ -130,13 +130,15 @@ def test_the_fastest_lift_leaves_out_what_no_pin_could_follow() -> None:
     assert 0.0 < scenes.fastest_lift(session) < find_free_speed(session)
 
 
-@pytest.mark.parametrize(("speed", "times"), [(0.2, []), (5e-3, [0.5])])
+@pytest.mark.parametrize(("speed", "times"), [(0.2, []), (5e-3, [0.5, 0.8])])
 def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float, times: list[float]) -> None:
     time = np.linspace(0.0, 1.0, 201)
     tip = np.zeros((201, 7))
     tip[:, 2] = speed * time
-    done = Result(resolve({}), {"time": time, "fingertip": tip}, 200, 1.0, {}, np.array([0.5]))
-    assert find_unintended_losses(done) == times
+    force = np.ones(201)
+    force[100:120] = force[160:] = 0.0
+    done = Result(resolve({}), {"time": time, "fingertip": tip, "total_force": force}, 200, 1.0, {})
+    assert find_unintended_losses(done) == pytest.approx(times)
 
 
 def test_every_arrow_of_the_controller_is_a_row_of_the_page() -> None:

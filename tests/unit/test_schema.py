@@ -8,7 +8,17 @@ from typing import Any
 
 import pytest
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.scene.schema import NEEDS, OPTIONAL, PARTS, SECTIONS, UNASKED, Scene, Simulation
+from digiclay.core.base.quantity import list_quantities
+from digiclay.core.scene.schema import (
+    NEEDS,
+    OPTIONAL,
+    PARTS,
+    SECTIONS,
+    UNASKED,
+    Scene,
+    Simulation,
+    import_parameters,
+)  # fmt: skip
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
 
@@ -126,7 +136,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "key that would break the line": (
         {"valve": {"a\nb": 1}},
         "valve.'a\\nb' must be a known key (got 1). "
-        "Known here: orifice_diameter, stroke, discharge_slope, knee_reynolds, gap.",
+        f"Known here: {', '.join(list_quantities(import_parameters('valve', '')))}.",
     ),
     "text for a number": (
         {"fluid": {"density": "thick"}},

@@ -59,7 +59,7 @@ def test_a_take_without_orders_is_written_as_version_2_that_older_versions_read(
 @pytest.mark.parametrize(
     ("orders", "said"),
     [
-        (ORDERS[1:], r"got an array of the shape \(39, 4\)"),
+        (ORDERS[1:], r"got an array of the shape \(39, 4\) of float64"),
         (np.full_like(ORDERS, np.nan), r"got row 0 is \[nan"),
         (ORDERS * [1.0, 1.0, 1.0, 2.0], r"got row 0 is \[-0.006, 0.0, 0.01, 2.0\]"),
     ],

@@ -286,4 +286,4 @@ def test_the_least_and_the_greatest_order_are_sound() -> None:
 
 @pytest.mark.parametrize("shape", [(0, 4), (2, 4), (3, 5), (12,)])
 def test_orders_of_another_shape_are_found(shape: tuple[int, ...]) -> None:
-    assert find_fault(np.zeros(shape), 3) == f"an array of the shape {shape}"
+    assert find_fault(np.zeros(shape), 3) == f"an array of the shape {shape} of float64"

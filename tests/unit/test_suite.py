@@ -232,6 +232,16 @@ def test_a_phase_is_judged_alone() -> None:
     assert part["figures"]["rfd"] != whole["figures"]["rfd"]
 
 
+def test_a_method_that_counts_nothing_itself_loses_the_fingertip_in_the_league() -> None:
+    scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": "elastic"}})
+    placed, measure = place_trial(scene, Trial("lift", "lift"))
+    phase, whole = measure(placed, None), measure_trial(placed)
+    assert phase
+    assert whole
+    assert phase["figures"]["contact_loss_share"] > 0.5
+    assert (phase["figures"]["losses"], whole["figures"]["losses"]) == (1.0, 1.0)
+
+
 def test_a_relief_that_is_nominal_has_no_error() -> None:
     scene = resolve({"layout": {"rows": 9, "columns": 25}, "control": {"method": "virtual_master"}})
     line = np.linspace(-30e-3, 30e-3, 61)

@@ -136,24 +136,13 @@ def measure_excess_heights(grid: Grid, height: Floats) -> Floats:
     height : ndarray (n,)
         m.
     """
-    plan = grid.layout
-    shape = (plan.rows, plan.columns)
-    one = np.asarray(height).reshape(shape)
-    highest, lowest = np.full(shape, -np.inf), np.full(shape, np.inf)
-    padded = np.pad(one, 1, constant_values=np.nan)
-    odd = (np.arange(plan.rows) % 2 == 1)[:, None]
-    for down in (-1, 0, 1):
-        for right in (-1, 0, 1):
-            if down == right == 0:
-                continue
-            beside = padded[1 + down : 1 + down + plan.rows, 1 + right : 1 + right + plan.columns]
-            if plan.shift > 0.0 and down and right:  # even rows reach left, odd ones right
-                beside = np.where(odd == (right > 0), beside, np.nan)
-            highest, lowest = np.fmax(highest, beside), np.fmin(lowest, beside)
-    # A bed of a single pin has no neighbors: their highest and lowest are still infinite then.
-    highest, lowest = np.where(np.isinf(highest), one, highest), np.where(np.isinf(lowest), one, lowest)
+    one = np.asarray(height)
+    beside = np.append(one, np.nan)[grid.layout.find_neighbors(corners=True)]
+    highest, lowest = np.fmax.reduce(beside, axis=1), np.fmin.reduce(beside, axis=1)
+    # A bed of a single pin has no neighbors.
+    highest, lowest = np.where(np.isnan(highest), one, highest), np.where(np.isnan(lowest), one, lowest)
     excess: Floats = np.maximum(one - highest, 0.0) - np.maximum(lowest - one, 0.0)
-    return excess.ravel()
+    return excess
 
 
 def _find_form(stroke: Stroke, grid: Grid, finger: Fingertip, blister: Blister) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 from .. import preferences
 from ..compat import bpy
 from ..core.control.methods import METHODS
-from ..core.model.layout import Layout
+from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS
 from ..device import palettes, rebuild, view
@@ -90,11 +90,7 @@ class AddBed(Action, bpy.types.Operator):
     arrangement: bpy.props.EnumProperty(
         name="Arrangement",
         description="Offset of neighboring rows",
-        items=[
-            ("aligned", "Aligned", "A square grid"),
-            ("staggered", "Staggered", "Every other row shifted by half a pitch, rows one pitch apart"),
-            ("hexagonal", "Hexagonal", "Every other row shifted, six neighbors at the same distance"),
-        ],
+        items=[(name, title(name), known.meaning) for name, known in ARRANGEMENTS.items()],
         default=DEFAULT.arrangement,
     )
     method: bpy.props.EnumProperty(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import copy
 import copyreg
 import dataclasses
 import importlib
@@ -10,10 +11,13 @@ import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.abc import ExecutionLoader
+from importlib.machinery import ModuleSpec
+from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any
 
-from ..core.base.errors import MethodError
+from ..core.base.errors import MethodError, ParameterError
 from ..core.control.guarded import Guarded, describe_failure, guard
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
 from .method_rules import check_class, list_classes
@@ -50,8 +54,8 @@ class OwnRow(Method):
 
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
-        source = self.source
-        return guard(lambda: parameters.build(device), self.name, source.label, source.file, device.period)
+        source, own = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
+        return guard(lambda: parameters.build(own), self.name, source.label, source.file, own.period)
 
     def describe(self) -> str:
         """Return what it does, in the first line of its class, where it has one of its own."""
@@ -60,19 +64,7 @@ class OwnRow(Method):
 
 
 def load_method(word: str) -> str:
-    """Load the method that a word of the command line names, unless it is known; return its name.
-
-    Parameters
-    ----------
-    word : str
-        Name of a method, ``path/to/mine.py:Mine``, or the name of an installed method. A word that names
-        nothing is returned as it is: `methods.find_method` refuses it with the list of those there are.
-
-    Raises
-    ------
-    MethodError
-        In one line: file and rule.
-    """
+    """Load the method that a word of the command line names; return its name, or a word that names none."""
     if word in METHODS or word in list_added():
         return word
     source = read_source(word)
@@ -95,17 +87,7 @@ def name_method(attribute: str) -> str:
 
 
 def add_source(name: str, source: MethodSource) -> OwnRow:
-    """Load a method's code and put it into the table of methods, in place of one of the same name.
-
-    Parameters
-    ----------
-    name : str
-    source : MethodSource
-
-    Raises
-    ------
-    MethodError
-    """
+    """Load a method's code and put it into the table of methods, in place of one of the same name."""
     if name in METHODS:
         raise MethodError(f"{source.label}: the class must not have the name of the built-in method {name}.")
     module = _import(source)
@@ -118,18 +100,7 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
 
 
 def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
-    """Check the class of a method, and put it into the table of methods.
-
-    Parameters
-    ----------
-    name : str
-    source : MethodSource
-    kind : type
-
-    Raises
-    ------
-    MethodError
-    """
+    """Check the class of a method, and put it into the table of methods."""
     check_class(source.label, kind)
     blister = getattr(kind, "blister", None)
     row = OwnRow(
@@ -148,21 +119,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
 
 
 def restore_parameters(name: str, source: MethodSource, values: dict[str, Any]) -> ControlParameters:
-    """Return parameters that another process has pickled, with their class: its code comes along.
-
-    Parameters
-    ----------
-    name : str
-        Of the method.
-    source : MethodSource
-    values : dict
-        SI, by field.
-
-    Raises
-    ------
-    MethodError
-        When an installed package is missing here, or is of another version.
-    """
+    """Return parameters that another process has pickled, with their class: its code comes along."""
     known = list_added().get(name)
     if not isinstance(known, OwnRow) or known.source[1:] != source[1:]:
         if source.module:
@@ -181,35 +138,47 @@ def _import(source: MethodSource) -> ModuleType:
         return run_code(source)
     try:
         return importlib.import_module(source.module)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         why = describe_failure(error, source.file)
         raise MethodError(f"{source.label}: {source.module} {why}.") from error
+
+
+class MethodCode(ExecutionLoader):
+    """Loader of code kept as text, which other processes have without the file; it keeps no bytecode."""
+
+    def __init__(self, source: MethodSource) -> None:
+        self.source = source
+
+    def get_filename(self, fullname: str) -> str:
+        """Return the file as tracebacks have it."""
+        return self.source.file
+
+    def get_source(self, fullname: str) -> str:
+        """Return the code as text."""
+        return self.source.text
 
 
 def run_code(source: MethodSource) -> ModuleType:
     """Run the code of a file as a module, without its folder: it may import what is installed.
 
     In Blender the package has another name; for the code it is ``digiclay`` everywhere.
-
-    Parameters
-    ----------
-    source : MethodSource
-
-    Raises
-    ------
-    MethodError
-        When it cannot be run.
     """
-    module = ModuleType(f"digiclay_own_{source.digest[:16]}")
+    name, loader = f"digiclay_own_{source.digest[:16]}", MethodCode(source)
+    module = module_from_spec(ModuleSpec(name, loader, origin=source.file))
     module.__file__ = source.file
     module.__dict__["__builtins__"] = {**vars(builtins), "__import__": _import_for_methods}
-    sys.modules[module.__name__] = module
+    sys.modules[name] = module
     try:
-        exec(compile(source.text, source.file, "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:
-        del sys.modules[module.__name__]
-        name = source.label.partition(":")[0]
-        raise MethodError(f"{name}: the code {describe_failure(error, source.file)}.") from error
+        loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[name]
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        rule = f"the code {describe_failure(error, source.file)}."
+        said = str(error) if isinstance(error, ParameterError) else rule
+        raise MethodError(f"{source.label.partition(':')[0]}: {said}") from error
     return module
 
 

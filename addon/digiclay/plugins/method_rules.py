@@ -8,11 +8,12 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from ..core.base.errors import MethodError, ParameterError
-from ..core.base.quantity import EXTENTS, Quantity
+from ..core.base.quantity import Quantity
 from ..core.control.blister import Blister
 from ..core.control.guarded import MOST_ROWS, describe_failure
 from ..core.control.methods import ControlParameters
 from ..core.control.own_method import OwnMethod
+from ..core.model.set_point import SetPoint
 
 __all__ = ["check_class", "list_classes"]
 
@@ -37,19 +38,7 @@ def list_classes(module: ModuleType) -> list[type]:
 
 
 def check_class(label: str, kind: Any) -> None:
-    """Refuse a class that is no control method.
-
-    Parameters
-    ----------
-    label : str
-        File and class, for messages.
-    kind : object
-
-    Raises
-    ------
-    MethodError
-        In one line: class, rule, what it is instead.
-    """
+    """Refuse a class that is no control method."""
 
     def refuse(rule: str, got: object = "") -> NoReturn:
         raise MethodError(f"{label}: {rule}{f' (got {got})' if got != '' else ''}.")
@@ -68,10 +57,15 @@ def check_class(label: str, kind: Any) -> None:
         refuse("the class must have a function command(self, memory, cells, device)")
     _check_settings(kind, refuse)
     try:
-        kind()
+        asked = getattr(kind(), "set_point", None)
+        if not (asked is None or isinstance(asked, SetPoint)):
+            refuse("set_point must be a SetPoint or None", type(asked).__name__)
     except ParameterError as error:
-        refuse(f"the default of {error.field} {error.rule}", error.value)
-    except Exception as error:
+        name = f"the default of {error.field}" if error.field else "the class"
+        refuse(f"{name} {error.rule}", error.value)
+    except (MethodError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
         refuse(f"the class {describe_failure(error, '')}")
 
 
@@ -87,8 +81,6 @@ def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
         refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
     if field.name in TAKEN or field.name.startswith("_"):
         refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
-    if known.unit not in EXTENTS:
-        refuse(f"the unit of {field.name} must be one of {', '.join(filter(None, EXTENTS))}", known.unit)
     if not isinstance(field.default, KINDS):
         kinds = ", ".join(kind.__name__ for kind in KINDS)
         refuse(f"the default of {field.name} must be a {kinds}", type(field.default).__name__)

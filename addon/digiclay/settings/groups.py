@@ -10,8 +10,9 @@ from ..compat import bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS, list_methods
 from ..core.model.fingertip import Fingertip
+from ..core.model.layout import ARRANGEMENTS
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
-from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
+from ..core.scene.toml_table import PRESETS
 from ..device import view
 from . import finger_size
 from .chosen_method import choose, list_offered, method_of, place_of
@@ -98,8 +99,9 @@ def take_arrangement(layout: Any, context: Any) -> None:
     """
     settings = layout.id_data.digiclay
     kind = import_parameters("contact", "")
-    if layout.arrangement == "hexagonal":
-        assign(settings.contact, kind, "share", HEXAGONAL_SHARE)
+    share = ARRANGEMENTS[layout.arrangement].share
+    if share is not None:
+        assign(settings.contact, kind, "share", share)
     else:
         reset(settings.contact, kind, "share")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError,
 #: All that numpy's readers raise over a head that makes no sense.
 BROKEN = (
     ValueError, TypeError, KeyError, SyntaxError, RecursionError, MemoryError, OverflowError, EOFError,
-    tokenize.TokenError,
+    tokenize.TokenError, Warning,
 )  # fmt: skip
 
 
@@ -38,21 +39,7 @@ class Head(NamedTuple):
 
 
 def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
-    """Return what arrays of a file .npz are.
-
-    Parameters
-    ----------
-    archive : ZipFile
-    names : sequence of str
-        Of the arrays.
-
-    Raises
-    ------
-    KeyError
-        When one is not there.
-    ValueError
-        When a head cannot be read, or promises more, or less, than there is.
-    """
+    """Return what arrays of a file .npz are; KeyError without one, ValueError for a head that is untrue."""
     found = {}
     for name in names:
         entry = archive.getinfo(f"{name}.npy")
@@ -68,14 +55,15 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
 
 
 def _head(file: IO[bytes], name: str) -> Head:
-    """Read the head of an array."""
+    """Read the head of an array; what numpy would warn of is no head of ours."""
     try:
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         readers: dict[Any, Any] = {
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }
-        shape, _, kind = readers[version](file)
+        with warnings.catch_warnings(action="error"):
+            shape, _, kind = readers[version](file)
         if kind.hasobject or not all(isinstance(side, int) and side >= 0 for side in shape):
             raise ValueError("no numbers")
         return Head(tuple(shape), kind)
@@ -84,31 +72,17 @@ def _head(file: IO[bytes], name: str) -> Head:
 
 
 def read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Read an array whose head has been looked at.
-
-    Parameters
-    ----------
-    archive : ZipFile
-    name : str
-        Of the array.
-    """
+    """Read an array whose head has been looked at."""
     with archive.open(f"{name}.npy") as file:
         read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         return read
 
 
 def map_array(path: Path) -> NDArray[Any]:
-    """Return the array of a file .npy, still in the file: nothing is read before it is used.
-
-    Raises
-    ------
-    OSError
-        When the file cannot be read.
-    ValueError
-        When it holds no array of numbers.
-    """
+    """Return the array of a file .npy, read as it is used; OSError, or ValueError where it has no numbers."""
     try:
-        read = np.load(path, allow_pickle=False, mmap_mode="r")
+        with warnings.catch_warnings(action="error"):
+            read = np.load(path, allow_pickle=False, mmap_mode="r")
     except BROKEN:
         raise ValueError("no array of numbers") from None
     if not isinstance(read, np.ndarray):

@@ -14,10 +14,11 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import ParameterError
+from .errors import DigiclayError, ParameterError
 
 __all__ = [
     "EXTENTS", "UNITS", "Parameters", "Quantity", "find_nearest_name", "list_quantities", "parse", "quantity",
+    "refuse_overrides",
 ]  # fmt: skip
 
 #: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
@@ -130,6 +131,14 @@ class Parameters:
         On a wrong type, a number that is not finite, or a value out of bounds.
     """
 
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        for name, field in vars(cls).items():
+            known = field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
+            if known and known.unit not in EXTENTS:
+                rule = f"must have one of the units {', '.join(filter(None, EXTENTS))}, or none for a number"
+                raise ParameterError(cls.__name__, name, rule, repr(known.unit))
+
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             known: Quantity = field.metadata["quantity"]
@@ -139,10 +148,27 @@ class Parameters:
                 rule = known.broken_rule(item)
                 if rule:
                     raise ParameterError(type(self).__name__, field.name, rule, known.show(item))
-        self.check()
+        try:
+            self.check()
+        except (DigiclayError, MemoryError, KeyboardInterrupt):
+            raise
+        except BaseException as error:  # of a method of one's own
+            said = f"{type(error).__name__}: {error}"
+            raise ParameterError(type(self).__name__, "", "must pass its own check", said) from error
 
     def check(self) -> None:
         """Check the rules that join several fields; parts override this."""
+
+    def list_idle(self) -> frozenset[str]:
+        """Return the parameters without effect under the choices made: unless changed, no file has them."""
+        return frozenset()
+
+
+def refuse_overrides(kind: type, base: type, names: tuple[str, ...], reason: str) -> None:
+    """Refuse a class that overrides attributes of its base which others are computed beside."""
+    for name in names:
+        if getattr(kind, name) is not getattr(base, name):
+            raise ParameterError(kind.__name__, name, f"must be that of {base.__name__}: {reason}", "another")
 
 
 def _typed(owner: Parameters, name: str, known: Quantity, value: Any, default: Any) -> Any:

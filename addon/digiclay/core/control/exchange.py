@@ -60,11 +60,6 @@ class Exchange:
 
         What one gives the other gets, and nothing is exchanged with a cell that is not there: the
         sum stays what it was.
-
-        Parameters
-        ----------
-        cells : ndarray of int (m,)
-        values : ndarray (m,)
         """
         change = np.zeros(cells.size)
         for one, other, share in self.find_pairs(cells):
@@ -75,21 +70,13 @@ class Exchange:
 
 
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
-    """Return the exchange that spreads values with a diffusivity, m²/s, alike in all directions.
+    """Return the exchange that spreads values with a diffusivity, m²/s, in all directions in a period, s.
 
     The rates come from matching ``D`` along x and y; their sum is limited so that no period,
     however long, makes neighbors overshoot one another.
-
-    Parameters
-    ----------
-    grid : Grid
-    diffusivity : float
-        m²/s.
-    period : float
-        Control period, s.
     """
     plan = grid.layout
-    if plan.arrangement == "aligned":
+    if not plan.shifted:
         along, across = diffusivity / plan.pitch**2, diffusivity / plan.row_spacing**2
         total = 2.0 * (along + across)
     else:
@@ -97,4 +84,4 @@ def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
         along = diffusivity / plan.pitch**2 - across / 2.0
         total = 2.0 * along + 4.0 * across
     limited = -math.expm1(-2.0 * total * period) / (2.0 * total) if total else 0.0
-    return Exchange(plan.columns, plan.shift > 0.0, along * limited, across * limited)
+    return Exchange(plan.columns, plan.shifted, along * limited, across * limited)

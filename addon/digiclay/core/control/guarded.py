@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import DigiclayError, MethodError
 from ..model.control_interface import Commands, Controller, Measurement
-from .own_method import check_array, check_modes
+from .own_method import check_array, check_modes, take_results
 
 __all__ = ["MOST_PERIODS", "MOST_ROWS", "Guarded", "Pace", "describe_failure", "guard"]
 
@@ -40,13 +40,7 @@ class Pace:
     count: int = 0
 
     def add(self, spent: float) -> float | None:
-        """Add a call; return the mean over `CALLS` of them, s, each time that these are complete.
-
-        Parameters
-        ----------
-        spent : float
-            s.
-        """
+        """Add a call; return the mean over `CALLS` of them, s, each time that these are complete."""
         self.spent, self.count = self.spent + spent, self.count + 1
         if self.count < CALLS:
             return None
@@ -94,8 +88,11 @@ class Guarded:
         """Let the method say which cells it commands; see `Controller`."""
         start = time.thread_time()
         with self._told("locate"), np.errstate(all="ignore"):
-            after, disc = _take_two(self.inner.locate(memory, touched), "memory and a disc, or None")
+            given = _hand_out(touched)
+            found = self.inner.locate(memory, given)
+            after, disc = take_results(found, 2, "memory and a disc, or None")
             _check_alike(memory, after)
+            touched.own[:] = given.own
             if disc is not None:
                 disc = tuple(check_array(disc, "the disc", (3,)).tolist())
         self.pace.spent += time.thread_time() - start
@@ -105,16 +102,17 @@ class Guarded:
         """Let the method command the cells; see `Controller`."""
         start, size = time.thread_time(), seen.height.shape
         with self._told("command"), np.errstate(all="ignore"):
-            after, orders = _take_two(self.inner.command(memory, seen), "memory and orders")
+            given = _hand_out(seen)
+            after, orders = take_results(self.inner.command(memory, given), 2, "memory and orders")
             _check_alike(memory, after)
-            target, mode, command = orders
+            target, mode, command = take_results(orders, 3, "target, mode and command")
             target = check_array(target, "target", size)
             mode = check_modes(check_array(mode, "mode", size, "iu"))
             command = check_array(command, "command", size)
             if command.size and not (command.max() <= 1.0 and command.min() >= -1.0):
                 raise ValueError(f"must return commands from -1 to 1 (got {np.abs(command).max():.6g})")
             if self.rows:
-                check_array(seen.own, "rows", seen.own.shape)
+                seen.own[:] = check_array(given.own, "rows", seen.own.shape)
         self._judge(time.thread_time() - start)
         return after, Commands(target, mode, command)
 
@@ -131,30 +129,14 @@ class Guarded:
         """Turn whatever goes wrong into one line."""
         try:
             yield
-        except (MethodError, MemoryError):
+        except (MethodError, MemoryError, KeyboardInterrupt):
             raise
-        except Exception as error:
+        except BaseException as error:  # also SystemExit, which would end the program without a word
             raise MethodError(f"{self.origin}: {function} {describe_failure(error, self.file)}.") from error
 
 
 def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guarded:
-    """Build a controller of unknown code, and guard it.
-
-    Parameters
-    ----------
-    build : callable
-        Returns the controller.
-    name : str
-        Of the method.
-    origin, file : str
-        See `Guarded`.
-    period : float
-        Control period, s.
-
-    Raises
-    ------
-    MethodError
-    """
+    """Build a controller of unknown code, and guard it."""
     try:
         inner = build()
         for function in ("begin", "locate", "command"):
@@ -163,9 +145,9 @@ def guard(build: Any, name: str, origin: str, file: str, period: float) -> Guard
         rows = inner.rows
         if not isinstance(rows, int) or isinstance(rows, bool) or not 0 <= rows <= MOST_ROWS:
             raise TypeError(f"must have rows, a whole number from 0 to {MOST_ROWS} (got {rows!r})")
-    except (DigiclayError, MemoryError):
+    except (DigiclayError, MemoryError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:
         raise MethodError(f"{origin}: build {describe_failure(error, file)}.") from error
     return Guarded(inner, name, origin, file, period, rows)
 
@@ -174,12 +156,6 @@ def describe_failure(error: BaseException, file: str) -> str:
     """Return what an error of unknown code breaks, with the line of its file.
 
     A rule that a check of ours found broken is the error's own text, ``must ...``.
-
-    Parameters
-    ----------
-    error : BaseException
-    file : str
-        As tracebacks have it.
     """
     said = str(error).rstrip(".")
     if said.startswith("must ") and isinstance(error, (TypeError, ValueError)):
@@ -195,10 +171,12 @@ def describe_failure(error: BaseException, file: str) -> str:
     return f"must not raise (got {kind}{where}{': ' + said if said else ''})"
 
 
-def _take_two(given: Any, wanted: str) -> tuple[Any, Any]:
-    """Return the two results of a function, or raise the broken rule."""
-    if not isinstance(given, tuple) or len(given) != 2:
-        raise TypeError(f"must return two results, {wanted} (got {type(given).__name__})")
+def _hand_out(seen: Measurement) -> Measurement:
+    """Return copies, so that no view leads to the bed's own arrays; read-only but the controller's rows."""
+    rows: Any = seen[:-1]  # a method of unknown code is asked about one run at a time
+    given = Measurement(*(array.copy() for array in rows))
+    for array in given[:-1]:
+        array.flags.writeable = array is given.own
     return given
 
 

@@ -23,7 +23,7 @@ from .drive import Drive, DriveParameters, make_drive
 
 __all__ = [
     "Cells", "DeviceInfo", "Mode", "Orders", "OwnControl", "OwnMethod", "check_array", "check_modes",
-    "quantity", "show_cells",
+    "quantity", "show_cells", "take_results",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -190,7 +190,8 @@ class OwnControl:
 
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Let the method order, and work out what it leaves open; see `Controller`."""
-        memory, orders = self.parameters.command(memory, show_cells(seen), self.device)
+        given = self.parameters.command(memory, show_cells(seen), self.device)
+        memory, orders = take_results(given, 2, "memory and orders")
         height, opening, mode, rows = _check_orders(orders, seen)
         actuator = self.device.cell.actuator
         target = np.clip(seen.target if height is None else height, 0.0, actuator.stroke)
@@ -208,18 +209,18 @@ class OwnControl:
 
 
 def show_cells(seen: Measurement) -> Cells:
-    """Return what is measured of cells as an own method sees it: nothing of it can be changed.
+    """Return what is measured of cells as an own method sees it: of the copies in `guarded`, read-only."""
+    basis, rows = seen.quadratic_basis, seen.own[:]
+    rows.flags.writeable = False
+    return Cells(basis[1], basis[2], seen.height, seen.force, seen.target, seen.mode, rows, seen.cells)
 
-    Parameters
-    ----------
-    seen : Measurement
-    """
-    basis = seen.quadratic_basis
-    given = basis[1], basis[2], seen.height, seen.force, seen.target, seen.mode, seen.own, seen.cells
-    shown: list[Any] = [array[:] for array in given]
-    for array in shown:
-        array.flags.writeable = False
-    return Cells(*shown)
+
+def take_results(given: Any, count: int, wanted: str) -> Any:
+    """Return the results of a function, a tuple of `count`, or raise the broken rule."""
+    if not isinstance(given, tuple) or len(given) != count:
+        got = f"{len(given)} results" if isinstance(given, tuple) else type(given).__name__
+        raise TypeError(f"must return {('two', 'three')[count - 2]} results, {wanted} (got {got})")
+    return given
 
 
 def _check_orders(orders: Any, seen: Measurement) -> tuple[Any, Any, Any, Any]:
@@ -239,23 +240,7 @@ def _check_orders(orders: Any, seen: Measurement) -> tuple[Any, Any, Any, Any]:
 
 
 def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fiu") -> Any:
-    """Return values as an array; None stays None.
-
-    Parameters
-    ----------
-    values : array_like or None
-    name : str
-        For messages.
-    shape : tuple of int
-        That they must have.
-    kinds : str
-        Kinds of numpy's types that they may have; floating-point numbers become those of 64 bits.
-
-    Raises
-    ------
-    ValueError, TypeError
-        Its text is the broken rule.
-    """
+    """Return values as an array of a shape and kinds of numbers, or raise the rule; None stays None."""
     if values is None:
         return None
     array = np.asarray(values)

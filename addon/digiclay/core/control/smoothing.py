@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 ORDER = 4
 #: How long the diffusion of strength 1 takes to spread over the disc's radius, ``D = r² / T``, s.
 SPREADING = 1.0
-#: How far the neighbors of a cell are at most, in pitches of the bed: 1.12 where rows are shifted.
+#: How far the neighbors of a cell are at most, in pitches or distances of rows: 1.12 where rows are shifted.
 MARGIN = 1.5
 #: Least radius of an order, m, and the farthest number in one, m.
 SMALLEST, FARTHEST = 1e-6, 1e3
@@ -154,7 +154,7 @@ def order_periods(
     """
     # As quick as a display is, and never quicker than the control period allows.
     known = DriveParameters(settling_time=max(DriveParameters().settling_time, 2.0 * period))
-    drive, margin = make_drive(known, cell, period), MARGIN * grid.layout.pitch
+    drive, margin = make_drive(known, cell, period), MARGIN * max(grid.layout.pitch, grid.layout.row_spacing)
     for x, y, radius, strength in orders.tolist():
         if radius == 0.0:
             yield method
@@ -172,8 +172,8 @@ def find_fault(orders: Floats, periods: int) -> str:
     orders : ndarray (t, 4)
     periods : int
     """
-    if orders.shape != (periods, ORDER):
-        return f"an array of the shape {orders.shape}"
+    if orders.shape != (periods, ORDER) or orders.dtype != np.float64:
+        return f"an array of the shape {orders.shape} of {orders.dtype}"
     radius, strength = orders[:, 2], orders[:, 3]
     good = (np.abs(orders) <= FARTHEST).all(axis=1) & ((radius == 0.0) | (radius >= SMALLEST))
     good &= (strength >= 0.0) & (strength <= 1.0)

@@ -8,12 +8,17 @@ from numpy.typing import ArrayLike, NDArray
 from .finger_path import Rows, find_contact_rows
 from .signal import compute_mean, compute_weights, measure_overshoot, measure_settling_time
 
-__all__ = ["BAND", "compute_contact_loss_share", "compute_rfd", "find_first_touch", "measure_touchdown"]
+__all__ = [
+    "BAND", "compute_contact_loss_share", "compute_rfd", "find_contact_ends", "find_first_touch",
+    "measure_touchdown",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
 #: Settled is a force this near to its set point, as a share of it.
 BAND = 0.1
+#: Ends of contact no farther apart are bounces of one parting, s: Method I's loss time.
+BOUNCE = 0.05
 
 
 def compute_rfd(
@@ -69,6 +74,13 @@ def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float
         return None
     first, after = int(np.argmax(touching)), len(touching) - int(np.argmax(touching[::-1]))
     return compute_mean(1.0 - touching[first:after], compute_weights(time)[first:after])
+
+
+def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
+    """Return when contact ends, s, shape (ends,), bounces counted once, from times, s, and forces (t,), N."""
+    touching = find_contact_rows(total_force)
+    ends: Floats = np.asarray(time, dtype=np.float64)[1:][touching[:-1] & ~touching[1:]]
+    return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
 
 
 def find_first_touch(total_force: ArrayLike) -> slice:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Constants
-from ..base.quantity import Parameters, quantity
+from ..base.quantity import Parameters, quantity, refuse_overrides
 
 __all__ = ["Contact", "ExponentialLaw"]
 
@@ -32,6 +33,11 @@ class ExponentialLaw:
     exponent: float
     offset: float
     share: float
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        rule = "the closed form of the step knows the exponential alone"
+        refuse_overrides(cls, ExponentialLaw, ("tension", "_numbers"), rule)
 
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force T, N, before the share f_d.

@@ -12,13 +12,14 @@ from dataclasses import fields, make_dataclass
 from functools import lru_cache
 from typing import Any
 
+from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
 __all__ = ["LAWS", "law_parameters", "select_law"]
 
 #: By section: a law's name, the module within the core, and the class of its parameters there. The first is
 #: the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact law is a
-#: `contact.ExponentialLaw`.
+#: `contact.ExponentialLaw`. Scene files have the keys of the selected law alone.
 LAWS: dict[str, dict[str, tuple[str, str]]] = {
     "valve": {
         "orifice": ("model.valve", "Valve"),
@@ -26,6 +27,11 @@ LAWS: dict[str, dict[str, tuple[str, str]]] = {
     "contact": {
         "exponential": ("model.contact", "Contact"),
     },
+}
+#: Base of a section's laws, beside `Parameters`, and the attributes a law has.
+NEEDED: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
+    "valve": (("base.quantity", "Parameters"), ("flow_law",)),
+    "contact": (("model.contact", "ExponentialLaw"), ("stiffness", "exponent", "offset", "share")),
 }
 
 
@@ -35,24 +41,27 @@ def law_parameters(section: str) -> type[Parameters]:
 
 
 def select_law(section: str, own: Any) -> Any:
-    """Return the parameters of the law that a section selects.
-
-    Parameters
-    ----------
-    section : str
-    own : Parameters
-        Of the class `law_parameters`.
-    """
-    names = tuple(LAWS[section])
-    if len(names) == 1:
+    """Return the parameters of the law that a section selects."""
+    law = getattr(own, "law", "")
+    if not law:  # the only one, or given without the others
         return own
-    kind = _load(section, own.law)
+    kind = _load(section, law)
     return kind(**{field.name: getattr(own, field.name) for field in fields(kind)})
 
 
 def _load(section: str, law: str) -> Any:
-    """Import the class of a law's parameters."""
-    module, name = LAWS[section][law]
+    """Import the class of a law's parameters, and refuse one that the steps cannot compute with."""
+    kind, (base, needed) = _import(*LAWS[section][law]), NEEDED[section]
+    missing = [one.__name__ for one in (_import(*base), Parameters) if not issubclass(kind, one)]
+    missing += [one for one in needed if not hasattr(kind, one)]
+    if missing:
+        rule = f"must derive from Parameters and {base[1]}, and have {', '.join(needed)}"
+        raise ParameterError(section, law, rule, f"{kind.__name__} without {', '.join(missing)}")
+    return kind
+
+
+def _import(module: str, name: str) -> Any:
+    """Import a class of the core."""
     return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
@@ -77,10 +86,16 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
         if self.law != names[0]:
             select_law(section, self)
 
+    def list_idle(self: Any) -> frozenset[str]:
+        used = {"law"} if self.law != names[0] else set()
+        used |= {field.name for field in fields(_load(section, self.law))}
+        return frozenset(field.name for field in fields(self)) - used
+
     def reduce(self: Any) -> Any:
         return _restore, (section, {field.name: getattr(self, field.name) for field in fields(self)})
 
-    namespace = {"check": check, "__reduce__": reduce, "__doc__": first.__doc__, "__module__": __name__}
+    namespace = {"check": check, "list_idle": list_idle, "__reduce__": reduce, "__doc__": first.__doc__}
+    namespace["__module__"] = __name__
     parts = [(name, kind, field) for name, (kind, field) in declared.items()]
     return make_dataclass(first.__name__, parts, bases=(first,), frozen=True, namespace=namespace)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "make_grid"]
+__all__ = [
+    "ARRANGEMENTS", "ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "find_neighbors",
+    "list_steps", "make_grid",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -21,17 +25,43 @@ Bounds = tuple[int, int, int, int]
 #: Center x, y and radius, m.
 Disc = tuple[float, float, float]
 
+
+class Arrangement(NamedTuple):
+    """Distance of rows and shift of odd ones along x, in pitches; meaning; share of the contact law.
+
+    Where rows are not shifted a pin has four neighbors beside it, where they are by half a pitch six; what
+    needs neighbors refuses all other beds. `share` is None where the default of the law holds.
+    """
+
+    spacing: float
+    shift: float
+    meaning: str
+    share: float | None = None
+
+
+#: Arrangements of the cells by name: the only place that knows them.
+ARRANGEMENTS = {
+    "aligned": Arrangement(1.0, 0.0, "A square grid"),
+    "staggered": Arrangement(1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"),
+    "hexagonal": Arrangement(
+        math.sqrt(0.75), 0.5, "Every other row shifted, six neighbors at the same distance", share=0.29
+    ),
+}
+#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid with those at the corners, in
+#: shifted ones of rows that stand back and of rows that are shifted forward along x.
+SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
+FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
+#: Those of even and of odd rows, by twice the shift of odd rows, in pitches.
+STEPS = {0: (SQUARE, SQUARE), 1: (BACK, FORWARD), -1: (FORWARD, BACK)}
+
 #: Relative slack, so that cells exactly on a limit count the same on every side of the center.
 ON_THE_SIDE = 1e-9
 
 
 @dataclass(frozen=True)
 class Layout(Parameters):
-    """Rows and columns of cells, centered on the origin of the bed.
-
-    *aligned*: a square grid. *staggered*: every other row shifted by half a pitch, rows
-    one pitch apart. *hexagonal*: shifted likewise, rows ``pitch * sqrt(3) / 2`` apart.
-    """
+    """Rows and columns of cells, centered on the origin of the bed, in one of the `ARRANGEMENTS`."""
 
     rows: int = quantity(
         25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000
@@ -46,7 +76,7 @@ class Layout(Parameters):
         "aligned",
         "offset of neighboring rows",
         source="P",
-        choices=("aligned", "staggered", "hexagonal"),
+        choices=tuple(ARRANGEMENTS),
     )
 
     def check(self) -> None:
@@ -58,12 +88,23 @@ class Layout(Parameters):
     @property
     def row_spacing(self) -> float:
         """Distance between rows, m."""
-        return self.pitch * (math.sqrt(0.75) if self.arrangement == "hexagonal" else 1.0)
+        return self.pitch * ARRANGEMENTS[self.arrangement].spacing
 
     @property
     def shift(self) -> float:
         """How far odd rows are shifted along x, m."""
-        return 0.0 if self.arrangement == "aligned" else self.pitch / 2
+        return self.pitch * ARRANGEMENTS[self.arrangement].shift
+
+    @property
+    def shifted(self) -> bool:
+        """Whether a cell has six neighbors, not four; ParameterError in a bed without a lattice."""
+        steps = list_steps(ARRANGEMENTS[self.arrangement].shift)
+        return steps.shape[1] == len(BACK)
+
+    def find_neighbors(self, *, corners: bool) -> Cells:
+        """Return the neighbors of all cells; see the function of this name."""
+        shift = ARRANGEMENTS[self.arrangement].shift
+        return find_neighbors(self.rows, self.columns, shift, corners=corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +138,7 @@ class Grid:
         return np.column_stack([self.x, self.y])
 
     def bounds(self, x: float, y: float, radius: float) -> Bounds:
-        """Return the rows and columns that hold all cells within `radius` of a point.
-
-        Parameters
-        ----------
-        x, y : float
-            Center, m.
-        radius : float
-            m; cells exactly on a side are inside. Negative: no cells.
-
-        Returns
-        -------
-        Bounds
-            First row, last row, first column, last column; a last below a first means none.
-        """
+        """Return rows and columns of all cells within a radius of a point, m; a last below a first: none."""
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         return (
@@ -130,27 +158,13 @@ class Grid:
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too.
-
-        Parameters
-        ----------
-        x, y : float
-            Its center, m.
-        radius : float
-            m.
-        """
+        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
         cells = self.within(self.bounds(x, y, radius))
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + ON_THE_SIDE)]
 
     def at(self, x: Floats, y: Floats) -> Cells:
-        """Return the cells nearest to some places, m, shape (k,).
-
-        Parameters
-        ----------
-        x, y : ndarray (k,)
-            m.
-        """
+        """Return the cells nearest to some places, m, shape (k,)."""
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
         column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
@@ -164,13 +178,7 @@ class Grid:
 
 
 def make_grid(layout: Layout) -> Grid:
-    """Lay out the cells of a bed, centered on the origin.
-
-    Returns
-    -------
-    Grid
-        With arrays of ``rows * columns`` positions.
-    """
+    """Lay out the cells of a bed, centered on the origin."""
     column = np.arange(layout.columns) * layout.pitch
     row = np.arange(layout.rows)
     width = (layout.columns - 1) * layout.pitch + (layout.shift if layout.rows > 1 else 0.0)
@@ -179,14 +187,29 @@ def make_grid(layout: Layout) -> Grid:
     return Grid(layout, x.ravel(), y.ravel())
 
 
-def enclose_discs(one: Disc, other: Disc) -> Disc:
-    """Return the least disc that holds two.
+def list_steps(shift: float) -> Cells:
+    """Return the steps to the neighbors of even and odd rows, (2, 8 or 6, 2), by their shift in pitches."""
+    if abs(2.0 * shift - round(2.0 * shift)) > 0.02 or round(2.0 * shift) not in STEPS:
+        rule = "must have its rows in line or shifted by half a pitch, where neighbors are needed"
+        raise ParameterError("layout", "arrangement", rule, f"a shift of {shift:.3g} pitches")
+    return np.array(STEPS[round(2.0 * shift)], np.intp)
 
-    Parameters
-    ----------
-    one, other : (float, float, float)
-        x, y and radius, m.
+
+def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> Cells:
+    """Return each cell's neighbors, (n, 6), in a square grid (n, 4) or with corners (n, 8); -1: none.
+
+    They are counter-clockwise; `shift` is that of the odd rows, in pitches.
     """
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    steps = list_steps(shift)
+    steps = (steps if corners or steps.shape[1] != len(SQUARE) else steps[:, ::2])[row % 2]
+    beside, along = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
+    on_bed = (beside >= 0) & (beside < rows) & (along >= 0) & (along < columns)
+    return np.where(on_bed, beside * columns + along, -1).astype(np.intp)
+
+
+def enclose_discs(one: Disc, other: Disc) -> Disc:
+    """Return the least disc, x, y and radius in m, that holds two."""
     (x, y, radius), (other_x, other_y, other_radius) = one, other
     apart = math.hypot(other_x - x, other_y - y)
     if apart + other_radius <= radius:

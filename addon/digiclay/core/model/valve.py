@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.quantity import Parameters, quantity
+from ..base.quantity import Parameters, quantity, refuse_overrides
 from .fluid import Fluid
 
 __all__ = ["Orifice", "Valve", "make_orifice"]
@@ -69,6 +69,11 @@ class Orifice:
     laminar: float
     turbulent: float
     power: int
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        rule = "steppers and conduits compute the flow from laminar_lift"
+        refuse_overrides(cls, Orifice, ("knee", "laminar_conductance", "conductance", "flow"), rule)
 
     @property
     def knee(self) -> float:

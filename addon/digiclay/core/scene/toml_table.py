@@ -11,6 +11,7 @@ from ..base.part_table import ReadParts, read_part, refuse_unknown, shorten, sho
 from ..base.quantity import Parameters, list_quantities
 from ..base.toml_text import format_value
 from ..control.methods import find_method
+from ..model.layout import ARRANGEMENTS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
@@ -33,8 +34,6 @@ FINGERS = "finger"
 #: The sections of a finger that are parts; the other one is its path.
 FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
 TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
-#: Share of the flat-plate law a cell of a hexagonal bed carries: its cells stand closer.
-HEXAGONAL_SHARE = 0.29
 
 
 def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Scene:
@@ -84,8 +83,9 @@ def resolve(table: Table, name: str = "", known: ReadParts | None = None) -> Sce
         if section == "blister":
             usual |= find_method(method).blister or {}
         parts[section] = known.read(section, import_parameters(section, method), usual, own)
-    if parts["layout"].arrangement == "hexagonal":
-        defaults.setdefault("contact", {})["share"] = HEXAGONAL_SHARE
+    share = ARRANGEMENTS[parts["layout"].arrangement].share
+    if share is not None:
+        defaults.setdefault("contact", {})["share"] = share
     rest_height = parts["actuator"].rest_height
     fingers = tuple(_read_finger(owner, own, defaults, rest_height, known) for owner, own in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
@@ -268,9 +268,10 @@ def write_part(section: str, part: Parameters | Path | None, method: str = "") -
     yield f"\n[{section}]"
     if method:
         yield f"method = {format_value(method)}"
+    idle = part.list_idle()
     for field in dataclasses.fields(part):
         known, value = field.metadata["quantity"], getattr(part, field.name)
-        if not known.later or value != field.default:
+        if not (known.later or field.name in idle) or value != field.default:
             note = f"{known.unit}: {known.doc}" if known.unit else known.doc
             yield f"{field.name} = {format_value(value)}  # {note}"
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import OutputError
+from ..base.modes import Mode
 from ..base.npz import BROKEN_ZIP, Head, read_array, read_heads
 from ..base.run_folder import MARK
 from ..base.whole_files import read_json
@@ -24,12 +25,16 @@ __all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "has_files", "is_whol
 
 #: The file of the arrays.
 HISTORY = "history.npz"
+#: No number of a run is as large: sums of squares are finite.
+LARGEST = 1e100
 #: Shape of each array of a history, t rows of n cells.
 SHAPES: dict[str, tuple[str | int, ...]] = {
     "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
     "fingertip": ("t", 7), "total_force": ("t",), "position": ("n", 2),
     "beyond_a_finger": ("t",),
 }  # fmt: skip
+#: Types of an array that does not hold numbers: their kinds, and what they are called.
+KINDS = {"mode": ("i", "whole numbers"), "beyond_a_finger": ("b", "truth values")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,19 +46,7 @@ class Run:
 
 
 def read_run(folder: Path, *names: str) -> Run:
-    """Read a run, and of its history the arrays named.
-
-    Parameters
-    ----------
-    folder : Path
-    names : str
-        Keys of `SHAPES`.
-
-    Raises
-    ------
-    OutputError
-        When there is no run, or its files do not belong together.
-    """
+    """Read a run, and of its history the arrays named, keys of `SHAPES`; OutputError if unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
@@ -64,9 +57,16 @@ def read_run(folder: Path, *names: str) -> Run:
         with zipfile.ZipFile(path) as archive:
             held = read_heads(archive, ("time", *names))
             _refuse(path, scene, held)
-            return Run(scene, {name: read_array(archive, name) for name in held})
+            history = {name: read_array(archive, name) for name in held}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
+    for name, values in history.items():
+        low, high = (0, len(Mode) - 1) if name == "mode" else (-LARGEST, LARGEST)
+        if not (values.min() >= low and values.max() <= high):
+            raise OutputError(f"{path}: {name} must hold numbers from {low:g} to {high:g}, as a run leaves.")
+    if (np.diff(history["time"]) <= 0.0).any():
+        raise OutputError(f"{path}: time must increase from row to row.")
+    return Run(scene, history)
 
 
 def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
@@ -81,8 +81,9 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
         shape = tuple(known[size] if isinstance(size, str) else size for size in SHAPES[name])
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
-        if head.kind.kind not in "bif" or head.kind.itemsize > 8:
-            raise OutputError(f"{path}: {name} must hold numbers of at most 8 bytes (got {head.kind}).")
+        kinds, called = KINDS.get(name, ("if", "numbers"))
+        if head.kind.kind not in kinds or head.kind.itemsize > 8:
+            raise OutputError(f"{path}: {name} must hold {called} of at most 8 bytes (got {head.kind}).")
     size, free = sum(head.size for head in held.values()), measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
@@ -90,14 +91,7 @@ def _refuse(path: Path, scene: Scene, held: Mapping[str, Head]) -> None:
 
 
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
-    """Return whether a run's folder has all that was written into it: copies break off half way.
-
-    Parameters
-    ----------
-    folder : Path
-    sizes : mapping of str to int
-        Bytes of each file, as they were written.
-    """
+    """Return whether a run's folder has all files in their sizes, bytes: copies break off half way."""
     try:
         return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
     except OSError:
@@ -105,30 +99,14 @@ def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
 
 
 def is_whole(folder: Path, scene: Scene) -> bool:
-    """Return whether a run's folder has what belongs into each, where no sizes were noted.
-
-    Parameters
-    ----------
-    folder : Path
-    scene : Scene
-        Of the run.
-    """
+    """Return whether a run's folder has what belongs into each, where no sizes were noted."""
     whole = read_json(folder / MARK) is not None
     # The names of an archive's parts stand at its end.
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
 def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
-    """Return the row nearest to a time within the session.
-
-    Parameters
-    ----------
-    history : mapping
-    time : float
-        s.
-    called : str
-        What a message calls the time.
-    """
+    """Return the row nearest to a time within the session, s, which messages call `called`."""
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
         raise OutputError(

@@ -58,8 +58,6 @@ class Result:
         Time the simulation took, s; neither building nor writing is in it.
     metrics : dict
         What ``metrics.json`` holds; SI units.
-    loss_times : ndarray (losses,), optional
-        When the controller lost the finger, s; None for one that does not count, and in a batch.
     """
 
     scene: Scene
@@ -67,7 +65,6 @@ class Result:
     periods: int
     run_time: float
     metrics: dict[str, Any]
-    loss_times: NDArray[np.float64] | None = None
 
     @property
     def figures(self) -> dict[str, float | None]:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from ..base.errors import OutputError
 from ..engine.simulation import begin, periods
@@ -52,20 +49,17 @@ def run(
     check_memory(scene, system.rows)
     start = begin(system)
     recording = RunRecording(scene.recorder, system.rows, start, scene.periods) if scene.recorder else None
-    lost: list[float] = []
     started = time.perf_counter()
     for state in periods(system, scene.trajectories(), start, scene.periods):
         if recording:
             recording.observe(state)
-        lost.extend([state.period * system.period] * ((count_losses(state.memory) or 0) - len(lost)))
         if progress:
             progress(state.period, scene.periods)
         if stopped and stopped():
             break
     took, losses = time.perf_counter() - started, count_losses(state.memory)
     rows = recording.finish(state.period) if recording else {}
-    result = evaluate(scene, system, rows, Ended(state.period, took, losses), versions or {})
-    return replace(result, loss_times=None if losses is None else np.array(lost))
+    return evaluate(scene, system, rows, Ended(state.period, took, losses), versions or {})
 
 
 def save(result: Result, folder: Path) -> None:

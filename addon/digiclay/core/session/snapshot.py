@@ -49,14 +49,7 @@ class Snapshot:
 
 
 def dump(system: System, state: State) -> bytes:
-    """Return a state as bytes, which do not change when the session goes on.
-
-    Parameters
-    ----------
-    system : System
-        The state's.
-    state : State
-    """
+    """Return a state as bytes, which do not change when the session goes on."""
     held, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
@@ -95,21 +88,7 @@ def dump(system: System, state: State) -> bytes:
 
 
 def load(system: System, data: bytes) -> State:
-    """Return the state that bytes hold; a session goes on from it bit for bit.
-
-    Parameters
-    ----------
-    system : System
-        With the cells, parts, control period and method of the state's.
-    data : bytes
-        From `dump`.
-
-    Raises
-    ------
-    StateError
-        When the bytes are no state, are damaged, or are a state of another bed, other parts,
-        another control period or another method.
-    """
+    """Return the state that bytes hold, bit for bit; StateError when they are damaged or of another bed."""
     kept = _read(data)
     header, rows = kept.header, system.rows
     here = [rows.physics, rows.queue, rows.control, rows.sensors]
@@ -150,18 +129,6 @@ def transfer_heights(system: System, data: bytes) -> State:
 
     Every pin stands still at the height it had, as far as the stroke allows; pulp, valves and
     the controller begin anew.
-
-    Parameters
-    ----------
-    system : System
-        With the cells of the state's.
-    data : bytes
-        From `dump`.
-
-    Raises
-    ------
-    StateError
-        When the bytes are no state, are damaged, or are a state of another number of cells.
     """
     kept = _read(data)
     _check_same("number of cells", kept.header["cells"], system.grid.count)
@@ -196,7 +163,7 @@ def _read(data: bytes) -> Snapshot:
         header = json.loads(data[first : first + length])
         cells, held = _read_count(header["cells"]), header["gathered"]
         if data.startswith(FIRST):
-            held["fingers"] = [{"reach": held.pop("reach")}]
+            held = header["gathered"] = {**held, "fingers": [{"reach": held["reach"]}]}
         count, taken = Rows(*map(_read_count, header["rows"])).count, _read_count(held["cells"])
         shapes: list[tuple[str, tuple[int, ...]]] = [
             ("<f8", (count, cells)), ("i1", (cells,)), ("<f8", (cells,)),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError, ParameterError
 from ..base.npz import BROKEN_ZIP, read_array, read_heads
 from ..base.toml_text import parse_tables
-from ..control.smoothing import find_fault
+from ..control.smoothing import FARTHEST, find_fault
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -77,12 +77,14 @@ class Take:
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
-        if self.poses.shape[1:] != (fingers, 7) or len(self.poses) < 2:
+        kind, shape = self.poses.dtype, self.poses.shape
+        if shape[1:] != (fingers, 7) or len(self.poses) < 2 or kind != np.float64:
             rule = f"must hold one control period at least, of {fingers} x 7 numbers, a pose a finger"
-            raise ParameterError("Take", "poses", rule, f"an array of the shape {self.poses.shape}")
-        if not np.isfinite(self.poses).all():
-            row = int(np.argwhere(~np.isfinite(self.poses))[0][0])
-            raise ParameterError("Take", "poses", "must be finite numbers", f"row {row} is not")
+            raise ParameterError("Take", "poses", rule, f"an array of the shape {shape} of {kind}")
+        sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[..., None]
+        if not sound.all():
+            rule = "must be finite numbers, quaternions not 0"
+            raise ParameterError("Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not")
         fault = "" if self.smoothing is None else find_fault(self.smoothing, self.periods)
         if fault:
             rule = f"must hold x, y, a radius and a strength from 0 to 1 for each of {self.periods} periods"
@@ -100,57 +102,20 @@ class Take:
 
 
 def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
-    """Simulate a take once more.
-
-    Parameters
-    ----------
-    take : Take
-    scene : Scene, optional
-        Another way to integrate it, such as `refine`; the take's own when left out.
-
-    Yields
-    ------
-    State
-        After each period; valid until the next one is asked for.
-    """
+    """Simulate a take once more, or as another scene integrates it; a state is valid until the next one."""
     system = assemble(scene or take.scene)
     yield from simulate_path(system, snapshot.load(system, take.start), take.poses, take.smoothing)
 
 
 def refine(scene: Scene, parts: int) -> Scene:
-    """Return a scene whose physics steps are cut into `parts`; control is sampled as before.
-
-    Parameters
-    ----------
-    scene : Scene
-    parts : int
-        From 1 to 64.
-
-    Raises
-    ------
-    ParameterError
-        When `parts` is not from 1 to 64.
-    """
+    """Return a scene whose physics steps are cut into 1 to 64 parts; control is sampled as before."""
     if not 1 <= parts <= MOST_PARTS:
         raise ParameterError("Take", "parts", f"must be from 1 to {MOST_PARTS}", str(parts))
     return replace(scene, simulation=scene.simulation.refined(parts))
 
 
 def to_scene(take: Take, name: str) -> Scene:
-    """Return a take as a scene that `digiclay run` simulates.
-
-    Parameters
-    ----------
-    take : Take
-    name : str
-        Of the scene.
-
-    Raises
-    ------
-    OutputError
-        When the take does not begin at rest: a scene file has no other beginning; or when something is
-        smoothed in it: a scene file has a finger alone.
-    """
+    """Return a take from rest as a scene that `digiclay run` simulates; OutputError of any other take."""
     if take.smoothing is not None:
         raise OutputError(
             f"The take {name!r} has strokes that smooth pins, of the brush Smooth or at a crossing, and a "
@@ -215,13 +180,7 @@ def to_bytes(take: Take) -> bytes:
 
 
 def from_bytes(data: bytes) -> Take:
-    """Read what `to_bytes` wrote.
-
-    Raises
-    ------
-    OutputError
-        When it is damaged.
-    """
+    """Read what `to_bytes` wrote; OutputError when it is damaged."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             there = archive.namelist()
@@ -235,9 +194,9 @@ def from_bytes(data: bytes) -> Take:
         scene, start, poses, end = (parts[name] for name in PARTS)
         if "version" not in parts:
             poses = poses[:, None]  # the first version held one finger
-        elif not PLAIN <= int(parts["version"]) <= VERSION:
+        elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
         return Take(resolved, start.tobytes(), poses, end.tobytes(), parts.get(SMOOTHING))
-    except (OSError, EOFError, KeyError, ValueError, TypeError, RecursionError, *BROKEN_ZIP) as error:
+    except (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, *BROKEN_ZIP) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None

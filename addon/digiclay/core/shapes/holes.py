@@ -16,10 +16,6 @@ Cells = NDArray[np.intp]
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05
-#: Steps (rows, columns) to the neighbors: of an aligned bed; of shifted ones in even rows, in odd ones.
-SQUARE = ((0, 1), (1, 0), (0, -1), (-1, 0))
-EVEN = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
-ODD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 #: How often the heights over holes are evened out, after they have been reached from all sides.
 ROUNDS = 300
 
@@ -38,9 +34,9 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     missing : ndarray (n,) of bool
         Pins whose value is not that of the surface.
     """
-    beside = _neighbors(grid)
+    beside = grid.layout.find_neighbors(corners=False)
     number = np.flatnonzero(missing)
-    position = np.full(grid.count + 1, -1)  # the last one stands for what is beyond the rim
+    position = np.full(grid.count + 1, -1)  # the last one, at -1, stands for what is beyond the rim
     position[number] = np.arange(number.size)
     joined = position[beside[number]]
     start = np.repeat(np.arange(number.size), joined.shape[1])
@@ -48,21 +44,11 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
     group = label_components(number.size, edges)
     size = np.bincount(group, minlength=number.size)
     at_rim = np.zeros(number.size, np.bool_)
-    at_rim[group[(beside[number] == grid.count).any(axis=1)]] = True
+    at_rim[group[(beside[number] < 0).any(axis=1)]] = True
     small = (size <= SMALL * (grid.count - number.size)) & ~at_rim
     hole = np.zeros(grid.count, np.bool_)
     hole[number[small[group]]] = True
     return _evened(value, hole, beside), hole
-
-
-def _neighbors(grid: Grid) -> Cells:
-    """Return the neighbors of all pins, (n, 4 or 6); n stands for what is beyond the rim."""
-    plan = grid.layout
-    row, column = np.divmod(np.arange(grid.count), plan.columns)
-    steps = np.array((EVEN, ODD) if plan.shift else (SQUARE, SQUARE))[row % 2]
-    rows, columns = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
-    on_bed = (rows >= 0) & (rows < plan.rows) & (columns >= 0) & (columns < plan.columns)
-    return np.where(on_bed, rows * plan.columns + columns, grid.count).astype(np.intp)
 
 
 def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:

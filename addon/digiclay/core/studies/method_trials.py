@@ -13,6 +13,7 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.quantity import find_nearest_name
 from ..metrics.finger_path import sum_cells
+from ..metrics.force import find_contact_ends
 from ..metrics.perception import PERCEPTION, perceive
 from ..metrics.summary import METRICS, compute_metrics
 from ..scene.assembly import assemble
@@ -61,7 +62,7 @@ OUTCOMES: dict[str, tuple[str, str]] = {
     "relief_largest": ("m", "largest deviation of the formed relief from the nominal one"),
     "max_total_force": METRICS["max_total_force"],
     "contact_loss_share": METRICS["contact_loss_share"],
-    "losses": ("1", "how often the fingertip was lost though it rose no faster than a pin can"),
+    "losses": ("1", "how often contact ended though the fingertip rose no faster than a pin can"),
     "speed_limit": ("m/s", "largest speed that is followed"),
     "period_cost": ("s", "processor time of a control period, device included"),
 }
@@ -181,7 +182,7 @@ def measure_trial(
     if done.incomplete:
         return None
     found = dict(done.figures)
-    found["losses"] = float(len(find_unintended_losses(done))) if found["losses"] is not None else None
+    found["losses"] = float(len(find_unintended_losses(done)))
     if phase is not None:
         judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)
         own = compute_metrics(part, scene.set_point)
@@ -226,8 +227,8 @@ def find_free_speed(scene: Scene) -> float:
 
 
 def find_unintended_losses(done: Result) -> list[float]:
-    """Return when the fingertip was lost though it rose no faster than a pin can, s."""
+    """Return when contact ended, s, though the fingertip rose no faster than a pin can just then."""
     limit, moments = find_free_speed(done.scene), done.history["time"]
     rise = np.gradient(done.history["fingertip"][:, 2], moments)
-    lost = done.loss_times if done.loss_times is not None else np.empty(0)
-    return [float(t) for t in lost if rise[(moments > t - 0.2) & (moments <= t)].max() <= limit]
+    lost = find_contact_ends(moments, done.history["total_force"])
+    return [float(t) for t in lost if rise[(moments > t - 0.2) & (moments <= t + 0.1)].max() <= limit]

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..metrics.finger_path import measure_lag, sum_cells
-from ..metrics.force import compute_rfd
+from ..metrics.force import compute_rfd, find_contact_ends
 from ..model.set_point import find_set_point
 from ..model.trajectory import Path, Waypoint
 from ..scene.recorder import Recorder
@@ -49,7 +49,7 @@ class Follows:
     speed : float
         m/s.
     losses : int
-        How often it was lost.
+        How often contact ended in it or in the 0.3 s after, or was absent from its start on.
     loss_share : float
         Share of the time without contact.
     lag : float
@@ -196,13 +196,14 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
         That it was run with, m/s.
     """
     part = select_rows(done.history, start, end)
-    sums, total, lost = sum_cells(part), part["total_force"], done.loss_times
+    sums, total = sum_cells(part), part["total_force"]
+    ends = find_contact_ends(done.history["time"], done.history["total_force"])
     behind, wanted = (
         measure_lag(sums, part["fingertip"]),
         find_set_point(done.scene.set_point, sums.following),
     )
     deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
-    losses = 0 if lost is None else int(np.sum((lost >= start) & (lost <= end + REST)))
+    losses = int(np.sum((ends > start) & (ends <= end + REST)) + (total[0] <= 0.0))  # or lost before
     return Follows(
         speed,
         losses,

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model.layout import list_steps
 from .formed import Formed
 from .skin_mesh import BASE_THICKNESS, find_base_level
 
@@ -56,7 +57,8 @@ class Parts:
 
 def make_parts(formed: Formed) -> Parts:
     """Divide a bed."""
-    corner, loops = _squares(formed) if not formed.shift else _hexagons(formed)
+    sides = list_steps(formed.shift / formed.pitch).shape[1]
+    corner, loops = _hexagons(formed) if sides == 6 else _squares(formed)
     # Corners of one loop that coincide are one corner: the loop of a square has two at each.
     start, end = loops.ravel(), np.roll(loops, -1, axis=1).ravel()
     pin = np.repeat(np.arange(len(loops)), loops.shape[1])
