@@ -178,13 +178,13 @@ def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict
 
 
 def make_feature_solid(feature: Feature) -> Body:
-    """Return the body between the surface as it is and as it was before, closed.
+    """Return the body between the surface as it is and as it was before, closed; it touches no other.
 
     A boss stands on the former surface; a crease is the body that fills it up to there. Where the
     feature ends, and at the edge of the bed, an upright wall closes it: as high as the threshold, because
     an edge that thins out to nothing makes booleans of other programs fail.
     """
-    region = feature.region
+    region = feature.apart
     count = len(region.position)
     now = region.former + (region.off if feature.kind == "boss" else -region.off)
     over, under = np.maximum(now, region.former), np.minimum(now, region.former)

@@ -101,24 +101,18 @@ def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold
     return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
 
 
-def divide(region: Region, nearer: Floats) -> tuple[Region | None, Region | None]:
-    """Return the two parts of a region where a value at its points is above 0, and where it is not.
+def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | None, Region | None]:
+    """Return the parts of a region where a value at its points, (k,), is above `gap`, and below -`gap`.
 
-    Together they are the region; one may have nothing.
-
-    Parameters
-    ----------
-    region : Region
-    nearer : ndarray (k,)
-        The value at its points.
+    Without a gap they are the region together; one may have nothing.
     """
     values = np.column_stack([region.position, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
     nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
     found: list[Region | None] = []
     for side in (nearer, -nearer):
-        some = region.faces[(side > 0.0)[region.faces].any(axis=1)]
-        kept, pieces, _ = _clipped(values, some, side, 0.0)
+        some = region.faces[(side > gap)[region.faces].any(axis=1)]
+        kept, pieces, _ = _clipped(values, some, side, gap)
         found.append(Region(kept[:, :2], kept[:, 2], kept[:, 3], pieces) if len(some) else None)
     return found[0], found[1]
 

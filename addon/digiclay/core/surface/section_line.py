@@ -152,7 +152,8 @@ class Field:
         longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
         fine = space_evenly(path, pitch / 4.0)
-        assert fine is not None
+        if fine is None:  # a line of a pitch that comes back to where it began
+            return line[:1]
         known = self.lattice.at(self.off, fine)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
         beyond = np.flatnonzero(np.isnan(known))
