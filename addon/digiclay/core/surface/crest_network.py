@@ -7,7 +7,7 @@ Where two lines run together for a short way, as in an eight of two circles, bot
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .branches import Branch, End, Network, measure_length, read_network
+from .regions import label_components
 
-__all__ = ["Chain", "find_chains", "reaches_out"]
+__all__ = ["SADDLE", "Chain", "find_chains", "find_stretch", "reaches_out"]
 
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
 #: A free branch is shorter than this many half widths when it is only the flank.
 FLANK = 1.5
+#: Lines are parted where they are lower than this share of the lower one.
+SADDLE = 0.5
 #: Branches go on into each other when the cosine between their ways is above this: 66 degrees.
 STRAIGHT = 0.4
 #: Two lines run together for this many widths at most, and turn into the common way by 75 degrees at most in
@@ -54,7 +57,9 @@ class Chain:
     nodes: frozenset[int]
 
 
-def find_chains(beside: Pins, pins: Pins, position: Floats, half: Floats, pitch: float) -> list[Chain]:
+def find_chains(
+    beside: Pins, pins: Pins, position: Floats, half: Floats, pitch: float, off: Callable[[Floats], Floats]
+) -> list[Chain]:
     """Return the lines of a skeleton.
 
     Parameters
@@ -69,8 +74,11 @@ def find_chains(beside: Pins, pins: Pins, position: Floats, half: Floats, pitch:
         Half the width of the feature at each pin of the skeleton, m.
     pitch : float
         m.
+    off : callable
+        Returns how far the feature is off at places, m.
     """
     network = read_network(beside, pins, position, half)
+    _open_low_loops(network, off)
     _merge(network)
     _open_small_loops(network)
     _prune(network, pitch)
@@ -115,6 +123,34 @@ def _merge(network: Network) -> None:
                         other.points[-end] = network.position[one]
             merged = True
             break
+
+
+def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
+    """Cut a loop where its line is lower than half of what is on both sides: it is not closed there."""
+    for number, branch in list(network.branches.items()):
+        height = off(branch.points)
+        before, after = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
+        low = int(np.argmin(height / np.maximum(np.minimum(before, after), 1e-12)))
+        bank = float(min(before[low], after[low]))
+        if height[low] >= SADDLE * bank or len(network.ends(branch.nodes[0])) < 3:
+            continue
+        others = [b.nodes for k, b in network.branches.items() if k != number]
+        joined = label_components(len(network.position), np.array(others, np.int32).reshape(-1, 2))
+        if joined[branch.nodes[0]] == joined[branch.nodes[1]]:
+            first, last = find_stretch(height < SADDLE * bank, low)
+            del network.branches[number]
+            for node, part in zip(branch.nodes, (branch.points[:first], branch.points[:last:-1]), strict=True):
+                if len(part) > 1:
+                    network.branches[max(network.branches, default=0) + 1] = Branch([node, len(network.position)], part)
+                    network.position.append(part[-1])
+                    network.half.append(0.0)
+
+
+def find_stretch(there: NDArray[np.bool_], at: int) -> tuple[int, int]:
+    """Return the first and the last of those about a place that all have something."""
+    out = np.flatnonzero(~there)
+    before, after = out[out < at], out[out > at]
+    return int(before[-1]) + 1 if len(before) else 0, int(after[0]) - 1 if len(after) else len(there) - 1
 
 
 def _open_small_loops(network: Network) -> None:

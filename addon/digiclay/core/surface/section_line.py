@@ -28,6 +28,9 @@ WIDE = 1.5
 FALLEN = 0.75
 #: A line runs through the middle of its sections at this share of its height.
 MIDDLE = 0.7
+#: A line has a corner where it turns by more than 45 degrees within `LEG` half widths to both sides. From
+#: `CORNER` half widths on, legs as long show where they meet, if the feature is so high there at least.
+CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(45.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
 
@@ -91,7 +94,76 @@ class Field:
                 line = line[::-1] if end == 0 else line
                 if len(line) < 2:
                     return None
-        return line
+        return self._sharpened(line, half, chain.closed)
+
+    def _sharpened(self, line: Floats, half: float, closed: bool) -> Floats:
+        """Return a line with its corners where its straight legs meet, if the feature is as high there."""
+        step = self.lattice.pitch / 2.0
+        fine = space_evenly(line, step)
+        width = max(2, round(CORNER * half / step))
+        if fine is None or len(fine) < 4 * width:
+            return line
+        wide = max(2, round(LEG * half / step))
+        turn = _turns(fine, wide, closed)
+        if closed:  # from a straight place on
+            first = int(np.argmin(turn[:-1]))
+            fine = np.concatenate([fine[first:-1], fine[: first + 1]])
+            turn = np.concatenate([turn[first:-1], turn[: first + 1]])
+        peaks = [i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()]
+        ends = [0, *peaks, len(fine) - 1]
+        pieces, start = [], 0
+        for before, i, after in zip(ends, peaks, ends[2:], strict=False):
+            reach = width + wide
+            legs = [
+                fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
+                fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
+            ]
+            corner = self._meeting(legs[0], legs[1][::-1])
+            if corner is not None and i - width >= start:
+                pieces += [np.concatenate([fine[start : i - width + 1], corner])]
+                fine[i + width - 1], start = corner[0], i + width - 1
+        if not pieces:
+            return line
+        evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
+        return np.concatenate([one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None])
+
+    def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
+        """Return a line led on from its last leg to where it meets one of others, or from its end to the nearest."""
+        step = self.lattice.pitch / 4.0
+        there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
+        fine = space_evenly(line, step)
+        if not there or fine is None:
+            return line
+        near, far = (round(share * half / step) for share in (CORNER, CORNER + LEG))
+        leg = fine[-far - 1 : -near]
+        every = np.concatenate(there)
+        corner = every[[int(np.argmin(np.hypot(*(every - line[-1]).T)))]]
+        if len(leg) > 4:
+            middle, way = _straight(leg)
+            off = (every - middle) @ np.array([-way[1], way[0]])
+            ahead = (every - middle) @ way
+            met = np.flatnonzero((np.abs(off) <= step) & (ahead > 0.0))
+            if len(met):
+                at = met[[int(np.argmin(np.abs(ahead[met] - float((line[-1] - middle) @ way))))]]
+                path = middle + np.linspace(0.0, 1.0, 9)[:, None] * (every[at] - middle)
+                if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
+                    fine, corner = fine[:-near], every[at]
+        whole = space_evenly(np.concatenate([fine, corner]), self.lattice.pitch)
+        return line if whole is None else whole
+
+    def _meeting(self, one: Floats, two: Floats) -> Floats | None:
+        """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
+        if min(len(one), len(two)) < 3:
+            return None
+        middles, ways = zip(*map(_straight, (one, two)), strict=True)
+        sides = np.column_stack([ways[0], -ways[1]])
+        if abs(np.linalg.det(sides)) < 1e-3:
+            return None
+        away = np.linalg.solve(sides, middles[1] - middles[0])
+        corner = (middles[0] + away[0] * ways[0])[None]
+        path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
+        high = float(np.median(self.at(np.concatenate([one, two]))))
+        return corner if away.min() > 0.0 and self.at(path).min() >= HIGH * high else None
 
     def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
         """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
@@ -208,6 +280,23 @@ def space_evenly(points: Floats, step: float) -> Floats | None:
         return None
     at = np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step)) + 1))
     return np.column_stack([np.interp(at, run, axis) for axis in points.T])
+
+
+def _straight(leg: Floats) -> tuple[Floats, Floats]:
+    """Return the middle of a leg (k, 2), and the unit vector along it."""
+    way = leg[len(leg) // 2 :].mean(axis=0) - leg[: (len(leg) + 1) // 2].mean(axis=0)
+    return leg.mean(axis=0), way / max(float(np.hypot(*way)), 1e-12)
+
+
+def _turns(line: Floats, width: int, closed: bool) -> Floats:
+    """Return by how much a line (m, 2) turns at its points, from `width` points before to as many after, rad."""
+    count = len(line) - 1
+    at = np.arange(count + 1)
+    before, after = at - width, at + width
+    before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
+    one, two = line - line[before], line[after] - line
+    turn = np.abs(np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1)))
+    return turn
 
 
 def smooth(line: Floats, times: int, closed: bool) -> Floats:
