@@ -175,11 +175,22 @@ def _prune(network: Network, pitch: float) -> None:
         for number, branch in network.branches.items():
             for free, node in (branch.nodes, branch.nodes[::-1]):
                 at_junction = len(network.ends(free)) == 1 and len(network.ends(node)) > 2
-                if at_junction and not reaches_out(branch.points, network.half[node], pitch):
+                if at_junction and (
+                    not reaches_out(branch.points, network.half[node], pitch)
+                    or _is_corner(network, number, node, free)
+                ):
                     short.append((branch.length, number))
         if not short:
             return
         del network.branches[min(short)[1]]
+
+
+def _is_corner(network: Network, number: int, node: int, free: int) -> bool:
+    """Return whether a free branch is the corner that the two others at its junction lead to."""
+    others = [end for end in network.ends(node) if end[0] != number]
+    met = _meeting(network, *others) if len(others) == 2 else None
+    tip, foot = network.position[free], network.position[node]
+    return met is not None and bool(np.hypot(*(met - tip)) < np.hypot(*(met - foot)))
 
 
 def _join_through(network: Network) -> None:
@@ -209,8 +220,34 @@ def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
         pairs = sorted((float(ways[a] @ ways[b]), a, b) for a, b in combinations(ends, 2))
         for cosine, a, b in pairs:
             if cosine < -STRAIGHT and a not in joints and b not in joints:
-                joints[a], joints[b] = (b, nothing), (a, nothing)
+                between = _round(network, a, b)
+                joints[a], joints[b] = (b, between), (a, between)
     return joints
+
+
+def _round(network: Network, one: End, two: End) -> Floats:
+    """Return the point of the arc by which two branches go on into each other, (1, 2), or none if straight."""
+    met = _meeting(network, one, two)
+    if met is None:
+        return np.empty((0, 2))
+    # Half as far out as the tangents meet: exact for a flat arc.
+    return (0.25 * (_begin(network, one) + _begin(network, two)) + 0.5 * met)[None]
+
+
+def _begin(network: Network, end: End) -> Floats:
+    """Return where a branch comes out of its junction, (2,)."""
+    point: Floats = _without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0]
+    return point
+
+
+def _meeting(network: Network, one: End, two: End) -> Floats | None:
+    """Return where two branches would meet if they went straight on to their junction and beyond, (2,)."""
+    sides = np.column_stack([network.path(one), -network.path(two)])
+    if abs(np.linalg.det(sides)) < 0.2:
+        return None
+    first = _begin(network, one)
+    away = np.linalg.solve(sides, _begin(network, two) - first)
+    return first + away[0] * sides[:, 0] if away.max() < 0.0 else None
 
 
 def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]]) -> None:

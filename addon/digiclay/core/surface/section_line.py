@@ -24,13 +24,15 @@ ROUNDS = 3
 ROUNDS_AT_END = 8
 #: A section this many times as wide as most is one through a junction, and says nothing of its middle.
 WIDE = 1.5
+EVEN = 1.25
 #: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
 FALLEN = 0.75
 #: A line runs through the middle of its sections at this share of its height.
 MIDDLE = 0.7
-#: A line has a corner where it turns by more than 45 degrees within `LEG` half widths to both sides. From
-#: `CORNER` half widths on, legs as long show where they meet, if the feature is so high there at least.
-CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(45.0), 0.7
+#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides. From
+#: `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there at least,
+#: and has lost less than half of what an arc between the legs would have.
+CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
 
@@ -118,7 +120,7 @@ class Field:
                 fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
                 fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
             ]
-            corner = self._meeting(legs[0], legs[1][::-1])
+            corner = self._meeting(legs[0], legs[1][::-1], half)
             if corner is not None and i - width >= start:
                 pieces += [np.concatenate([fine[start : i - width + 1], corner])]
                 fine[i + width - 1], start = corner[0], i + width - 1
@@ -151,7 +153,7 @@ class Field:
         whole = space_evenly(np.concatenate([fine, corner]), self.lattice.pitch)
         return line if whole is None else whole
 
-    def _meeting(self, one: Floats, two: Floats) -> Floats | None:
+    def _meeting(self, one: Floats, two: Floats, half: float) -> Floats | None:
         """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
         if min(len(one), len(two)) < 3:
             return None
@@ -163,7 +165,10 @@ class Field:
         corner = (middles[0] + away[0] * ways[0])[None]
         path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
         high = float(np.median(self.at(np.concatenate([one, two]))))
-        return corner if away.min() > 0.0 and self.at(path).min() >= HIGH * high else None
+        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3)
+        out = np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
+        least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
+        return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
 
     def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
         """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
@@ -182,7 +187,7 @@ class Field:
         seen = np.isfinite(wide)
         if not seen.any():
             return line
-        seen &= wide <= WIDE * float(np.median(wide[seen]))
+        seen &= wide <= EVEN * float(np.median(wide[seen]))
         # Across a junction the line goes on as it does beside it.
         known = np.flatnonzero(seen)
         shift = np.interp(np.arange(len(line)), known, 0.5 * (left[known] - right[known]))
