@@ -28,10 +28,10 @@ FLANK = 1.5
 SADDLE = 0.5
 #: Branches go on into each other when the cosine between their ways is above this: 66 degrees.
 STRAIGHT = 0.4
-#: Two lines run together for this many widths at most, and turn into the common way by 75 degrees at most in
-#: the mean: those of an eight of two circles by 40 to 72, the uprights of an H by 78 to 95.
-TOGETHER = 3.0
-TURN = np.radians(75.0)
+#: Two lines run together for this many widths at most, and turn into the common way by so much at most in the
+#: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of two
+#: circles, may turn by 75.
+TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
 #: A line runs straight through a junction, from so many half widths before it to as many after it.
 THROUGH = 1.5
 
@@ -190,7 +190,7 @@ def _is_corner(network: Network, number: int, node: int, free: int) -> bool:
     others = [end for end in network.ends(node) if end[0] != number]
     met = _meeting(network, *others) if len(others) == 2 else None
     tip, foot = network.position[free], network.position[node]
-    return met is not None and bool(np.hypot(*(met - tip)) < np.hypot(*(met - foot)))
+    return met is not None and bool(np.hypot(*(met - tip)) < 1.5 * np.hypot(*(met - foot)))
 
 
 def _join_through(network: Network) -> None:
@@ -262,7 +262,8 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
     ways = np.array([[network.path(end) for end in side] for side in sides])
     along = network.position[two] - network.position[one]
     cosines_along = np.array([ways[0] @ -along, ways[1] @ along]) / max(float(np.hypot(*along)), 1e-12)
-    if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > TURN:
+    most = TURN_OF_LOOPS if len({end[0] for side in sides for end in side}) == 2 else TURN
+    if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > most:
         return
     order = min(permutations((0, 1)), key=lambda known: float(np.sum(ways[0] * ways[1][list(known)])))
     for k in (0, 1):
