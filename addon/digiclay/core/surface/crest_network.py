@@ -32,6 +32,8 @@ STRAIGHT = 0.4
 #: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of two
 #: circles, may turn by 75.
 TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
+#: Branches that turn by more than this sine go on into each other by an arc.
+BENT = 0.35
 #: A line runs straight through a junction, from so many half widths before it to as many after it.
 THROUGH = 1.5
 
@@ -174,23 +176,20 @@ def _prune(network: Network, pitch: float) -> None:
         short = []
         for number, branch in network.branches.items():
             for free, node in (branch.nodes, branch.nodes[::-1]):
-                at_junction = len(network.ends(free)) == 1 and len(network.ends(node)) > 2
-                if at_junction and (
-                    not reaches_out(branch.points, network.half[node], pitch)
-                    or _is_corner(network, number, node, free)
-                ):
-                    short.append((branch.length, number))
+                if len(network.ends(free)) == 1 and len(network.ends(node)) > 2:
+                    beyond = np.stack([_foot(network, number, node), network.position[free]])
+                    if not all(reaches_out(one, network.half[node], pitch) for one in (branch.points, beyond)):
+                        short.append((branch.length, number))
         if not short:
             return
         del network.branches[min(short)[1]]
 
 
-def _is_corner(network: Network, number: int, node: int, free: int) -> bool:
-    """Return whether a free branch is the corner that the two others at its junction lead to."""
+def _foot(network: Network, number: int, node: int) -> Floats:
+    """Return where a free branch begins, (2,): its junction, or the corner that the two others there lead to."""
     others = [end for end in network.ends(node) if end[0] != number]
-    met = _meeting(network, *others) if len(others) == 2 else None
-    tip, foot = network.position[free], network.position[node]
-    return met is not None and bool(np.hypot(*(met - tip)) < 1.5 * np.hypot(*(met - foot)))
+    met = _meeting(network, others[0], others[1]) if len(others) == 2 else None
+    return network.position[node] if met is None else met
 
 
 def _join_through(network: Network) -> None:
@@ -243,7 +242,7 @@ def _begin(network: Network, end: End) -> Floats:
 def _meeting(network: Network, one: End, two: End) -> Floats | None:
     """Return where two branches would meet if they went straight on to their junction and beyond, (2,)."""
     sides = np.column_stack([network.path(one), -network.path(two)])
-    if abs(np.linalg.det(sides)) < 0.2:
+    if abs(np.linalg.det(sides)) < BENT:
         return None
     first = _begin(network, one)
     away = np.linalg.solve(sides, _begin(network, two) - first)
@@ -266,9 +265,11 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
     if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > most:
         return
     order = min(permutations((0, 1)), key=lambda known: float(np.sum(ways[0] * ways[1][list(known)])))
+    # A way that is shorter than wide is a crossing, which each line passes straight.
+    way = branch.points if branch.length > 2.0 * max(network.half[one], network.half[two]) else np.empty((0, 2))
     for k in (0, 1):
         a, b = sides[0][k], sides[1][order[k]]
-        joints[a], joints[b] = (b, branch.points), (a, branch.points[::-1])
+        joints[a], joints[b] = (b, way), (a, way[::-1])
     del network.branches[number]
 
 
