@@ -54,9 +54,14 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--unit", choices=tuple(UNITS), default="mm", help="unit of all formats but glb; default: mm"
     )
-    parser.add_argument("--up", choices=AXES, default=UP, help="upward axis of an obj; default y, as Blender's")
     parser.add_argument(
-        "--forward", choices=AXES, default="", help="forward axis of an obj, as --forward=-z; default: to --up"
+        "--up", choices=AXES, default=UP, help="upward axis of an obj; default y, as Blender's"
+    )
+    parser.add_argument(
+        "--forward",
+        choices=AXES,
+        default="",
+        help="forward axis of an obj, as --forward=-z; default: to --up",
     )
     parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
     parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")

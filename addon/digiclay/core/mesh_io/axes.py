@@ -34,7 +34,9 @@ def make_axes(up: str, forward: str = "") -> Floats:
     for name, value in (("up", up), ("forward", forward)):
         if value not in AXES:
             raise ParameterError("Export", name, f"must be one of {', '.join(AXES)}", repr(value))
-    ahead, above = (np.eye(3)[AXES.index(one) % 3] * (-1.0 if one[0] == "-" else 1.0) for one in (forward, up))
+    ahead, above = (
+        np.eye(3)[AXES.index(one) % 3] * (-1.0 if one[0] == "-" else 1.0) for one in (forward, up)
+    )
     if forward[-1] == up[-1]:
         raise ParameterError("Export", "forward", f"must be another axis than up, {up}", forward)
     return np.stack([np.cross(ahead, above), ahead, above])

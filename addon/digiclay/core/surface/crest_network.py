@@ -141,9 +141,13 @@ def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
         if joined[branch.nodes[0]] == joined[branch.nodes[1]]:
             first, last = find_stretch(height < SADDLE * bank, low)
             del network.branches[number]
-            for node, part in zip(branch.nodes, (branch.points[:first], branch.points[:last:-1]), strict=True):
+            for node, part in zip(
+                branch.nodes, (branch.points[:first], branch.points[:last:-1]), strict=True
+            ):
                 if len(part) > 1:
-                    network.branches[max(network.branches, default=0) + 1] = Branch([node, len(network.position)], part)
+                    network.branches[max(network.branches, default=0) + 1] = Branch(
+                        [node, len(network.position)], part
+                    )
                     network.position.append(part[-1])
                     network.half.append(0.0)
 
@@ -178,7 +182,9 @@ def _prune(network: Network, pitch: float) -> None:
             for free, node in (branch.nodes, branch.nodes[::-1]):
                 if len(network.ends(free)) == 1 and len(network.ends(node)) > 2:
                     beyond = np.stack([_foot(network, number, node), network.position[free]])
-                    if not all(reaches_out(one, network.half[node], pitch) for one in (branch.points, beyond)):
+                    if not all(
+                        reaches_out(one, network.half[node], pitch) for one in (branch.points, beyond)
+                    ):
                         short.append((branch.length, number))
         if not short:
             return
@@ -266,7 +272,9 @@ def _share(network: Network, number: int, joints: dict[End, tuple[End, Floats]])
         return
     order = min(permutations((0, 1)), key=lambda known: float(np.sum(ways[0] * ways[1][list(known)])))
     # A way that is shorter than wide is a crossing, which each line passes straight.
-    way = branch.points if branch.length > 2.0 * max(network.half[one], network.half[two]) else np.empty((0, 2))
+    way = (
+        branch.points if branch.length > 2.0 * max(network.half[one], network.half[two]) else np.empty((0, 2))
+    )
     for k in (0, 1):
         a, b = sides[0][k], sides[1][order[k]]
         joints[a], joints[b] = (b, way), (a, way[::-1])

@@ -111,7 +111,9 @@ class Field:
             first = int(np.argmin(turn[:-1]))
             fine = np.concatenate([fine[first:-1], fine[: first + 1]])
             turn = np.concatenate([turn[first:-1], turn[: first + 1]])
-        peaks = [i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()]
+        peaks = [
+            i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()
+        ]
         ends = [0, *peaks, len(fine) - 1]
         pieces, start = [], 0
         for before, i, after in zip(ends, peaks, ends[2:], strict=False):
@@ -127,10 +129,12 @@ class Field:
         if not pieces:
             return line
         evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
-        return np.concatenate([one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None])
+        return np.concatenate(
+            [one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None]
+        )
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
-        """Return a line led on from its last leg to where it meets one of others, or from its end to the nearest."""
+        """Return a line led on straight from its last leg to one of others, or from its end to the nearest."""
         step = self.lattice.pitch / 4.0
         there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
         fine = space_evenly(line, step)
@@ -166,7 +170,9 @@ class Field:
         path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
         high = float(np.median(self.at(np.concatenate([one, two]))))
         turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3)
-        out = np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
+        out = (
+            np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
+        )
         least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
         return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
 
@@ -294,7 +300,7 @@ def _straight(leg: Floats) -> tuple[Floats, Floats]:
 
 
 def _turns(line: Floats, width: int, closed: bool) -> Floats:
-    """Return by how much a line (m, 2) turns at its points, from `width` points before to as many after, rad."""
+    """Return the turn of a line (m, 2) at its points, from `width` points before to as many after, rad."""
     count = len(line) - 1
     at = np.arange(count + 1)
     before, after = at - width, at + width
