@@ -29,8 +29,8 @@ SADDLE = 0.5
 #: Branches go on into each other when the cosine between their ways is above this: 66 degrees.
 STRAIGHT = 0.4
 #: Two lines run together for this many widths at most, and turn into the common way by so much at most in the
-#: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of two
-#: circles, may turn by 75.
+#: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of
+#: two circles, may turn by 75.
 TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
 #: Branches that turn by more than this sine go on into each other by an arc.
 BENT = 0.35
@@ -62,23 +62,7 @@ class Chain:
 def find_chains(
     beside: Pins, pins: Pins, position: Floats, half: Floats, pitch: float, off: Callable[[Floats], Floats]
 ) -> list[Chain]:
-    """Return the lines of a skeleton.
-
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbors of all pins of the feature, -1 where there is none.
-    pins : ndarray of int (s,)
-        Those of the skeleton.
-    position : ndarray (k, 2)
-        m.
-    half : ndarray (s,)
-        Half the width of the feature at each pin of the skeleton, m.
-    pitch : float
-        m.
-    off : callable
-        Returns how far the feature is off at places, m.
-    """
+    """Return the lines of a skeleton's pins (s,); `half` (s,), m, is half the feature's width there."""
     network = read_network(beside, pins, position, half)
     _open_low_loops(network, off)
     _merge(network)
@@ -89,17 +73,7 @@ def find_chains(
 
 
 def reaches_out(points: Floats, half: float, pitch: float) -> bool:
-    """Return whether a free branch is longer than the flank of the line it stands on.
-
-    Parameters
-    ----------
-    points : ndarray (m, 2)
-        Of the branch, m.
-    half : float
-        Half the width of the line it stands on, m.
-    pitch : float
-        m.
-    """
+    """Return whether a free branch is longer than the flank of the line it stands on."""
     return measure_length(points) > FLANK * half + 0.5 * pitch
 
 
@@ -192,7 +166,7 @@ def _prune(network: Network, pitch: float) -> None:
 
 
 def _foot(network: Network, number: int, node: int) -> Floats:
-    """Return where a free branch begins, (2,): its junction, or the corner that the two others there lead to."""
+    """Return where a free branch begins, (2,): its junction, or the corner of the two others there."""
     others = [end for end in network.ends(node) if end[0] != number]
     met = _meeting(network, others[0], others[1]) if len(others) == 2 else None
     return network.position[node] if met is None else met
@@ -231,7 +205,7 @@ def _joints(network: Network) -> dict[End, tuple[End, Floats]]:
 
 
 def _round(network: Network, one: End, two: End) -> Floats:
-    """Return the point of the arc by which two branches go on into each other, (1, 2), or none if straight."""
+    """Return the point of the arc by which two branches go on into each other, (1, 2); none if straight."""
     met = _meeting(network, one, two)
     if met is None:
         return np.empty((0, 2))

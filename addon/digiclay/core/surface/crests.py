@@ -24,7 +24,7 @@ __all__ = ["Crest", "Ridge", "find_ridges"]
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
-#: Where lines are lower than they should be for more half widths than so many, there is a ridge between two mounds.
+#: Where a line is too low for more half widths than so many, there is a ridge between two mounds.
 NOTCH = 1.5
 
 
@@ -77,20 +77,7 @@ class Ridge(NamedTuple):
 
 
 def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
-    """Return the ridges and mounds of a feature that are parted by saddles, with their crests.
-
-    Parameters
-    ----------
-    lattice : Lattice
-    pins : ndarray of int (k,)
-        The feature's, ascending.
-    off : ndarray (n,)
-        How far every pin of the bed is off where it was, m, positive for pins of the feature.
-    height : ndarray (n,)
-        Pin tops, m.
-    least : float
-        A saddle is this deep at least, m.
-    """
+    """Return the ridges and mounds of a feature that are parted by saddles, with their crests."""
     own = np.zeros(len(off))
     own[pins] = off[pins]
     beside = lattice.neighbor[pins]

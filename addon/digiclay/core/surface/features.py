@@ -119,12 +119,6 @@ def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
 
     Points belong together that the skin's triangles join; so two bosses that only touch at
     the threshold are two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
-
-    Parameters
-    ----------
-    grid : SurfaceGrid
-    finding : Finding, optional
-        Thresholds; by default its own defaults.
     """
     finding = finding or Finding()
     lattice = Lattice.of(grid.formed)

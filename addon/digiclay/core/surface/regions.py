@@ -65,14 +65,7 @@ class Region:
 
 
 def label_components(count: int, edges: Indices) -> Indices:
-    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2).
-
-    Parameters
-    ----------
-    count : int
-    edges : ndarray of int (e, 2)
-        Pairs of points.
-    """
+    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2)."""
     label = np.arange(count, dtype=np.int32)
     while True:
         a, b = label[edges[:, 0]], label[edges[:, 1]]
@@ -84,18 +77,7 @@ def label_components(count: int, edges: Indices) -> Indices:
 
 
 def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold: float) -> Region:
-    """Return what of some triangles lies where `off` is above the threshold.
-
-    Parameters
-    ----------
-    position : ndarray (m, 2)
-    former, off : ndarray (m,)
-        m, straight within each triangle.
-    faces : ndarray of int (f, 3)
-        Each with one corner above the threshold at least.
-    threshold : float
-        m.
-    """
+    """Return what of some triangles lies where `off` is above the threshold."""
     values, pieces, whole = _clipped(np.column_stack([position, former, off]), faces, off, threshold)
     values[whole:, 3] = threshold
     return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
@@ -121,15 +103,6 @@ def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[
     """Return what of some triangles lies where a value at their corners is above a level.
 
     After the values at its points and its faces: how many of the points, the first, are corners.
-
-    Parameters
-    ----------
-    values : ndarray (m, c)
-        At the corners, straight within each triangle.
-    faces : ndarray of int (f, 3)
-        Each with one corner above the level at least.
-    by : ndarray (m,)
-    level : float
     """
     inside = by > level
     count = inside[faces].sum(axis=1)

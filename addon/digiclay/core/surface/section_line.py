@@ -29,9 +29,9 @@ EVEN = 1.25
 FALLEN = 0.75
 #: A line runs through the middle of its sections at this share of its height.
 MIDDLE = 0.7
-#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides. From
-#: `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there at least,
-#: and has lost less than half of what an arc between the legs would have.
+#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides.
+#: From `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there
+#: at least, and has lost less than half of what an arc between the legs would have.
 CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
@@ -51,17 +51,7 @@ class Field:
         return np.nan_to_num(self.lattice.at(self.off, position))
 
     def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
-        """Return how far it is to where the feature falls to a level, m.
-
-        Parameters
-        ----------
-        position : ndarray (k, 2)
-            Where to start, m.
-        direction : ndarray (k, 2)
-            Unit vectors.
-        level : ndarray (k,)
-            m.
-        """
+        """Return how far it is to where the feature falls to a level, m."""
         return measure_distance(self.lattice, self.off, position, direction, level, self.most)
 
     def half_widths(self, position: Floats) -> Floats:
@@ -134,7 +124,7 @@ class Field:
         )
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
-        """Return a line led on straight from its last leg to one of others, or from its end to the nearest."""
+        """Return a line led on straight from its last leg to one of others, or from its end to the next."""
         step = self.lattice.pitch / 4.0
         there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
         fine = space_evenly(line, step)
@@ -204,15 +194,7 @@ class Field:
         return line + shift[:, None] * aside
 
     def half_width(self, line: Floats, closed: bool) -> float:
-        """Return half the width at half the height, the median along a line.
-
-        Parameters
-        ----------
-        line : ndarray (m, 2)
-            m.
-        closed : bool
-            Whether its ends are joined.
-        """
+        """Return half the width at half the height, the median along a line."""
         _, left, right = self._sections(line, closed, 0.5)
         # Along the edge of the bed a feature has one flank only.
         half = np.where(np.isfinite(left + right), 0.5 * (left + right), np.minimum(left, right))
@@ -277,15 +259,7 @@ class Field:
 
 
 def space_evenly(points: Floats, step: float) -> Floats | None:
-    """Return points along a line at even steps, `step` apart at most; none of a line without length.
-
-    Parameters
-    ----------
-    points : ndarray (m, 2)
-        m.
-    step : float
-        m.
-    """
+    """Return points along a line at even steps, `step` apart at most; none of a line without length."""
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     if run[-1] < 1e-9:
         return None
@@ -306,7 +280,9 @@ def _turns(line: Floats, width: int, closed: bool) -> Floats:
     before, after = at - width, at + width
     before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
     one, two = line - line[before], line[after] - line
-    turn = np.abs(np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1)))
+    turn: Floats = np.abs(
+        np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1))
+    )
     return turn
 
 
@@ -315,14 +291,6 @@ def smooth(line: Floats, times: int, closed: bool) -> Floats:
 
     Each point goes towards the middle of those beside it and a little further back again, so that an arc does
     not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
-
-    Parameters
-    ----------
-    line : ndarray (m, 2)
-        m.
-    times : int
-    closed : bool
-        Whether its ends are joined.
     """
     if len(line) < 4:
         return line
