@@ -76,7 +76,7 @@ def write(folder: Path) -> list[Path]:
         vertices, faces = getattr(shape_solids, name)()
         written.append(folder / f"{name}.{kind}")
         solid = trimesh.Trimesh(vertices, faces, process=False)
-        options = {"include_normals": False, "header": None, "digits": 3} if kind == "obj" else {}
+        options = {"include_normals": False, "header": "z up", "digits": 3} if kind == "obj" else {}
         solid.export(written[-1], **options)
     return written
 

@@ -92,6 +92,20 @@ def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file
     assert sum(len(one.data.polygons) for one in read) == sum(known)
 
 
+@pytest.mark.parametrize(
+    "axes",
+    [{}, {"forward_axis": "Y", "up_axis": "Z"}, {"forward_axis": "NEGATIVE_X", "up_axis": "NEGATIVE_Y"}],
+)
+def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path, axes):
+    path = str(tmp_path / "bed.obj")
+    bpy.ops.export_mesh.digital_clay(filepath=path, kind="surface", **axes)
+    bpy.ops.wm.obj_import(filepath=path, **axes)
+    read = bpy.context.object
+    known = corners(read) @ np.array(read.matrix_world)[:3, :3].T  # the importer turns the object
+    wanted = shaped()
+    np.testing.assert_allclose(known, np.column_stack([wanted.position, wanted.height]) * 1e3, atol=1e-4)
+
+
 @pytest.mark.parametrize("file_format", FORMATS)
 def test_every_format_is_written_with_its_ending(bed, tmp_path, file_format):
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), file_format=file_format)

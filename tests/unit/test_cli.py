@@ -161,7 +161,23 @@ def highest(path: Path) -> float:
 
 def test_export_can_be_in_meters_and_of_any_instant(here: Path) -> None:
     main(["run", "my.toml", "--quiet"])
-    main(["export", "my", "--format", "obj", "--unit", "m", "--time", "0", "--out", "meshes", "--quiet"])
+    main(
+        [
+            "export",
+            "my",
+            "--format",
+            "obj",
+            "--unit",
+            "m",
+            "--time",
+            "0",
+            "--up",
+            "z",
+            "--out",
+            "meshes",
+            "--quiet",
+        ]
+    )
     # At rest all pins are 40 mm high; OBJ files are written to 1e-8.
     assert highest(here / "meshes" / "surface.obj") == pytest.approx(0.04, abs=1e-8)
 

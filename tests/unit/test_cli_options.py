@@ -218,5 +218,5 @@ def test_what_is_written_before_a_signal_is_not_denied(
     monkeypatch.setattr(export, "write", interrupted)
     code = main(["export", "my", "--format", "obj,ply"])
     assert (code, capfd.readouterr()) == (
-        130, (f"{Path('my', 'surface.obj')}\n", "Stopped; no file is half-written.\n"),
+        130, (f"{Path('my', 'surface.obj')} (y up)\n", "Stopped; no file is half-written.\n"),
     )  # fmt: skip

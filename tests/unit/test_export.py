@@ -50,7 +50,7 @@ def corners(body: Body) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_meshio_reads_back_the_triangles_in_millimeters(solid, tmp_path, kind):
-    read = meshio.read(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind))
+    read = meshio.read(mesh_writer.write(solid, path_for(tmp_path, kind), kind=kind, up="z"))
     found = read.points[read.cells_dict["triangle"]]
     np.testing.assert_allclose(found, corners(solid[0]) * 1e3, rtol=0.0, atol=WRITTEN)
 
@@ -66,7 +66,7 @@ def test_trimesh_reads_back_a_watertight_solid_in_millimeters(solid, tmp_path, k
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_meters_are_written_when_asked_for(solid, tmp_path, kind):
-    read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), unit="m", kind=kind))
+    read = trimesh.load_mesh(mesh_writer.write(solid, path_for(tmp_path, kind), "m", kind, up="z"))
     np.testing.assert_allclose(read.bounds[1], solid[0].vertices.max(axis=0), rtol=0.0, atol=5e-9)  # float32
 
 

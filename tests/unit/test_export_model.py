@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import OutputError, ParameterError
+from digiclay.core.mesh_io import mesh_reader
 from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
+from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.body import NO_PIN, Body, compute_volume
 from digiclay.core.surface.features import Finding
@@ -41,6 +43,37 @@ def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight(kind, arra
         if body.closed:
             assert made.volume > 0.0
             assert compute_volume(body) == pytest.approx(made.volume, rel=1e-9)
+
+
+def touching(arrangement: str, seed: int) -> Formed:
+    """Ridges with mounds on them, up and down, turned and beside the middle."""
+    place = make_grid(Layout(rows=26, columns=25, arrangement=arrangement)).positions
+    random = np.random.default_rng(seed)
+    turn, (x, y) = random.uniform(0.0, 2.0 * np.pi), (place * 1e3 + random.uniform(-4.0, 4.0, 2)).T
+    along, aside = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
+    raised = np.zeros(len(place))
+    for sign in (1.0, -1.0):
+        off = np.hypot(np.clip(np.abs(along) - 16.0, 0.0, None), aside - sign * 12.0)
+        ridge = 12.0 * np.clip(1.0 - (off / 7.0) ** 2, 0.0, None)
+        mound = 24.0 * np.clip(1.0 - np.hypot(along - 14.0, aside - sign * 12.0) ** 2 / 81.0, 0.0, None)
+        raised += sign * np.maximum(ridge, mound)
+    return Formed.of(place, 0.04 + raised * 1e-3, 0.04, 0.0, 0)
+
+
+@pytest.mark.parametrize("skin", ["bilinear", "smooth", "membrane"])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("kind", ["solid", "pins", "features"])
+def test_a_file_is_watertight_after_its_vertices_are_welded(tmp_path, kind, arrangement, skin):
+    for seed in range(2):
+        made = make_bodies(touching(arrangement, seed), Model(kind=kind, skin=skin, resolution=2))
+        assert len(made) == (4 if kind == "features" else 1)
+        for name in FORMATS if skin == "bilinear" else ("stl",):
+            path = write(made, tmp_path / f"welded{find_suffix(name)}", kind=name)
+            read = mesh_reader.read(path)
+            welded = trimesh.Trimesh(read.vertices.astype(np.float32), read.faces, process=False)
+            welded.merge_vertices()
+            _, counts = np.unique(welded.edges_sorted, axis=0, return_counts=True)
+            assert set(counts) == {2}, name
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

@@ -211,7 +211,9 @@ def test_every_body_is_closed_and_of_the_volume_that_is_listed(arrangement, seed
         _, counts = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
         assert set(counts) == {2}
         assert mesh.is_winding_consistent
-        assert mesh.volume == pytest.approx(one.volume, rel=1e-9)
+        assert mesh.volume == pytest.approx(one.apart.volume, rel=1e-9)
+        # Where it is divided, a strip as wide as 0.005 to 0.01 pitches is missing: 0.1 mm² under up to 1 mm.
+        assert mesh.volume == pytest.approx(one.volume, rel=1e-9 if one.apart is one.region else 0.01)
         assert len(np.unique(body.faces)) == len(body.vertices)
 
 

@@ -101,7 +101,7 @@ def test_a_skin_and_its_resolution_can_be_chosen(run: Path) -> None:
 def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(
     said: str, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--quiet"]) == 0
+    assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--up", "z", "--quiet"]) == 0
     heights = [
         float(line.split()[3]) for line in (run / "surface.obj").read_text().splitlines() if line[:2] == "v "
     ]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.actuator import Actuator
@@ -66,6 +67,34 @@ def test_a_file_in_meters_comes_back_too(tmp_path: Path, format: str) -> None:
     back = read_back(cells, formed, Model(), path, format, unit="m")
     assert back.covered == cells.count
     assert np.abs(back.heights - formed.height).max() < EXACT
+
+
+@pytest.mark.parametrize(
+    ("up", "forward", "header"),
+    [
+        ("y", "", None),
+        ("z", "", None),
+        ("z", "-x", None),
+        ("-y", "x", None),
+        ("x", "-z", None),
+        ("z", "", "# digiclay, lengths in mm, z up"),  # as files were written before they had axes
+        ("y", "", "# Blender 4.5"),  # whoever says nothing has Blender's axes
+    ],
+)
+def test_an_obj_comes_back_from_any_axes(tmp_path: Path, up: str, forward: str, header: str | None) -> None:
+    cells, formed = bed(2.3, "staggered")
+    path = write(make_bodies(formed, Model()), tmp_path / "x.obj", up=up, forward=forward)
+    if header:
+        path.write_text(header + path.read_text()[path.read_text().index("\n") :])
+    shape = Shape(file=str(path), fit="placed", unit="mm")
+    assert np.abs(fit_relief(shape, read(shape), cells, Actuator()).heights - formed.height).max() < EXACT
+
+
+@pytest.mark.parametrize(("up", "forward"), [("z", "-z"), ("w", ""), ("y", "up")])
+def test_axes_that_make_no_sense_are_refused(tmp_path: Path, up: str, forward: str) -> None:
+    with pytest.raises(ParameterError, match=r"^Export\.(up|forward) must be "):
+        write(make_bodies(bed(3.0, "aligned")[1], Model()), tmp_path / "x.obj", up=up, forward=forward)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

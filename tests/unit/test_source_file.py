@@ -86,8 +86,8 @@ def test_every_sample_mesh_is_closed_and_turned_outwards(name: str) -> None:
 def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> None:
     solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
     path = tmp_path / f"Ein Körper mit Blank.{kind}"
-    unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in meters, y up
-    turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind == "glb" else solid.vertices
+    unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in meters, y up; an OBJ that says nothing is y up
+    turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind in ("glb", "obj") else solid.vertices
     if kind == "3mf":
         mesh_writer.write([Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path)
     else:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..core.base.errors import OutputError
 from ..core.base.run_folder import claim_files
+from ..core.mesh_io.axes import AXES, UP, make_axes
 from ..core.mesh_io.export_model import KINDS, Model, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_format, find_suffix, write
 from ..core.scene.schema import Scene
@@ -18,7 +19,7 @@ from ..core.session.finished_run import read_run
 from ..core.surface.body import Body
 from ..core.surface.features import Finding
 from ..core.surface.formed import make_formed
-from .arguments import add_run, millimeters, seconds
+from .arguments import add_run, millimeters, seconds, told_as_options
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
@@ -27,7 +28,7 @@ __all__ = ["add", "exported", "file_names", "formats"]
 EXAMPLES = """\
 examples:
   digiclay export ridge_mound_valley --format stl,3mf
-  digiclay export ridge_mound_valley --skin smooth --resolution 6 --format obj
+  digiclay export ridge_mound_valley --skin smooth --resolution 6 --format obj --up z
   digiclay export ridge_mound_valley --kind features --separate --format stl --out parts
   digiclay export ridge_mound_valley --kind pins --format ply --unit m --time 10 --out meshes
 """
@@ -52,6 +53,15 @@ def add(commands: Any) -> None:
     parser.add_argument("--separate", action="store_true", help="one file a feature")
     parser.add_argument(
         "--unit", choices=tuple(UNITS), default="mm", help="unit of all formats but glb; default: mm"
+    )
+    parser.add_argument(
+        "--up", choices=AXES, default=UP, help="upward axis of an obj; default y, as Blender's"
+    )
+    parser.add_argument(
+        "--forward",
+        choices=AXES,
+        default="",
+        help="forward axis of an obj, as --forward=-z; default: to --up",
     )
     parser.add_argument("--time", metavar="T", type=seconds, help="instant, s; default: the end")
     parser.add_argument("--out", metavar="DIR", type=Path, help="output folder; default: the run folder")
@@ -120,6 +130,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], made)]
     if arguments.separate:
         files = [(body.name, [body]) for body in made]
+    with told_as_options("Export"):
+        make_axes(arguments.up, arguments.forward)
     folder = arguments.out or arguments.run
     targets = [
         (some, kind, folder / f"{stem}{find_suffix(kind)}")
@@ -128,7 +140,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     ]
     with claim_files([path for _, _, path in targets]):
         for some, kind, path in targets:
-            write(some, path, arguments.unit, kind)
+            write(some, path, arguments.unit, kind, arguments.up, arguments.forward)
             if not arguments.quiet:
-                print(path)
+                print(f"{path} ({arguments.up} up)" if kind == "obj" else path)
     return 0

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import bpy
+from ..core.mesh_io.axes import AXES, find_forward
 from ..core.mesh_io.export_model import make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..device.view import bed_of
@@ -24,6 +25,10 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
      {"kind": "features", "file_format": "stl", "separate": True}),
     ("Solid for the web (.glb)", "WORLD", {"kind": "solid", "skin": "smooth", "file_format": "glb"}),
 )  # fmt: skip
+
+#: Axes under the names of Blender's own exporter.
+AXIS_NAMES = {name.upper().replace("-", "NEGATIVE_"): name for name in AXES}
+AXIS_ITEMS = [(key, name.upper(), f"{name.upper()} axis") for key, name in AXIS_NAMES.items()]
 
 
 class ExportMesh(SurfaceOptions, bpy.types.Operator):
@@ -50,6 +55,12 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         items=[(name, name, f"Lengths in {name}") for name in UNITS],
         default="mm",
     )
+    forward_axis: bpy.props.EnumProperty(
+        name="Forward Axis", description="Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z"
+    )
+    up_axis: bpy.props.EnumProperty(
+        name="Up Axis", description="Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y"
+    )
     separate: bpy.props.BoolProperty(
         name="A File Each", description="Write each feature into a file of its own", default=False
     )
@@ -68,8 +79,10 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         if self.file_format == self.shown:
             self.file_format = _told_by(self.filepath) or self.file_format
         self.shown = self.file_format
+        forward = next(key for key, name in AXIS_NAMES.items() if name == self._axes()[1])
         wanted = str(self._file())
-        changed: bool = wanted != self.filepath
+        changed: bool = wanted != self.filepath or forward != self.forward_axis
+        self.forward_axis = forward
         self.filepath = wanted
         return changed
 
@@ -82,6 +95,9 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         row = layout.row()
         row.active = self.file_format != "glb"
         row.prop(self, "unit", expand=True)
+        if self.file_format == "obj":
+            layout.prop(self, "forward_axis")
+            layout.prop(self, "up_axis")
         self.draw_surface(layout)
         row = layout.row()
         row.active = self.kind == "features"
@@ -100,9 +116,14 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
             stem = target.name.removesuffix(ending)
             files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
         for path, some in files:
-            write(some, path, self.unit, self.file_format)
+            write(some, path, self.unit, self.file_format, *self._axes())
         told = localize("{} files beside {}", len(files), target) if len(files) > 1 else str(files[0][0])
         self.report({"INFO"}, localize("Written: {}", told))
+
+    def _axes(self) -> tuple[str, str]:
+        """Return the upward and the forward axis of an OBJ; the latter gives way where both are the same."""
+        up, forward = AXIS_NAMES[self.up_axis], AXIS_NAMES[self.forward_axis]
+        return up, find_forward(up) if up[-1] == forward[-1] else forward
 
     def _file(self) -> Path:
         """Return the file with the ending of its format, in place of that of another format."""

@@ -55,19 +55,7 @@ class Model(Parameters):
 
 
 def make_skin_grid(formed: Formed, model: Model) -> SurfaceGrid:
-    """Return the skin of a model.
-
-    Parameters
-    ----------
-    formed : Formed
-    model : Model
-        Its skin and resolution.
-
-    Raises
-    ------
-    ParameterError
-        When it would have too many points.
-    """
+    """Return the skin of a model."""
     points = model.parts**2 * len(formed.height)
     if points > MOST_POINTS:
         rule = f"must be low enough for {MOST_POINTS // 1_000_000} million points on this bed"
@@ -77,36 +65,12 @@ def make_skin_grid(formed: Formed, model: Model) -> SurfaceGrid:
 
 
 def find_features(formed: Formed, model: Model, finding: Finding) -> list[Feature]:
-    """Return the features of the skin of a model.
-
-    Parameters
-    ----------
-    formed : Formed
-    model : Model
-        Its skin and resolution.
-    finding : Finding
-    """
+    """Return the features of the skin of a model."""
     return find(make_skin_grid(formed, model), finding)
 
 
 def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) -> list[Body]:
-    """Return the bodies of a model, in m.
-
-    Parameters
-    ----------
-    formed : Formed
-    model : Model
-    finding : Finding, optional
-        How features are found; they become groups of faces. Without it there are no groups, which spares
-        a large bed the search; bodies of features are found by the defaults then.
-
-    Raises
-    ------
-    OutputError
-        When features are asked for and there are none.
-    ParameterError
-        When there would be too many points.
-    """
+    """Return the bodies of a model, in m."""
     skin = make_skin_grid(formed, model)
     if model.kind == "features":
         found = find(skin, finding)
@@ -178,13 +142,13 @@ def _of_pins(formed: Formed, vertices: Floats, owner: NDArray[np.int64]) -> dict
 
 
 def make_feature_solid(feature: Feature) -> Body:
-    """Return the body between the surface as it is and as it was before, closed.
+    """Return the body between the surface as it is and as it was before, closed; it touches no other.
 
     A boss stands on the former surface; a crease is the body that fills it up to there. Where the
     feature ends, and at the edge of the bed, an upright wall closes it: as high as the threshold, because
     an edge that thins out to nothing makes booleans of other programs fail.
     """
-    region = feature.region
+    region = feature.apart
     count = len(region.position)
     now = region.former + (region.off if feature.kind == "boss" else -region.off)
     over, under = np.maximum(now, region.former), np.minimum(now, region.former)

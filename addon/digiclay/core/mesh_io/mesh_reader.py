@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
+from .axes import find_axes, make_axes
 from .head_checks import check_off, check_ply, check_stl, stl_is_text
 from .mesh_limits import refuse_size
 
@@ -75,7 +76,10 @@ def read(path: Path) -> Read:
     if kind in GLTF:
         return Read(*gltf_reader.read(path, data), 1.0, "y")
     if kind == ".obj":
-        return Read(*obj_reader.read(data, path.name), None, "z")
+        vertices, faces = obj_reader.read(data, path.name)
+        up, forward = find_axes(data)
+        # Turned about the upward axis to the usual forward one.
+        return Read(vertices @ make_axes(up, forward).T @ make_axes(up), faces, None, up)
     CHECKS[kind](data, path.name)
     return Read(*_by_trimesh(data, kind, path), None, "z")
 

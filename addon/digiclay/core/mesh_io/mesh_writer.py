@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -10,6 +11,7 @@ from ..base.errors import OutputError, ParameterError
 from ..base.whole_files import open_whole
 from ..surface.body import Body
 from . import glb_writer, obj_writer, ply_writer, stl_writer, threemf_writer
+from .axes import UP, make_axes
 
 __all__ = ["FORMATS", "UNITS", "find_format", "find_suffix", "write"]
 
@@ -17,7 +19,7 @@ __all__ = ["FORMATS", "UNITS", "find_format", "find_suffix", "write"]
 FORMATS: dict[str, str] = {
     "stl": "STL, binary",
     "stl_ascii": "STL as text",
-    "obj": "Wavefront OBJ, with a group for each feature",
+    "obj": "Wavefront OBJ, with a group for each feature; y up as in Blender's, other axes by option",
     "ply": "Stanford PLY, binary, with height, force and mode of each vertex",
     "glb": "binary glTF, in meters and y up as its standard says",
     "3mf": "3MF, which names its unit",
@@ -54,7 +56,14 @@ def find_suffix(kind: str) -> str:
     return ".ascii.stl" if kind == "stl_ascii" else f".{kind}"
 
 
-def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str | None = None) -> Path:
+def write(
+    bodies: Sequence[Body],
+    path: str | Path,
+    unit: str = "mm",
+    kind: str | None = None,
+    up: str = UP,
+    forward: str = "",
+) -> Path:
     """Write bodies into one file, a few MB at a time.
 
     Parameters
@@ -68,6 +77,8 @@ def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str 
         standard says so.
     kind : str, optional
         A key of `FORMATS`; by default the extension of `path`.
+    up, forward : str
+        Axes of an OBJ, of `axes.AXES`; by default those of Blender.
 
     Returns
     -------
@@ -79,10 +90,12 @@ def write(bodies: Sequence[Body], path: str | Path, unit: str = "mm", kind: str 
     OutputError
         On an unknown format, nothing to write, or when the file cannot be written.
     ParameterError
-        On an unknown unit.
+        On an unknown unit or axis.
     """
     target = Path(path)
-    writer = WRITERS[find_format(target.suffix if kind is None else kind)]
+    named = find_format(target.suffix if kind is None else kind)
+    writer = partial(obj_writer.write, up=up, forward=forward) if named == "obj" else WRITERS[named]
+    make_axes(up, forward)  # an error before the file is opened
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
     if not any(len(body.faces) for body in bodies):

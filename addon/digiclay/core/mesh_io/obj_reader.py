@@ -32,20 +32,7 @@ VERTEX, FACE = (b"v ", b"v\t"), (b"f ", b"f\t")
 
 
 def read(data: bytes, name: str) -> tuple[Floats, Indices]:
-    """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans.
-
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        What messages call it.
-
-    Raises
-    ------
-    ParameterError
-        When a line cannot be read, a face refers to a vertex that is not there, or the file is cut off.
-    """
+    """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans."""
     data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     vertices, corners = array("d"), array("q")
     line = 1

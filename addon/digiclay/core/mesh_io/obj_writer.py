@@ -8,27 +8,21 @@ from typing import BinaryIO
 import numpy as np
 
 from ..surface.body import Body, Indices, split_pieces
+from .axes import UP, find_forward, make_axes
 
 __all__ = ["write"]
 
 
-def write(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first.
-
-    Parameters
-    ----------
-    file : binary file
-    bodies : sequence of Body
-    factor : float
-        Units of the file in a meter.
-    """
+def write(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = "") -> None:
+    """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first."""
+    axes, unit = make_axes(up, forward), "mm" if factor > 1.0 else "m"
     line = "v {0} {0} {0}\n".format("%.6f" if factor > 1.0 else "%.9f")
-    file.write(f"# digiclay, lengths in {'mm' if factor > 1.0 else 'm'}, z up\n".encode())
+    file.write(f"# digiclay, lengths in {unit}, {up} up, {forward or find_forward(up)} forward\n".encode())
     first = 1
     for body in bodies:
         file.write(f"o {body.name}\n".encode())
         for some in split_pieces(len(body.vertices)):
-            block = body.vertices[some] * factor
+            block = body.vertices[some] @ (axes * factor)
             file.write(((line * len(block)) % tuple(block.ravel().tolist())).encode())
         if body.groups:
             for number, name in enumerate(("rest", *body.groups)):

@@ -61,19 +61,7 @@ class Network:
 
 
 def read_network(beside: Pins, pins: Pins, position: Floats, half: Floats) -> Network:
-    """Return the network of a skeleton: pins with three neighbors or more are junctions.
-
-    Parameters
-    ----------
-    beside : ndarray of int (k, 8 or 6)
-        Neighbors within the feature; -1 where there is none.
-    pins : ndarray of int (m,)
-        Those of the skeleton.
-    position : ndarray (k, 2)
-        Places of all pins of the feature, m.
-    half : ndarray (m,)
-        Half the feature's width at the pins of the skeleton, m.
-    """
+    """Return the network of a skeleton: pins with three neighbors or more are junctions."""
     wide = dict(zip(pins.tolist(), half.tolist(), strict=True))
     around = _neighbors(beside, pins)
     cluster: dict[int, int] = {}

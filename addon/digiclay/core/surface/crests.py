@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .crest_network import Chain, find_chains, reaches_out
+from .crest_network import SADDLE, Chain, find_chains, find_stretch, reaches_out
 from .pin_lattice import Lattice
-from .section_line import LEVEL, Field, smooth, space_evenly
+from .section_line import LEVEL, Field, smooth
 from .skeleton import find_skeleton, measure_half_width
 
 __all__ = ["Crest", "Ridge", "find_ridges"]
@@ -24,9 +24,7 @@ __all__ = ["Crest", "Ridge", "find_ridges"]
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
-#: Lines are parted where they are lower than this share of the lower one. Where they are as low for more half
-#: widths than so many, there is a ridge between two mounds.
-SADDLE = 0.5
+#: Where a line is too low for more half widths than so many, there is a ridge between two mounds.
 NOTCH = 1.5
 
 
@@ -79,20 +77,7 @@ class Ridge(NamedTuple):
 
 
 def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least: float) -> tuple[Ridge, ...]:
-    """Return the ridges and mounds of a feature that are parted by saddles, with their crests.
-
-    Parameters
-    ----------
-    lattice : Lattice
-    pins : ndarray of int (k,)
-        The feature's, ascending.
-    off : ndarray (n,)
-        How far every pin of the bed is off where it was, m, positive for pins of the feature.
-    height : ndarray (n,)
-        Pin tops, m.
-    least : float
-        A saddle is this deep at least, m.
-    """
+    """Return the ridges and mounds of a feature that are parted by saddles, with their crests."""
     own = np.zeros(len(off))
     own[pins] = off[pins]
     beside = lattice.neighbor[pins]
@@ -102,7 +87,7 @@ def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least
     position = lattice.formed.position[pins]
     field = Field(lattice, own, height, 2.0 * (measure_half_width(among, on_bed) + 2.0) * lattice.pitch)
     half = field.half_widths(position[line])
-    found = find_chains(among, line, position, half, lattice.pitch) if len(line) > 1 else []
+    found = find_chains(among, line, position, half, lattice.pitch, field.at) if len(line) > 1 else []
     if not found:  # a single pin, or a ring of three
         return (Ridge((), position[line], float(half.max())),)
     usual = float(np.median(half))
@@ -113,7 +98,7 @@ def find_ridges(lattice: Lattice, pins: Pins, off: Floats, height: Floats, least
         if piece is chain or not any(piece.joined) or reaches_out(piece.points, usual, lattice.pitch)
     ]
     lines = [field.line(piece) for piece in pieces]
-    _meet(pieces, lines, lattice.pitch)
+    _meet(pieces, lines, field)
     groups: list[tuple[set[int], list[int]]] = []
     for number, piece in enumerate(pieces):
         group = (set(piece.nodes), [number])
@@ -150,9 +135,9 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
     for at in np.argsort(off / np.maximum(banks, 1e-12)).tolist():
         if off[at] >= SADDLE * banks[at]:
             return [chain]
-        first, last = _stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)
+        first, last = find_stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)
         if banks[at] - off[at] >= least and run[last] - run[first] <= NOTCH * half and 0 < at < len(off) - 1:
-            first, last = _stretch(off < SADDLE * banks[at], at)
+            first, last = find_stretch(off < SADDLE * banks[at], at)
             one = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
             two = replace(
                 chain, points=points[min(last + 1, len(off) - 1) :], joined=(False, chain.joined[1])
@@ -161,32 +146,20 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
     return [chain]
 
 
-def _stretch(there: NDArray[np.bool_], at: int) -> tuple[int, int]:
-    """Return the first and the last of those about a place that all have something."""
-    out = np.flatnonzero(~there)
-    before, after = out[out < at], out[out > at]
-    return int(before[-1]) + 1 if len(before) else 0, int(after[0]) - 1 if len(after) else len(there) - 1
-
-
-def _meet(pieces: list[Chain], lines: list[Floats | None], pitch: float) -> None:
-    """Let lines that end at a junction end on the nearest line there, in place."""
+def _meet(pieces: list[Chain], lines: list[Floats | None], field: Field) -> None:
+    """Let lines that end at a junction end on another line there, in place."""
     for number, piece in enumerate(pieces):
         for end in (0, -1):
             mine = lines[number]
             if mine is None or piece.closed or not piece.joined[end]:
                 continue
             others = [
-                fine
+                line
                 for k, line in enumerate(lines)
                 if k != number and line is not None and pieces[k].nodes & piece.nodes
-                for fine in (space_evenly(line, pitch / 4.0),)
-                if fine is not None
             ]
-            if others:
-                there = np.concatenate(others)
-                foot = there[[int(np.argmin(np.hypot(*(there - mine[end]).T)))]]
-                joined = np.concatenate([foot, mine] if end == 0 else [mine, foot])
-                lines[number] = space_evenly(joined, pitch)
+            turned = field.extend(mine[::-1] if end == 0 else mine, field.half_width(mine, False), others)
+            lines[number] = turned[::-1] if end == 0 else turned
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:

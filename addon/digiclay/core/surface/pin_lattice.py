@@ -50,12 +50,6 @@ class Lattice:
         """Return what has a value at each pin, (n,), at places (..., 2), m; NaN beyond the bed.
 
         It is straight along each row, and then between two rows.
-
-        Parameters
-        ----------
-        values : ndarray (n,)
-        position : ndarray (..., 2)
-            m.
         """
         bed = self.formed
         first = bed.position[:: bed.columns]
@@ -82,23 +76,9 @@ class Lattice:
 def measure_distance(
     lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
 ) -> Floats:
-    """Return how far it is from places to where values fall to a level.
+    """Return how far it is, m, (k,), from places (k, 2) along unit vectors to where values (n,) fall to a level.
 
-    Parameters
-    ----------
-    lattice : Lattice
-    values : ndarray (n,)
-        At the pins.
-    position, direction : ndarray (k, 2)
-        Places, m, and unit vectors.
-    level : ndarray (k,)
-    most : float
-        Looked at so far, m.
-
-    Returns
-    -------
-    ndarray (k,)
-        m; infinite where the values stay above the level, as far as the bed or `most` reaches.
+    Infinite where they stay above their level (k,), as far as the bed or `most`, m, reaches.
     """
     step = lattice.pitch / STEPS
     steps = np.arange(1, int(np.ceil(most / step)) + 1) * step

@@ -65,14 +65,7 @@ class Region:
 
 
 def label_components(count: int, edges: Indices) -> Indices:
-    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2).
-
-    Parameters
-    ----------
-    count : int
-    edges : ndarray of int (e, 2)
-        Pairs of points.
-    """
+    """Return for each of `count` points the least point it is joined to by edges, shape (e, 2)."""
     label = np.arange(count, dtype=np.int32)
     while True:
         a, b = label[edges[:, 0]], label[edges[:, 1]]
@@ -84,41 +77,24 @@ def label_components(count: int, edges: Indices) -> Indices:
 
 
 def cut(position: Floats, former: Floats, off: Floats, faces: Indices, threshold: float) -> Region:
-    """Return what of some triangles lies where `off` is above the threshold.
-
-    Parameters
-    ----------
-    position : ndarray (m, 2)
-    former, off : ndarray (m,)
-        m, straight within each triangle.
-    faces : ndarray of int (f, 3)
-        Each with one corner above the threshold at least.
-    threshold : float
-        m.
-    """
+    """Return what of some triangles lies where `off` is above the threshold."""
     values, pieces, whole = _clipped(np.column_stack([position, former, off]), faces, off, threshold)
     values[whole:, 3] = threshold
     return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
 
 
-def divide(region: Region, nearer: Floats) -> tuple[Region | None, Region | None]:
-    """Return the two parts of a region where a value at its points is above 0, and where it is not.
+def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | None, Region | None]:
+    """Return the parts of a region where a value at its points, (k,), is above `gap`, and below -`gap`.
 
-    Together they are the region; one may have nothing.
-
-    Parameters
-    ----------
-    region : Region
-    nearer : ndarray (k,)
-        The value at its points.
+    Without a gap they are the region together; one may have nothing.
     """
     values = np.column_stack([region.position, region.former, region.off])
     # What is at 0 is on one side by a trifle, or triangles along the contour would be on none.
     nearer = np.where(nearer == 0.0, -np.finfo(float).tiny, nearer)
     found: list[Region | None] = []
     for side in (nearer, -nearer):
-        some = region.faces[(side > 0.0)[region.faces].any(axis=1)]
-        kept, pieces, _ = _clipped(values, some, side, 0.0)
+        some = region.faces[(side > gap)[region.faces].any(axis=1)]
+        kept, pieces, _ = _clipped(values, some, side, gap)
         found.append(Region(kept[:, :2], kept[:, 2], kept[:, 3], pieces) if len(some) else None)
     return found[0], found[1]
 
@@ -127,15 +103,6 @@ def _clipped(values: Floats, faces: Indices, by: Floats, level: float) -> tuple[
     """Return what of some triangles lies where a value at their corners is above a level.
 
     After the values at its points and its faces: how many of the points, the first, are corners.
-
-    Parameters
-    ----------
-    values : ndarray (m, c)
-        At the corners, straight within each triangle.
-    faces : ndarray of int (f, 3)
-        Each with one corner above the level at least.
-    by : ndarray (m,)
-    level : float
     """
     inside = by > level
     count = inside[faces].sum(axis=1)

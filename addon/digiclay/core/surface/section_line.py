@@ -24,10 +24,15 @@ ROUNDS = 3
 ROUNDS_AT_END = 8
 #: A section this many times as wide as most is one through a junction, and says nothing of its middle.
 WIDE = 1.5
+EVEN = 1.25
 #: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
 FALLEN = 0.75
 #: A line runs through the middle of its sections at this share of its height.
 MIDDLE = 0.7
+#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides.
+#: From `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there
+#: at least, and has lost less than half of what an arc between the legs would have.
+CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
 
@@ -46,17 +51,7 @@ class Field:
         return np.nan_to_num(self.lattice.at(self.off, position))
 
     def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
-        """Return how far it is to where the feature falls to a level, m.
-
-        Parameters
-        ----------
-        position : ndarray (k, 2)
-            Where to start, m.
-        direction : ndarray (k, 2)
-            Unit vectors.
-        level : ndarray (k,)
-            m.
-        """
+        """Return how far it is to where the feature falls to a level, m."""
         return measure_distance(self.lattice, self.off, position, direction, level, self.most)
 
     def half_widths(self, position: Floats) -> Floats:
@@ -91,7 +86,85 @@ class Field:
                 line = line[::-1] if end == 0 else line
                 if len(line) < 2:
                     return None
-        return line
+        return self._sharpened(line, half, chain.closed)
+
+    def _sharpened(self, line: Floats, half: float, closed: bool) -> Floats:
+        """Return a line with its corners where its straight legs meet, if the feature is as high there."""
+        step = self.lattice.pitch / 2.0
+        fine = space_evenly(line, step)
+        width = max(2, round(CORNER * half / step))
+        if fine is None or len(fine) < 4 * width:
+            return line
+        wide = max(2, round(LEG * half / step))
+        turn = _turns(fine, wide, closed)
+        if closed:  # from a straight place on
+            first = int(np.argmin(turn[:-1]))
+            fine = np.concatenate([fine[first:-1], fine[: first + 1]])
+            turn = np.concatenate([turn[first:-1], turn[: first + 1]])
+        peaks = [
+            i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()
+        ]
+        ends = [0, *peaks, len(fine) - 1]
+        pieces, start = [], 0
+        for before, i, after in zip(ends, peaks, ends[2:], strict=False):
+            reach = width + wide
+            legs = [
+                fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
+                fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
+            ]
+            corner = self._meeting(legs[0], legs[1][::-1], half)
+            if corner is not None and i - width >= start:
+                pieces += [np.concatenate([fine[start : i - width + 1], corner])]
+                fine[i + width - 1], start = corner[0], i + width - 1
+        if not pieces:
+            return line
+        evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
+        return np.concatenate(
+            [one[: None if k == len(pieces) else -1] for k, one in enumerate(evenly) if one is not None]
+        )
+
+    def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
+        """Return a line led on straight from its last leg to one of others, or from its end to the next."""
+        step = self.lattice.pitch / 4.0
+        there = [fine for fine in (space_evenly(other, step) for other in others) if fine is not None]
+        fine = space_evenly(line, step)
+        if not there or fine is None:
+            return line
+        near, far = (round(share * half / step) for share in (CORNER, CORNER + LEG))
+        leg = fine[-far - 1 : -near]
+        every = np.concatenate(there)
+        corner = every[[int(np.argmin(np.hypot(*(every - line[-1]).T)))]]
+        if len(leg) > 4:
+            middle, way = _straight(leg)
+            off = (every - middle) @ np.array([-way[1], way[0]])
+            ahead = (every - middle) @ way
+            met = np.flatnonzero((np.abs(off) <= step) & (ahead > 0.0))
+            if len(met):
+                at = met[[int(np.argmin(np.abs(ahead[met] - float((line[-1] - middle) @ way))))]]
+                path = middle + np.linspace(0.0, 1.0, 9)[:, None] * (every[at] - middle)
+                if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
+                    fine, corner = fine[:-near], every[at]
+        whole = space_evenly(np.concatenate([fine, corner]), self.lattice.pitch)
+        return line if whole is None else whole
+
+    def _meeting(self, one: Floats, two: Floats, half: float) -> Floats | None:
+        """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
+        if min(len(one), len(two)) < 3:
+            return None
+        middles, ways = zip(*map(_straight, (one, two)), strict=True)
+        sides = np.column_stack([ways[0], -ways[1]])
+        if abs(np.linalg.det(sides)) < 1e-3:
+            return None
+        away = np.linalg.solve(sides, middles[1] - middles[0])
+        corner = (middles[0] + away[0] * ways[0])[None]
+        path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
+        high = float(np.median(self.at(np.concatenate([one, two]))))
+        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3)
+        out = (
+            np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn / 2.0) - 1.0 / np.tan(turn / 2.0))
+        )
+        least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
+        return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
 
     def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
         """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
@@ -110,7 +183,7 @@ class Field:
         seen = np.isfinite(wide)
         if not seen.any():
             return line
-        seen &= wide <= WIDE * float(np.median(wide[seen]))
+        seen &= wide <= EVEN * float(np.median(wide[seen]))
         # Across a junction the line goes on as it does beside it.
         known = np.flatnonzero(seen)
         shift = np.interp(np.arange(len(line)), known, 0.5 * (left[known] - right[known]))
@@ -121,15 +194,7 @@ class Field:
         return line + shift[:, None] * aside
 
     def half_width(self, line: Floats, closed: bool) -> float:
-        """Return half the width at half the height, the median along a line.
-
-        Parameters
-        ----------
-        line : ndarray (m, 2)
-            m.
-        closed : bool
-            Whether its ends are joined.
-        """
+        """Return half the width at half the height, the median along a line."""
         _, left, right = self._sections(line, closed, 0.5)
         # Along the edge of the bed a feature has one flank only.
         half = np.where(np.isfinite(left + right), 0.5 * (left + right), np.minimum(left, right))
@@ -152,7 +217,8 @@ class Field:
         longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
         fine = space_evenly(path, pitch / 4.0)
-        assert fine is not None
+        if fine is None:  # a line of a pitch that comes back to where it began
+            return line[:1]
         known = self.lattice.at(self.off, fine)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine, axis=0).T))])
         beyond = np.flatnonzero(np.isnan(known))
@@ -193,15 +259,7 @@ class Field:
 
 
 def space_evenly(points: Floats, step: float) -> Floats | None:
-    """Return points along a line at even steps, `step` apart at most; none of a line without length.
-
-    Parameters
-    ----------
-    points : ndarray (m, 2)
-        m.
-    step : float
-        m.
-    """
+    """Return points along a line at even steps, `step` apart at most; none of a line without length."""
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     if run[-1] < 1e-9:
         return None
@@ -209,19 +267,30 @@ def space_evenly(points: Floats, step: float) -> Floats | None:
     return np.column_stack([np.interp(at, run, axis) for axis in points.T])
 
 
+def _straight(leg: Floats) -> tuple[Floats, Floats]:
+    """Return the middle of a leg (k, 2), and the unit vector along it."""
+    way = leg[len(leg) // 2 :].mean(axis=0) - leg[: (len(leg) + 1) // 2].mean(axis=0)
+    return leg.mean(axis=0), way / max(float(np.hypot(*way)), 1e-12)
+
+
+def _turns(line: Floats, width: int, closed: bool) -> Floats:
+    """Return the turn of a line (m, 2) at its points, from `width` points before to as many after, rad."""
+    count = len(line) - 1
+    at = np.arange(count + 1)
+    before, after = at - width, at + width
+    before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
+    one, two = line - line[before], line[after] - line
+    turn: Floats = np.abs(
+        np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], np.sum(one * two, axis=1))
+    )
+    return turn
+
+
 def smooth(line: Floats, times: int, closed: bool) -> Floats:
     """Return a line without its staircase; ends stay.
 
     Each point goes towards the middle of those beside it and a little further back again, so that an arc does
     not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
-
-    Parameters
-    ----------
-    line : ndarray (m, 2)
-        m.
-    times : int
-    closed : bool
-        Whether its ends are joined.
     """
     if len(line) < 4:
         return line
