@@ -15,6 +15,9 @@ from digiclay.core.steppers.closed_form import (
     solve_crossing,
     solve_pressed,
 )
+from digiclay.core.steppers.near_overflow import StepStart, find_loaded_path
+
+from tests.assemble import one_cell
 
 COUNT = 4000
 
@@ -105,3 +108,22 @@ def test_the_largest_tension_has_a_finite_square() -> None:
     # Sums of squares tell whether all is finite, and make up the metrics.
     most = Contact().tension(np.array([1e6]))
     assert np.isfinite(most * most).all()
+
+
+@pytest.mark.parametrize(
+    ("exponent", "lift", "bow", "deepest"),
+    [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)],
+)
+def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper(
+    exponent: float, lift: float, bow: float, deepest: float
+) -> None:
+    # It leaves the pin. Its way is a parabola whose mean lies `bow` above its chord, its middle 1.5 times that.
+    # The valve is open to the high reservoir, and a bend of the way without load would take the pin far down.
+    m, opening = 2000.0, np.ones((1, 1))
+    of_pin = {"exponent": exponent, "deviation": 9.0, "finger_deviation": bow, "lift": lift, "relaxed": 1.0}
+    start = StepStart(
+        opening, 1e3 * opening, **{name: np.array([value]) for name, value in of_pin.items()},
+        idle=np.array([False]),
+    )  # fmt: skip
+    rise = find_loaded_path(one_cell().cell, m, 1e6, 1.0, start).rise
+    assert rise == pytest.approx(-deepest / m, rel=1e-12)
