@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from digiclay.core.batch.run_together import run_together
+from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.contact import Contact
@@ -22,7 +23,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.stiff_runs import strict
-from tests.assemble import Record, make_system, one_cell, path, record, sample, scripted, under
+from tests.assemble import Motion, Record, make_system, one_cell, path, record, sample, scripted, under
 
 Floats = NDArray[np.float64]
 
@@ -240,3 +241,24 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x:
         assert force[-1].max() > 0.1
         # The times at which they press are rounded otherwise.
         np.testing.assert_allclose(after[number][-len(force) :], force, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("opening", [-0.5, 0.5, 1.0])
+@pytest.mark.parametrize("swing", [0.2, 1.0])
+def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening: float, swing: float) -> None:
+    # One step a period, of a quarter of the finger's swing: its way bends, it meets and leaves. A swing that
+    # the pin follows without a gap would be held by what the valve can do (`_limit`), here alone.
+    system = make_system(
+        Layout(1, 2), step=5e-3, contact=Contact(exponent=2e4), control=scripted(lambda t, x, y: opening)
+    )
+    finger = Motion(lambda t: 39.95e-3 + 1e-3 * swing * np.sin(2.0 * np.pi * t / 20e-3))
+    runs = []
+    for other in (40e-3, 95e-3):  # the second is 55 mm in the finger: an exponent of 1100
+        state = begin(system)
+        state.rows[0, 1] = other
+        runs.append(record(system, finger, 40, state))
+    alone, beside = runs
+    assert alone.force[:, 0].max() > 0.0 or opening < 0.0
+    # Rounding: the same equations, solved another way.
+    np.testing.assert_allclose(beside.height[:, 0], alone.height[:, 0], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(beside.force[:, 0], alone.force[:, 0], rtol=1e-9, atol=1e-12)
