@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 
-from digiclay_paper.results import WAYS
+from digiclay_paper.results import DRAGS
 from digiclay_paper.scenes import COMPARED
 
 
@@ -57,7 +57,7 @@ def test_every_figure_has_its_data_beside_it(folder: Path) -> None:
             rows = list(csv.DictReader(file))
         assert len(rows) >= 8  # two curves of two points in each of two panels
         # Two panels have names for one axis.
-        named = set(WAYS)
+        named = set(DRAGS)
         numbers = [row[name] for row in rows for name in ("x", "y") if row[name] not in named]
         assert np.isfinite(np.array(numbers, dtype=float)).all()
         assert [row for row in rows if "panel" in row and not row["x_axis"]] == []

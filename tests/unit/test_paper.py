@@ -17,12 +17,13 @@ from digiclay.core.studies.speed_limits import Follows
 from digiclay_paper import scenes
 from digiclay_paper.claim import Claim, verdict
 from digiclay_paper.claims import carried_out
-from digiclay_paper.claims_following import tracking
-from digiclay_paper.claims_force import onset, trade
+from digiclay_paper.claims_following import largest_speed, tracking
+from digiclay_paper.claims_force import DEVIATIONS, WINDOWED, deviations, onset, trade
 from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page
 from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
 from digiclay_paper.simulations import sessions
+from digiclay_paper.windows import WINDOWS, measure_windows
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
@@ -30,7 +31,7 @@ GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 def results(*swings: Swing, **bad: Follows) -> Results:
     """Return results that follow everything but what is bad, by method."""
     simple = {(method, name): bad.get(method, GOOD) for method in scenes.METHODS for name in WAYS}
-    session = Session(resolve({}), {}, {}, {}, [], 0.0)
+    session = Session(resolve({}), {}, {}, {}, [], 0.0, {})
     return Results(simple=simple, swings=list(swings), printed={scenes.METHODS[0]: session})
 
 
@@ -91,11 +92,65 @@ def test_a_loop_that_never_oscillates_differs_from_the_paper() -> None:
     assert "none up to K_f = 5 1/N" in claim.measured
 
 
-def test_a_loop_that_oscillates_at_high_gain_does_as_the_paper_says() -> None:
-    claim = onset(results(*CALM_THEN_WILD))
-    assert claim.verdict == "holds"
+def test_a_loop_that_oscillates_only_beyond_the_gain_of_the_session_is_not_all_of_the_papers() -> None:
+    found = results(*CALM_THEN_WILD)
+    claim = onset(found)
+    assert claim.verdict == "holds in part"
     assert "at 50 1/N (amplitude 0.200 N, 10 Hz)" in claim.measured
-    assert "are below the onset" in claim.why  # the scene's own K_f is 5 1/N
+    assert "are below the onset, 10 times this K_f" in claim.why  # the scene's own K_f is 5 1/N
+    scene = resolve({"control": {"method": "virtual_master", "force_gain": 60.0}})
+    found.printed[scenes.METHODS[0]] = found.printed[scenes.METHODS[0]]._replace(scene=scene)
+    assert onset(found).verdict == "holds"
+
+
+@pytest.mark.parametrize(
+    ("slow", "verdict"),
+    [({}, "holds"), ({"a valley": 14e-3}, "holds in part"), ({"up": None}, "holds in part")],
+)
+def test_speed_counts_along_every_way_and_not_along_the_ridge_alone(
+    slow: dict[str, float | None], verdict: str
+) -> None:
+    found, (one, two) = results(), scenes.METHODS
+    found.printed[two] = found.printed[one]
+    found.fastest = {(method, way): 20e-3 for method in scenes.METHODS for way in WAYS}
+    found.fastest |= {(two, way): speed for way, speed in slow.items() if way in WAYS}
+    found.lifting = {one: 20e-3, two: slow.get("up", 20e-3)}
+    assert largest_speed(found).verdict == verdict
+
+
+@pytest.mark.parametrize(("height", "verdict"), [(1.6, "holds"), (1.4, "holds in part"), (None, "holds")])
+def test_deviations_count_in_each_of_the_papers_windows(height: float | None, verdict: str) -> None:
+    known = dict.fromkeys((*DEVIATIONS, *WINDOWED), 1.0)
+    session, found = results().printed[scenes.METHODS[0]]._replace(metrics={**known, "set_point": 0.4}), {}
+    for method, share in zip(scenes.METHODS, (1.0, 2.0), strict=True):
+        metrics = {name: share * value for name, value in known.items()} | {"set_point": 0.4}
+        windows = {window: dict(metrics) for window in WINDOWS}
+        found[method] = session._replace(metrics=metrics, windows=windows)
+    found[scenes.METHODS[1]].windows["valley alone"]["height_deviation"] = height
+    claim = deviations(replace(results(), printed=found, session=found))
+    assert claim.verdict == verdict
+    assert "5 to 10 s and 18 to 25 s (both), RFD: 1 and 2 N, ratio 2.0" in claim.measured
+
+
+def test_the_windows_of_the_paper_are_judged_together_and_alone() -> None:
+    # 0.4 N along the ridge, 0.6 N along the valley; one cell follows, 2 mm and 5 mm over the fingertip.
+    time = np.arange(0.0, 30.0, 0.01)
+    valley, nothing = time > 14.0, np.zeros(time.size)
+    tip = np.column_stack(
+        [np.zeros((time.size, 2)), np.where(valley, 35e-3, 38e-3), np.zeros((time.size, 4))]
+    )
+    force = np.where(valley, 0.6, 0.4)
+    history = {
+        "time": time, "total_force": force, "force": np.column_stack([force, nothing]), "fingertip": tip,
+        "height": np.full((time.size, 2), 40e-3), "position": np.array([[0.0, 0.0], [3e-3, 0.0]]),
+        "mode": np.tile([Mode.FORCE_FOLLOW, Mode.REST], (time.size, 1)),
+    }  # fmt: skip
+    found = measure_windows(Result(resolve({}), history, time.size, 1.0, {}))  # the set point is 0.4 N
+    # 5 s and 7 s: shares of 5/12 and 7/12, but for a row of 10 ms.
+    spread, share = (35.0**0.5) / 12.0, (7.0 / 12.0) ** 0.5
+    assert list(found["both"].values()) == pytest.approx([0.2 * share, 0.2 * spread, 3e-3 * spread], rel=1e-3)
+    assert list(found["ridge alone"].values()) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert list(found["valley alone"].values()) == pytest.approx([0.2, 0.0, 0.0], abs=1e-12)
 
 
 def test_the_trade_needs_a_response_that_gets_quicker_and_an_oscillation() -> None:

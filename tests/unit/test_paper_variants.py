@@ -40,7 +40,8 @@ def swing(gain: float, amplitude: float) -> Swing:
 def two_methods() -> dict[str, Session]:
     """Return sessions of which only the scenes count."""
     return {
-        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0) for method in METHODS
+        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0, {})
+        for method in METHODS
     }
 
 
