@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.base.modes import MEANINGS, Mode
+from digiclay.core.base.modes import MEANINGS
 from digiclay.core.control.transitions import BY_FORCE, BY_PLACE
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
@@ -23,7 +23,7 @@ from digiclay_paper.figures_session import details, heights_and_force
 from digiclay_paper.page import page
 from digiclay_paper.results import SESSION, WAYS, Results, Session, Swing
 from digiclay_paper.simulations import sessions
-from digiclay_paper.windows import WINDOWS, measure_windows
+from digiclay_paper.windows import WINDOWS
 
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
@@ -132,27 +132,6 @@ def test_deviations_count_in_each_of_the_papers_windows(height: float | None, ve
     claim = deviations(replace(results(), printed=found, session=found))
     assert claim.verdict == verdict
     assert "5 to 10 s and 18 to 25 s (both), RFD: 1 and 2 N, ratio 2.0" in claim.measured
-
-
-def test_the_windows_of_the_paper_are_judged_together_and_alone() -> None:
-    # 0.4 N along the ridge, 0.6 N along the valley; one cell follows, 2 mm and 5 mm over the fingertip.
-    time = np.arange(0.0, 30.0, 0.01)
-    valley, nothing = time > 14.0, np.zeros(time.size)
-    tip = np.column_stack(
-        [np.zeros((time.size, 2)), np.where(valley, 35e-3, 38e-3), np.zeros((time.size, 4))]
-    )
-    force = np.where(valley, 0.6, 0.4)
-    history = {
-        "time": time, "total_force": force, "force": np.column_stack([force, nothing]), "fingertip": tip,
-        "height": np.full((time.size, 2), 40e-3), "position": np.array([[0.0, 0.0], [3e-3, 0.0]]),
-        "mode": np.tile([Mode.FORCE_FOLLOW, Mode.REST], (time.size, 1)),
-    }  # fmt: skip
-    found = measure_windows(Result(resolve({}), history, time.size, 1.0, {}))  # the set point is 0.4 N
-    # 5 s and 7 s: shares of 5/12 and 7/12, but for a row of 10 ms.
-    spread, share = (35.0**0.5) / 12.0, (7.0 / 12.0) ** 0.5
-    assert list(found["both"].values()) == pytest.approx([0.2 * share, 0.2 * spread, 3e-3 * spread], rel=1e-3)
-    assert list(found["ridge alone"].values()) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-    assert list(found["valley alone"].values()) == pytest.approx([0.2, 0.0, 0.0], abs=1e-12)
 
 
 def test_the_trade_needs_a_response_that_gets_quicker_and_an_oscillation() -> None:
