@@ -110,20 +110,12 @@ def test_the_largest_tension_has_a_finite_square() -> None:
     assert np.isfinite(most * most).all()
 
 
-@pytest.mark.parametrize(
-    ("exponent", "lift", "bow", "deepest"),
-    [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)],
-)
-def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper(
-    exponent: float, lift: float, bow: float, deepest: float
-) -> None:
-    # It leaves the pin. Its way is a parabola whose mean lies `bow` above its chord, its middle 1.5 times that.
-    # The valve is open to the high reservoir, and a bend of the way without load would take the pin far down.
-    m, opening = 2000.0, np.ones((1, 1))
-    of_pin = {"exponent": exponent, "deviation": 9.0, "finger_deviation": bow, "lift": lift, "relaxed": 1.0}
-    start = StepStart(
-        opening, 1e3 * opening, **{name: np.array([value]) for name, value in of_pin.items()},
-        idle=np.array([False]),
-    )  # fmt: skip
-    rise = find_loaded_path(one_cell().cell, m, 1e6, 1.0, start).rise
-    assert rise == pytest.approx(-deepest / m, rel=1e-12)
+def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper() -> None:
+    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
+    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
+    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
+    exponent, lift, bow, deepest = np.array(cases).T
+    one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
+    start = StepStart(np.ones((1, 4)), weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
+    rise = find_loaded_path(one_cell().cell, 2000.0, 1e6, 1.0, start).rise
+    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
