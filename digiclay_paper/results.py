@@ -22,7 +22,7 @@ PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
 #: The simple trajectories: straight and level drags over the finger's height, m; and one more, less deep.
 RIDGE = "a ridge 15 mm high"
 WAYS = {"in the surface": Drag(height=-4.5e-3), RIDGE: Drag(height=TALL), "a valley": Drag(height=SINK)}
-DRAGS = WAYS | {"less deep in the surface": Drag(height=-1.5e-3)}
+DRAGS = WAYS | {"less deep": Drag(height=-1.5e-3)}
 #: How far ahead of the finger cells are looked at that do not feel it yet, m.
 AHEAD = (9e-3, 12e-3)
 #: The scene without a change, among its variants.

@@ -62,7 +62,7 @@ def test_cells_ahead_that_stay_up_are_not_lowered() -> None:
     stays = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
     assert ahead(Results(dragged=dragged(it_I=stays, it_II=EASY))).verdict == "differs"
     assert ahead(Results(dragged=dragged(it_I=EASY._replace(ahead=None)))).verdict == "differs"
-    shallow = {(AS_IT_IS, METHODS[0], "less deep in the surface"): EASY._replace(ahead=0.0)}
+    shallow = {(AS_IT_IS, METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
     assert ahead(Results(dragged=dragged(it_I=EASY) | shallow)).verdict == "holds in part"
 
 
