@@ -36,7 +36,7 @@ DEVIATIONS = {
 #: Of them, what is compared in the paper's windows, too.
 WINDOWED = {
     "rfd": ("RFD", 1.0, "N"), "force_deviation": ("total force", 1.0, "N"),
-    "height_deviation": ("height", MM, "mm"),
+    "height_deviation": ("height under the finger", MM, "mm"),
 }  # fmt: skip
 
 

@@ -128,12 +128,16 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
     for speed in extent.speeds:
         told(f"drag at {speed * 1e3:g} mm/s, {method}")
         results.tracks[method].append(track(found, Drag(height=TALL), speed)[0])
-    tried: dict[str, list[Follows]] = {RIDGE: results.tracks[method]}
+
+    def tried(one: Follows) -> None:
+        told(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
+        if name == RIDGE:
+            results.tracks[method].append(one)
+
     for name, way in WAYS.items():
-        told(f"fastest drag, {name}, {method}")
         results.fastest[method, name] = find_largest_speed(
-            found, way, results.criterion, low=extent.drags[0], high=extent.drags[1],
-            resolution=extent.resolution, told=tried.setdefault(name, []).append,
+            found, way, results.criterion,
+            low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
         )  # fmt: skip
     results.tracks[method].sort(key=lambda one: one.speed)
     results.lifting[method] = find_largest_speed(
