@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .results import Results
+from .results import FULL, QUICK, Results
 from .scenes import METHODS, NAMES
 
 __all__ = ["MM", "ONE", "SHORT", "TWO", "Claim", "speed", "times", "verdict"]
@@ -12,6 +12,8 @@ __all__ = ["MM", "ONE", "SHORT", "TWO", "Claim", "speed", "times", "verdict"]
 MM = 1e3
 ONE, TWO = METHODS
 SHORT = {name: NAMES[name].split(",")[0] for name in METHODS}
+#: Ends of the searches for a largest speed, m/s.
+FASTEST = {speeds[1] for one in (FULL, QUICK) for speeds in (one.drags, one.lifts)}
 HOLDS, PARTLY, DIFFERS = "holds", "holds in part", "differs"
 
 
@@ -31,7 +33,9 @@ def verdict(holds: list[bool]) -> str:
 
 def speed(found: float | None) -> str:
     """Write a largest speed, m/s."""
-    return "below the slowest tried" if found is None else f"{found * MM:.1f} mm/s"
+    if found is None:
+        return "below the slowest tried"
+    return f"{'at least ' if found in FASTEST else ''}{found * MM:.1f} mm/s"
 
 
 def times(results: Results) -> str:

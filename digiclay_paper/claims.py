@@ -42,7 +42,7 @@ def _blister(results: Results) -> Claim:
     for (method, shape, profile), done in results.blisters.items():
         one = blister_section(done)
         high = "high" if shape == "convex" else "deep"
-        rim = f", rim {one.rim * MM:.1f} mm beyond it" if one.rim > LIMITS.rim * one.relief else ""
+        rim = f", rim {one.pins * MM:.1f} mm beyond it" if one.pins > LIMITS.rim * one.relief else ""
         told.append(
             f"{SHORT[method]}, {shape}, {profile}: {one.relief * MM:.1f} mm {high} in the middle{rim}, "
             f"section rms {one.rms * MM:.1f}, at most {one.largest * MM:.1f} mm from its profile"

@@ -44,9 +44,9 @@ def _missed(found: dict[tuple[str, str], Follows], criterion: Criterion) -> str:
 
 
 def largest_speed(results: Results) -> Claim:
-    fast, lift = results.fastest, results.lifting
-    drag = ", ".join(f"{SHORT[method]} {speed(fast[method])}" for method in METHODS)
-    up = ", ".join(f"{SHORT[method]} {speed(lift[method])}" for method in METHODS)
+    lifts = {(method, "a lift straight up"): limit for method, limit in results.lifting.items()}
+    found = {key: limit for key, limit in (results.fastest | lifts).items() if key[0] in METHODS}
+    told = [f"{SHORT[method]}, {name}: {speed(limit)}" for (method, name), limit in found.items()]
     free = find_free_speed(results.printed[ONE].scene)
     control = results.printed[TWO].scene.control
     gain = getattr(control, "force_gain", 0.0) * getattr(control, "force_setpoint", 0.0)
@@ -57,7 +57,7 @@ def largest_speed(results: Results) -> Claim:
     )
     return Claim(
         f"Up to {PAPER_SPEED * MM:g} mm/s, and how far beyond",
-        f"Largest speed of a straight level drag of a ridge: {drag}; of a lift straight up: {up}",
-        verdict([(one or 0.0) >= PAPER_SPEED for one in fast.values()]),
+        "Largest speed of a straight level drag, and of a lift: " + "; ".join(told),
+        verdict([(limit or 0.0) >= PAPER_SPEED for limit in found.values()]),
         why,
     )

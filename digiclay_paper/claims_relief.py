@@ -44,7 +44,8 @@ def _parts(found: list[Section]) -> dict[str, Section]:
 
 
 def _told(one: Section) -> str:
-    rim = f", rim {one.rim * MM:.1f} mm over its middle" if one.rim > LIMITS.rim * one.relief else ""
+    rim = f", rim {one.rim * MM:.1f} mm over its middle, {one.pins * MM:.1f} mm by all pins of the {one.part}"
+    rim = rim if max(one.rim, one.pins) > LIMITS.rim * one.relief else ""
     low = abs(one.level) > LIMITS.level * one.middle
     level = f", its middle {one.level * MM:+.1f} mm from {one.middle * MM:.1f} mm" if low else ""
     holds = "" if one.meets(LIMITS) else " (missed)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .claim import MM, ONE, SHORT, TWO, Claim, verdict
 from .claims_force import MUCH
-from .results import AHEAD, AS_IT_IS, PAPER_SPEED, Dragged, Results, onset_among
+from .results import AHEAD, AS_IT_IS, DRAGS, PAPER_SPEED, Dragged, Results, onset_among
 from .scenes import PRESSED
 from .variants import GAUSSIAN, NO_RISE, STAGGERED
 
@@ -46,12 +46,12 @@ def ahead(results: Results) -> Claim:
         one = results.dragged[variant, method, name]
         if variant != AS_IT_IS or name not in DEPTH or one.ahead is None:
             continue
-        told.append(f"{SHORT[method]}, {name}: {one.ahead * MM:+.2f} mm")
+        told.append(f"{SHORT[method]}, {name}, {DEPTH[name] * MM:g} mm deep: {one.ahead * MM:+.2f} mm")
         if method == ONE:
             holds.append(-one.ahead > LOWERED * DEPTH[name])
     near, far = (f"{one * MM:g}" for one in AHEAD)
     return Claim(
-        "Method I lowers the cells ahead of a finger in the surface",
+        "Method I lowers the cells ahead of a finger in the surface, however deep",
         f"Mean height over the bed at rest, {near} to {far} mm ahead of the finger, of cells that do not "
         "feel it: " + "; ".join(told),
         verdict(holds or [False]),
@@ -61,7 +61,7 @@ def ahead(results: Results) -> Claim:
 
 
 #: How far the finger is in the surface, m.
-DEPTH = {"in the surface": 4.5e-3, "a valley": 10e-3}
+DEPTH = {name: -way.height for name, way in DRAGS.items() if way.height < 0.0}
 
 
 def escape(results: Results) -> Claim:

@@ -49,7 +49,8 @@ def _ahead(axes: Any, results: Results) -> None:
     near, far = (f"{one * MM:g}" for one in AHEAD)
     axes.axvline(0.0, color=INK, linewidth=1.0, linestyle=DASHED)
     axes.set(xlabel="height over the bed at rest (mm)", title=f"Cells {near} to {far} mm ahead")
-    axes.set_xlim(1.15 * min(found.values()), 0.1 * -min(found.values()))
+    lowest, highest = min(found.values()), max(found.values())
+    axes.set_xlim(1.15 * lowest, max(-0.1 * lowest, 1.5 * highest))
     axes.legend(loc="upper left", borderaxespad=0.0)
 
 

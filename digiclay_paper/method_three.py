@@ -44,12 +44,9 @@ def compare_methods(results: Results) -> Iterator[str]:
         speed = f"drag at {PAPER_SPEED * 1e3:g} mm/s, {way}"
         yield _row(f"{speed}: RFD (N)", [one.rfd if one else None for one in found])
         yield _row(f"{speed}: largest lag (mm)", [one.lag * 1e3 if one else None for one in found])
-    for name, limits in (
-        ("largest speed of a ridge drag", results.fastest),
-        ("largest speed of a lift", results.lifting),
-    ):
-        known = [limits.get(method) for method in methods]
-        yield _row(f"{name} (mm/s)", [None if one is None else one * 1e3 for one in known])
+    drags = {f"drag, {way}": [results.fastest.get((method, way)) for method in methods] for way in WAYS}
+    for name, known in {**drags, "lift": [results.lifting.get(method) for method in methods]}.items():
+        yield _row(f"largest speed, {name} (mm/s)", [None if one is None else one * 1e3 for one in known])
     for title, measure in SECTIONS:
         values = [measure(results.session[method]) * 1e3 for method in methods]
         yield _row(f"{title} (mm)", list(values))

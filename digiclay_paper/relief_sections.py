@@ -40,7 +40,7 @@ class Limits(NamedTuple):
     rms, largest : float
         Of the deviation, as shares of the height of the relief asked for in the section.
     rim : float
-        How much higher (in a crease: lower) than in the middle its top may be anywhere, as such a share.
+        How much higher (in a crease: lower) than in the middle any of its pins may be, as such a share.
     level : float
         How far its middle may be from the height asked for there, as a share of that.
     """
@@ -80,6 +80,8 @@ class Section(NamedTuple):
         The height asked for in the middle, m; in a crease: the depth.
     rim : float
         How much higher (in a crease: lower) than in the middle the section is anywhere, m.
+    pins : float
+        The same of all pins of the boss or crease, on the section or beside it, m.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Section(NamedTuple):
     level: float
     middle: float
     rim: float
+    pins: float
 
     @property
     def relief(self) -> float:
@@ -109,7 +112,8 @@ class Section(NamedTuple):
     def meets(self, limits: Limits) -> bool:
         """Return whether the section has the shape asked for."""
         allowed = limits.rms, limits.largest, limits.rim
-        shape = np.array([self.rms, self.largest, self.rim]) <= np.array(allowed) * self.relief + TINY
+        rim = max(self.rim, self.pins)
+        shape = np.array([self.rms, self.largest, rim]) <= np.array(allowed) * self.relief + TINY
         return bool(np.all(shape)) and abs(self.level) <= limits.level * self.middle
 
 
@@ -130,6 +134,7 @@ def sections(session: Session) -> Iterator[Section]:
     slant = (x - END) - (y - RIDGE)
     ridge, valley = (np.abs(y - line) < ON for line in (RIDGE, VALLEY))
     straight, end = np.abs(x) < LEVEL, np.abs(x - END) < ON
+    parts = {"ridge": near & straight, "mound": near, "valley": far}
     # Name, part, cells, where they are on their line, and the cells in its middle.
     lines = (
         ("along ridge and mound", "mound", ridge, x, ridge & end),
@@ -144,8 +149,8 @@ def sections(session: Session) -> Iterator[Section]:
             sign = -1.0 if part == "valley" else 1.0
             high, wanted = (float(np.median(sign * heights[middle])) for heights in (found, asked))
             scale, rim = high / wanted if wanted else 1.0, float((sign * found)[cells].max()) - high
-            drawn = scale * asked[cells]
-            yield Section(name, part, where[cells], found[cells], drawn, high - wanted, wanted, rim)
+            drawn, pins = scale * asked[cells], float((sign * found)[parts[part]].max()) - high
+            yield Section(name, part, where[cells], found[cells], drawn, high - wanted, wanted, rim, pins)
 
 
 def blister_section(done: Result) -> Section:
@@ -160,6 +165,6 @@ def blister_section(done: Result) -> Section:
     found, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
     asked = evaluate_share(scene.blister, distance)[row] * found[middle]
     high = sign * float(found[middle])
-    rim = float((sign * found[row]).max()) - high
-    along = place[row, 0]
-    return Section("blister", "blister", along, found[row], asked, high - sign * wanted, sign * wanted, rim)
+    rim, pins = (float((sign * cells).max()) - high for cells in (found[row], found))
+    level, wanted = high - sign * wanted, sign * wanted
+    return Section("blister", "blister", place[row, 0], found[row], asked, level, wanted, rim, pins)

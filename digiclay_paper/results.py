@@ -13,18 +13,16 @@ from numpy.typing import NDArray
 from .scenes import SINK, TALL
 
 __all__ = [
-    "AHEAD", "AS_IT_IS", "BEYOND", "FULL", "PAPER_SPEED", "QUICK", "SESSION", "WAYS", "Dragged", "Extent",
-    "Located", "Results", "Session", "Swing", "onset_among",
+    "AHEAD", "AS_IT_IS", "BEYOND", "DRAGS", "FULL", "PAPER_SPEED", "QUICK", "RIDGE", "SESSION", "WAYS",
+    "Dragged", "Extent", "Located", "Results", "Session", "Swing", "onset_among",
 ]  # fmt: skip
 
 #: The speed up to which the paper says both methods track, m/s, and its session.
 PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
-#: The simple trajectories: straight and level drags over the finger's height, m.
-WAYS = {
-    "in the surface": Drag(height=-4.5e-3),
-    "a ridge 15 mm high": Drag(height=TALL),
-    "a valley": Drag(height=SINK),
-}
+#: The simple trajectories: straight and level drags over the finger's height, m; and one more, less deep.
+RIDGE = "a ridge 15 mm high"
+WAYS = {"in the surface": Drag(height=-4.5e-3), RIDGE: Drag(height=TALL), "a valley": Drag(height=SINK)}
+DRAGS = WAYS | {"less deep": Drag(height=-1.5e-3)}
 #: How far ahead of the finger cells are looked at that do not feel it yet, m.
 AHEAD = (9e-3, 12e-3)
 #: The scene without a change, among its variants.
@@ -183,6 +181,9 @@ class Session(NamedTuple):
         When the finger was lost though it rose no faster than a pin can, s.
     followers : float
         Mean number of cells that follow the force while there are any.
+    windows : dict
+        RFD, N, and standard deviations over time of total force, N, and of the height under the finger, m,
+        by the names of `windows.WINDOWS` and of the metrics.
     """
 
     scene: Scene
@@ -191,6 +192,7 @@ class Session(NamedTuple):
     metrics: dict[str, float | None]
     lost: list[float]
     followers: float
+    windows: dict[str, dict[str, float | None]]
 
 
 @dataclass
@@ -205,7 +207,7 @@ class Results:
     slow : how many times as long the latter takes
     simple : the simple trajectories at 15 mm/s, by method and name
     tracks : ridge drags at several speeds
-    fastest, lifting : largest speed of a ridge drag, and of a lift, m/s
+    fastest, lifting : largest speed of a drag, by method and name, and of a lift, by method, m/s
     swings, details : the sweep of the gains; its sessions, by gains
     quicker : the same sweep with a quicker device, and how fast its pins are without load, m/s
     wild : the session's first seconds with Method I at the first gain that oscillates, if one does
@@ -223,7 +225,7 @@ class Results:
     slow: float = 1.0
     simple: dict[tuple[str, str], Follows] = field(default_factory=dict)
     tracks: dict[str, list[Follows]] = field(default_factory=dict)
-    fastest: dict[str, float | None] = field(default_factory=dict)
+    fastest: dict[tuple[str, str], float | None] = field(default_factory=dict)
     lifting: dict[str, float | None] = field(default_factory=dict)
     swings: list[Swing] = field(default_factory=list)
     details: dict[tuple[float, float], tuple[Result, float]] = field(default_factory=dict)

@@ -19,9 +19,22 @@ from digiclay.core.studies.method_trials import find_free_speed, find_unintended
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, find_largest_speed, track
 
 from . import scenes
-from .results import AS_IT_IS, BEYOND, PAPER_SPEED, SESSION, WAYS, Extent, Results, Session, Swing
+from .results import (
+    AS_IT_IS,
+    BEYOND,
+    DRAGS,
+    PAPER_SPEED,
+    RIDGE,
+    SESSION,
+    WAYS,
+    Extent,
+    Results,
+    Session,
+    Swing,
+)
 from .scenes import METHODS, QUICKER, SINK, TALL, THIRD, Device
 from .variants import dragged, vary
+from .windows import measure_windows
 
 __all__ = ["sessions", "simulate"]
 
@@ -35,14 +48,7 @@ Told = Callable[[str], None]
 
 
 def simulate(extent: Extent, told: Told) -> Results:
-    """Simulate all of it; `told` hears what comes next, and may raise KeyboardInterrupt.
-
-    Parameters
-    ----------
-    extent : Extent
-        How many speeds and gains.
-    told : callable
-    """
+    """Simulate all of it; `told` hears what comes next, and may raise KeyboardInterrupt."""
     results = Results()
     for method in METHODS:
         _form_blisters(results, method, told)
@@ -110,29 +116,30 @@ def _go_wild(results: Results, told: Told) -> None:
 def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
     """Measure how fast a finger a method follows; every drag of the bisection is one more of `tracks`."""
     found = load(find(SESSION), [Setting("control.method", method)])
-    for name, way in WAYS.items():
+    for name, way in DRAGS.items():
         told(f"drag at {PAPER_SPEED * 1e3:g} mm/s, {name}, {method}")
-        one, done = dragged(found, way)
-        results.dragged[AS_IT_IS, method, name], results.simple[method, name] = one, one.follows
-        if way.height == TALL:
+        results.dragged[AS_IT_IS, method, name], done = one, _ = dragged(found, way)
+        if name in WAYS:
+            results.simple[method, name] = one.follows
+        if name == RIDGE:
             _, start, end = way.path(PAPER_SPEED, found.actuator.rest_height)
             results.drags[method] = done, start, end
     results.tracks[method] = []
     for speed in extent.speeds:
         told(f"drag at {speed * 1e3:g} mm/s, {method}")
         results.tracks[method].append(track(found, Drag(height=TALL), speed)[0])
-    told(f"fastest drag, {method}")
-    tracks = results.tracks[method]
 
     def tried(one: Follows) -> None:
-        told(f"drag at {one.speed * 1e3:.1f} mm/s, {method}")
-        tracks.append(one)
+        told(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
+        if name == RIDGE:
+            results.tracks[method].append(one)
 
-    results.fastest[method] = find_largest_speed(
-        found, Drag(height=TALL), results.criterion,
-        low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
-    )  # fmt: skip
-    tracks.sort(key=lambda one: one.speed)
+    for name, way in WAYS.items():
+        results.fastest[method, name] = find_largest_speed(
+            found, way, results.criterion,
+            low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, told=tried,
+        )  # fmt: skip
+    results.tracks[method].sort(key=lambda one: one.speed)
     results.lifting[method] = find_largest_speed(
         found, Lift(), results.criterion,
         low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
@@ -141,17 +148,7 @@ def _track(results: Results, method: str, extent: Extent, told: Told) -> None:
 
 
 def sessions(results: Results, told: Told, session: str = SESSION) -> None:
-    """Run the paper's session at its times, and again slowly where a method loses the finger.
-
-    Parameters
-    ----------
-    results : Results
-        Takes them in.
-    told : callable
-        Hears what comes next.
-    session : str
-        The sample scene.
-    """
+    """Run the paper's session at its times, and again slowly where a method loses the finger."""
     for method in METHODS:
         told(f"the paper's session, {method}")
         found = load(find(session), [Setting("control.method", method)])
@@ -188,7 +185,8 @@ def _boiled_down(done: Result) -> Session:
     followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
-    return Session(done.scene, kept, detail, done.figures, find_unintended_losses(done), followers)
+    lost, windows = find_unintended_losses(done), measure_windows(done)
+    return Session(done.scene, kept, detail, done.figures, lost, followers, windows)
 
 
 def _swing(

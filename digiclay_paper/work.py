@@ -29,21 +29,7 @@ SURFACES = "fig10_surfaces"
 
 
 def produce(folder: Path, extent: Extent, told: Told) -> list[str]:
-    """Simulate, draw and write into an existing folder; return the claims' verdicts as lines.
-
-    Parameters
-    ----------
-    folder : Path
-    extent : Extent
-        How many speeds and gains.
-    told : callable
-        Hears what comes next.
-
-    Raises
-    ------
-    OutputError
-        When matplotlib is missing, or a file cannot be written.
-    """
+    """Simulate, draw and write into an existing folder; return the claims' verdicts as lines."""
     started = time.perf_counter()
     results = simulate(extent, told)
     took = time.perf_counter() - started
@@ -129,7 +115,8 @@ def _numbers(results: Results) -> dict[str, Any]:
         "session": {method: results.session[method].metrics for method in methods},
         "session_at_its_own_times": {method: results.printed[method].metrics for method in methods},
         "lost_at_its_own_times": {method: results.printed[method].lost for method in methods},
-        "largest_drag_speed": results.fastest,
+        "windows_of_the_paper": {method: results.printed[method].windows for method in methods},
+        "largest_drag_speed": {", ".join(key): speed for key, speed in results.fastest.items()},
         "largest_lift_speed": results.lifting,
         "drags": {
             method: [_finite(asdict(one)) for one in results.tracks.get(method, [])] for method in methods
@@ -151,6 +138,7 @@ def _numbers(results: Results) -> dict[str, Any]:
                     "rms": one.rms,
                     "largest": one.largest,
                     "rim": one.rim,
+                    "rim_by_pins": one.pins,
                     "relief": one.relief,
                     "level": one.level,
                     "meets": one.meets(LIMITS),

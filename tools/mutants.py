@@ -1,4 +1,4 @@
-"""Mutation test: one change at a time in the core's physics and control, under its tests.
+"""Mutation test: one change at a time in the core's physics, engine, control and metrics, under its tests.
 
 cosmic-ray makes the mutants. Its own runner writes each one into the source file and starts a Python for it;
 here each is loaded in a fork of one process that has numpy, SciPy and pytest imported already. No file is

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from digiclay.core.batch.run_together import run_together
+from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.contact import Contact
@@ -22,7 +23,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.stiff_runs import strict
-from tests.assemble import Record, make_system, one_cell, path, record, sample, scripted, under
+from tests.assemble import Motion, Record, make_system, one_cell, path, record, sample, scripted, under
 
 Floats = NDArray[np.float64]
 
@@ -240,3 +241,15 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x:
         assert force[-1].max() > 0.1
         # The times at which they press are rounded otherwise.
         np.testing.assert_allclose(after[number][-len(force) :], force, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("opening", "swing"), [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])
+def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening: float, swing: float) -> None:
+    # A step is a quarter of the finger's swing: its way bends. It meets and leaves the pin in each swing.
+    contact, control = Contact(exponent=2e4), scripted(lambda t, x, y: opening)
+    system = make_system(Layout(1, 2), step=5e-3, contact=contact, control=control)
+    finger = Motion(lambda t: 39.95e-3 + 1e-3 * swing * np.sin(2.0 * np.pi * t / 20e-3))
+    states = begin(system), begin(system)
+    states[1].rows[0, 1] = 95e-3  # 55 mm in the finger: an exponent of 1100
+    alone, beside = (record(system, finger, 40, state).height[:, 0] for state in states)
+    np.testing.assert_allclose(beside, alone, rtol=0.0, atol=1e-12)  # rounding: solved another way

@@ -140,6 +140,27 @@ def test_a_cell_behind_a_traveling_finger_is_frozen_at_its_command() -> None:
     assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
 
 
+@pytest.mark.parametrize("toward", [(1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)])
+def test_the_blister_s_edge_is_the_mean_height_of_the_ring_ahead_and_abeam(toward: tuple[float, ...]) -> None:
+    # On a bed that slopes both ways; behind lies what the finger has formed, no measure of the ground.
+    measured = seen({MIDDLE: 0.1}, {MIDDLE: Mode.FORCE_FOLLOW})
+    measured.height[:] += 0.2 * BED.x - 0.3 * BED.y
+    # 1e-9: rounding in the places of cells on the border and abeam.
+    ring = [c for c in range(BED.count) if BLISTER.radius - 1e-9 < distance(c) < BLISTER.edge_radius]
+    ahead = [c for c in ring if BED.x[c] * toward[0] + BED.y[c] * toward[1] > -1e-9]
+    memory, _ = ordered(measured, Patch(heading=Heading(0.0, 0.0, *toward), felt=True))
+    assert len(ring) / 2 <= len(ahead) < len(ring)
+    assert memory.edge == pytest.approx(measured.height[ahead].mean(), abs=1e-15)
+
+
+@pytest.mark.parametrize(("flat", "mode"), [(2.9e-3, Mode.FROZEN), (3.1e-3, Mode.BLISTER)])
+def test_only_cells_beyond_the_flat_top_freeze_behind_the_finger(flat: float, mode: Mode) -> None:
+    control = replace(CONTROL, blister=replace(BLISTER, flat_radius=flat))
+    measured = seen({MIDDLE: 0.04}, {MIDDLE: Mode.FORCE_FOLLOW, MIDDLE - 1: Mode.BLISTER})  # 3 mm behind
+    _, orders = control.command(Patch(heading=Heading(0.0, 0.0, 1.0, 0.0), felt=True), measured)
+    assert orders.mode[MIDDLE - 1] == mode
+
+
 def test_a_finger_that_jumps_farther_than_r_vm_is_counted_as_lost() -> None:
     memory, _ = CONTROL.locate(Patch(x=-9e-3, felt=True), seen({MIDDLE: 0.1}))
     assert memory.losses == 1

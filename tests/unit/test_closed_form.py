@@ -15,6 +15,9 @@ from digiclay.core.steppers.closed_form import (
     solve_crossing,
     solve_pressed,
 )
+from digiclay.core.steppers.near_overflow import StepStart, find_loaded_path
+
+from tests.assemble import one_cell
 
 COUNT = 4000
 
@@ -105,3 +108,14 @@ def test_the_largest_tension_has_a_finite_square() -> None:
     # Sums of squares tell whether all is finite, and make up the metrics.
     most = Contact().tension(np.array([1e6]))
     assert np.isfinite(most * most).all()
+
+
+def test_a_finger_pushes_a_pin_as_deep_as_it_comes_within_the_step_and_no_deeper() -> None:
+    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
+    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
+    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
+    exponent, lift, bow, deepest = np.array(cases).T
+    one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
+    start = StepStart(np.ones((1, 4)), weights, exponent, 9.0 * one, bow, lift, relaxed=one, idle=loaded)
+    rise = find_loaded_path(one_cell().cell, 2000.0, 1e6, 1.0, start).rise
+    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)

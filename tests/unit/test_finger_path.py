@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-#: 21 pins along x, 3 mm apart; the finger goes over all of them in 201 rows, 50 mm up.
-PLACE = np.column_stack([np.linspace(-30e-3, 30e-3, 21), np.zeros(21)])
-TIP = np.zeros((201, 7))
-TIP[:, 0], TIP[:, 2], TIP[:, 3] = np.linspace(-30e-3, 30e-3, 201), 50e-3, 1.0
+#: 21 pins 3 mm apart on a slanting line; the finger goes over all of them in 201 rows, 50 mm up.
+LINE, ALONG = np.linspace(-30e-3, 30e-3, 21), (0.6, 0.8)
+PLACE, TIP = np.outer(LINE, ALONG), np.zeros((201, 7))
+TIP[:, :2], TIP[:, 2], TIP[:, 3] = np.outer(np.linspace(-30e-3, 30e-3, 201), ALONG), 50e-3, 1.0
 ALL = np.ones(201, dtype=bool)
 
 
@@ -32,17 +32,19 @@ def test_a_ridge_over_the_path_has_its_height_over_it() -> None:
 
 def test_each_pin_is_judged_by_the_height_the_finger_had_there() -> None:
     climbing = TIP.copy()
-    climbing[:, 2] += 0.1 * climbing[:, 0]
-    final = 50e-3 + 0.1 * PLACE[:, 0]
+    climbing[:, 2] += 0.1 * np.linspace(-30e-3, 30e-3, 201)
+    final = 50e-3 + 0.1 * LINE
     # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm higher.
     np.testing.assert_allclose(errors(final, tip=climbing), -0.15, atol=0.031)
 
 
 def test_pins_the_finger_did_not_go_on_from_do_not_count() -> None:
     # Of the 21 pins the last four are less than 11 mm before the end of the way.
-    final = np.where(PLACE[:, 0] > 18.5e-3, 90e-3, 50e-3)
+    final = np.where(LINE > 18.5e-3, 90e-3, 50e-3)
     found = errors(final)
     assert (len(found), found.max()) == (17, 0.0)
+    # With 12 mm, as if none is given, the last of them is on the border.
+    assert len(measure_ridge_errors(PLACE, final, TIP, ALL)) in (16, 17)
 
 
 def test_a_press_without_travel_leaves_no_ridge() -> None:

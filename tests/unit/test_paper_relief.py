@@ -34,7 +34,7 @@ def session(method: str, followers: int) -> Session:
         "total_force": np.full(97, 0.4), "set_point": np.full(97, 0.4), "following": np.full(97, followers),
         "fingertip": tip, "position": place, "height": np.full((1, len(place)), REST),
     }  # fmt: skip
-    return Session(scene, history, {}, {}, [], 0.0)
+    return Session(scene, history, {}, {}, [], 0.0, {})
 
 
 def formed(bare: Session, over: Floats) -> Session:
@@ -102,6 +102,17 @@ def test_a_rim_alone_fails_however_small_the_deviation_is_on_the_whole(bare: Ses
     assert one.rms < LIMITS.rms * one.relief
     assert one.largest < LIMITS.largest * one.relief
     assert not one.meets(LIMITS)
+
+
+def test_a_rim_beside_the_sections_counts(bare: Session) -> None:
+    # 9 mm to the left of the mound's middle and 3 mm off the ridge, where no section goes.
+    over = asked_for(bare)
+    over[at(bare, 12, -24)] = MOUND + 1.5e-3
+    found = {one.name: one for one in sections(formed(bare, over))}
+    assert [name for name, one in found.items() if not one.meets(LIMITS)] == [
+        "along ridge and mound", "across the mound", "slantwise across the mound",
+    ]  # fmt: skip
+    assert found["across the mound"].pins == pytest.approx(1.5e-3, rel=1e-9)
 
 
 def test_a_crease_with_a_hump_is_no_valley(bare: Session) -> None:

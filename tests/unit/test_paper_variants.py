@@ -40,7 +40,8 @@ def swing(gain: float, amplitude: float) -> Swing:
 def two_methods() -> dict[str, Session]:
     """Return sessions of which only the scenes count."""
     return {
-        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0) for method in METHODS
+        method: Session(resolve({"control": {"method": method}}), {}, {}, {}, [], 0.0, {})
+        for method in METHODS
     }
 
 
@@ -61,6 +62,8 @@ def test_cells_ahead_that_stay_up_are_not_lowered() -> None:
     stays = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
     assert ahead(Results(dragged=dragged(it_I=stays, it_II=EASY))).verdict == "differs"
     assert ahead(Results(dragged=dragged(it_I=EASY._replace(ahead=None)))).verdict == "differs"
+    shallow = {(AS_IT_IS, METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
+    assert ahead(Results(dragged=dragged(it_I=EASY) | shallow)).verdict == "holds in part"
 
 
 def test_a_method_that_swings_at_some_gain_has_not_escaped() -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.engine.simulation import begin
+from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import Rows, State, make_initial_state
 from digiclay.core.model.layout import Layout
 
-from tests.assemble import make_system, one_cell, path, record
+from tests.assemble import AWAY, make_system, one_cell, path, record
 
 
 @pytest.mark.parametrize("owners", [(1, 1), (5, 2), (4, 7), (5, 2, 3, 1)])
@@ -83,3 +83,22 @@ def test_modes_are_the_gathered_cells_own() -> None:
 )
 def test_a_part_that_is_left_out_owns_no_row(absent: dict[str, None], rows: int) -> None:
     assert begin(one_cell(dead_time=0.0, **absent)).rows.shape[0] == rows + 3  # command, target, force
+
+
+def test_as_many_periods_are_simulated_as_asked() -> None:
+    assert [state.period for state in periods(one_cell(), [AWAY], begin(one_cell()), 600)][-1] == 600
+
+
+@pytest.mark.parametrize(
+    ("disc", "held"),
+    [((3, -6, 5), True), ((5, -6, 5), True), ((3, -8, 5), True), ((3, -6, 7), True), ((3, -6, 9), False),
+     ((6.1, -6, 5), False), ((3, -2.9, 5), False), ((-6, 3, 5), False)],
+)  # fmt: skip
+def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around_it(
+    disc: tuple[float, ...], held: bool
+) -> None:
+    system = make_system(Layout(11, 11))
+    select, (x, y) = system.selection, system.grid.positions.T
+    first = select.update(begin(system), None, (3e-3, -6e-3, 5e-3)).active
+    assert first.cells.tolist() == np.flatnonzero(np.hypot(x - 3e-3, y + 6e-3) < 8e-3).tolist()
+    assert select.holds(first, 0, None, tuple(1e-3 * one for one in disc)) == held

@@ -147,6 +147,12 @@ def test_the_contact_loss_is_the_share_of_the_gap_between_first_and_last_contact
     assert compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
 
 
+def test_the_contact_loss_weighs_the_first_and_the_last_row_of_contact():
+    # A row a second: one between two others stands for 1 s, the first and the last for half of it.
+    for force, share in (([1, 0, 0, 1], 2 / 3), ([0, 1, 0, 1, 1], 2 / 7), ([0, 1, 1, 0], 0.0), ([1], 0.0)):
+        assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(share, rel=ROUNDING)
+
+
 def test_lifting_at_the_end_is_no_contact_loss():
     assert compute_contact_loss_share(TIME, np.where(TIME < 4.0, 0.4, 0.0)) == 0.0
 
