@@ -10,6 +10,8 @@ place of the finger, and ahead of it as far as the speed of the pins asks for.
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 from ..model.contact import Contact
 from ..model.fingertip import Fingertip
 from ..model.null_parts import Unrelaxed
@@ -21,7 +23,8 @@ from .hybrid_controller import HybridControl
 from .hybrid_parameters import Hybrid
 from .lead_profile import LeadProfile
 from .pulp_estimate import PulpEstimate
-from .virtual_master import HEAVIEST
+from .virtual_master import HEAVIEST, VirtualMaster
+from .virtual_master import build as build_master
 
 __all__ = ["Hybrid", "HybridControl", "build"]
 
@@ -50,7 +53,10 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
     noise = max(device.force_floor / 5.0, QUIET)
     spread = Spread(
-        parameters.acceleration / max(noise / STEADY, 1.0), parameters.turn, parameters.size_drift, parameters.underside_error
+        parameters.acceleration / max(noise / STEADY, 1.0),
+        parameters.turn,
+        parameters.size_drift,
+        parameters.underside_error,
     )
     share = parameters.speed_share
     return HybridControl(
@@ -69,4 +75,14 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
         max(parameters.felt_force, device.force_floor),
         noise,
         max(touch.fingertip.length, touch.fingertip.width) + BESIDE,
+        build_master(
+            VirtualMaster(
+                **{
+                    item.name: getattr(parameters, item.name)
+                    for item in fields(VirtualMaster)
+                    if hasattr(parameters, item.name)
+                }
+            ),
+            device,
+        ),
     )

@@ -12,20 +12,22 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Constants
 from ..model.control_interface import Commands, Measurement
+from ..model.layout import enclose_discs
 from .blister import Blister
 from .blister_cells import BlisterRule
 from .device_info import DeviceInfo
 from .finger_estimate import Estimate, FingerFilter
 from .flow_servo import FlowServo
 from .force_height import Reach, find_top, lead_heights
-from .hybrid_memory import Follower
+from .hybrid_memory import UNKNOWN, Follower
 from .hybrid_parameters import Hybrid
 from .hybrid_rows import OWN_ROWS, OwnRows, number_rows
 from .lead_profile import LeadProfile
 from .led_blister import LedBlister, Region
-from .master_memory import LossRule, Phase
+from .master_memory import LossRule, Master, Phase
 from .pulp_estimate import PulpEstimate
 from .travel import Heading, update_heading
+from .virtual_master import VirtualMasterControl
 
 __all__ = ["HybridControl"]
 
@@ -38,6 +40,9 @@ LEARNED = 0.5
 HELD, SLOW, EVERY = 0.02, 20e-3, 2
 #: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
 JUMP = 1.5
+#: Share of the set point by which predictions of the force may be off, rms over that many control periods:
+#: beyond it the model of the device or fingertip is wrong, and Method I takes over until the finger is lost.
+DOUBTED, PERIODS = 0.4, 20.0
 
 
 class Moved(NamedTuple):
@@ -74,6 +79,8 @@ class HybridControl:
         Standard deviation of forces, N.
     contact_radius : float
         Within which the finger may touch, m.
+    substitute : VirtualMasterControl
+        Method I, for a finger that the model does not predict.
     """
 
     parameters: Hybrid
@@ -86,6 +93,7 @@ class HybridControl:
     felt: float
     noise: float
     contact_radius: float
+    substitute: VirtualMasterControl
 
     name = "hybrid"
 
@@ -128,11 +136,22 @@ class HybridControl:
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the finger; see `Controller`."""
+        if memory.master.phase is not Phase.IDLE:
+            return self._substitute(memory, touched)
         idle, period = memory.phase is Phase.IDLE, memory.period + 1
         estimate = memory.estimate if idle else self.finger.predict(memory.estimate)
         memory = memory._replace(period=period, estimate=estimate)
         memory = self._observe(memory, touched) if touched.force.size else self._loss.wait(memory)
         return memory, self._surface.find_disc(memory)
+
+    def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
+        """Let Method I follow the finger; the next one is predicted again."""
+        master, disc = self.substitute.locate(memory.master, touched)
+        if memory.led_radius:
+            led = (memory.led_x, memory.led_y, memory.led_radius)
+            disc = enclose_discs(disc, led) if disc else led
+        period, phase, losses = memory.period + 1, master.phase, master.losses
+        return memory._replace(period=period, phase=phase, losses=losses, master=master), disc
 
     def _observe(self, memory: Follower, touched: Measurement) -> Follower:
         """Observe the pulp of the cells the finger may touch, and follow or find the finger."""
@@ -212,6 +231,11 @@ class HybridControl:
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Form the blister, and drive all pins to their heights; see `Controller`."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
+        if memory.master.phase is not Phase.IDLE:
+            known = seen._replace(target=seen.target - lead)
+            lead[:] = speeds[:] = 0.0
+            master, commands = self.substitute.command(memory.master, known)
+            return memory._replace(master=master, led_radius=0.0), commands
         moved = Moved(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
@@ -240,7 +264,9 @@ class HybridControl:
         top, felt, trim = memory.felt, memory.felt, memory.trim
         if not memory.alone:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
-            top = self._set_top(memory, seen, region, moved, self._holds(memory, force), raised=raised)
+            holds = self._holds(memory, force)
+            top, coming = self._set_top(memory, seen, region, moved, holds, raised=raised)
+            memory = self._doubt(memory, force, coming - trim, seen.force.size, top)
             if abs(asked - force) <= LEARNED * asked:
                 trim += (asked - force) * self.device.period / self.parameters.trim_time
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
@@ -248,25 +274,38 @@ class HybridControl:
         reach = self.profile.find_reach(top - memory.edge, region.speed)
         return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
 
+    def _doubt(self, memory: Follower, force: float, coming: float, cells: int, top: float) -> Follower:
+        """Compare a force of some cells with its prediction, N; hand over to Method I when they disagree."""
+        due, asked = memory.due, self.parameters.force_setpoint
+        error = min(abs(force - due[0]), LEARNED * asked) if due[0] >= 0.0 else 0.0
+        doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
+        if doubt <= (DOUBTED * asked) ** 2:
+            return memory._replace(due=(*due[1:], coming), doubt=doubt)
+        x, y = memory.estimate.mean[:2].tolist()
+        master = Master(
+            Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
+        )
+        return memory._replace(master=master, doubt=0.0, due=UNKNOWN)
+
     def _set_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, held: bool, *, raised: bool
-    ) -> float:
-        """Return the height of the top, m: solved for, or while the force is held along with the finger."""
+    ) -> tuple[float, float]:
+        """Return the height of the top, m, and the force it leads to, N: solved for, or along with the finger."""
         guess = memory.top + float(memory.estimate.mean[5]) * self.device.period
         if held and memory.period % EVERY:
             seen.own[self._at.later] += guess - memory.top
-            top = guess
+            top, force = guess, self.parameters.force_setpoint + memory.trim
         else:
-            top = self._solve_top(memory, seen, region, moved, guess, raised=raised)
-        return min(max(top, 0.0), self.device.cell.actuator.stroke)
+            top, force = self._solve_top(memory, seen, region, moved, guess, raised=raised)
+        return min(max(top, 0.0), self.device.cell.actuator.stroke), force
 
     def _solve_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, guess: float, *, raised: bool
-    ) -> float:
-        """Return the height of the top at which the forces predicted add up to the set point, m."""
+    ) -> tuple[float, float]:
+        """Return the height of the top at which the forces predicted add up to the set point, m, and their sum, N."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
         if not near.size:
-            return memory.felt
+            return memory.felt, 0.0
         at, own = self._at, seen.own.take(near, 1)
         under = self.finger.find_underside(region.aim, memory.estimate, seen.quadratic_basis.take(near, 1))
         under += own[at.residual]
