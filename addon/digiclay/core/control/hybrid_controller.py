@@ -40,6 +40,8 @@ LEARNED = 0.5
 HELD, SLOW, EVERY = 0.02, 20e-3, 2
 #: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
 JUMP = 1.5
+#: Underside where none is predicted, m.
+AWAY = 1.0
 #: Share of the set point by which predictions of the force may be off, rms over that many control periods:
 #: beyond it the model of the device or fingertip is wrong, and Method I takes over until the finger is lost.
 DOUBTED, PERIODS = 0.4, 20.0
@@ -159,14 +161,18 @@ class HybridControl:
         late = (memory.period - 1.0) - own[at.stamp]
         if np.count_nonzero(late):
             self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
+            own[at.coming, late != 0.0] = own[at.later, late != 0.0] = AWAY
         own[at.stamp] = memory.period
         (here,) = (force > self.felt).nonzero()
         if memory.phase is Phase.IDLE:
             self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
+            own[at.coming] = own[at.later] = AWAY
             return self._find(memory, touched, here) if here.size else memory
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
-        self.pulp.observe(own[at.pulp], force, expected)
+        found = self.pulp.observe(own[at.pulp], force, expected)
         own[at.coming] = own[at.later]
+        if self.device.force_floor and (here.size or self._is_felt(force[found])):
+            (here,) = found.nonzero()
         if not here.size:
             own[at.residual] = 0.0
             waiting: Follower = self._loss.wait(memory)
@@ -178,6 +184,10 @@ class HybridControl:
         if self._has_jumped(memory.estimate, basis):
             return self._find(memory._replace(losses=memory.losses + 1), touched, here)
         return self._fit(memory, touched, here, basis)
+
+    def _is_felt(self, force: Floats) -> bool:
+        """Tell whether forces under the predicted fingertip, N, are more than their noise together."""
+        return bool(force.sum() > self.felt * math.sqrt(force.size))
 
     def _holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a finger is slow, and a total force, N, near the set point: then less is solved."""
@@ -309,6 +319,7 @@ class HybridControl:
         at, own = self._at, seen.own.take(near, 1)
         under = self.finger.find_underside(region.aim, memory.estimate, seen.quadratic_basis.take(near, 1))
         under += own[at.residual]
+        seen.own[at.later] = AWAY
         seen.own[at.later, near] = under
         ends = moved.limits.take(near, 1)
         ends *= self.servo.span

@@ -21,6 +21,10 @@ __all__ = ["PulpEstimate", "Span"]
 Floats = NDArray[np.float64]
 
 
+#: Share of the least force that is no noise, from which on an expected force counts as contact.
+EXPECTED = 0.2
+
+
 class Span(NamedTuple):
     """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
@@ -101,11 +105,13 @@ class PulpEstimate:
         self.touch.pulp.age(pulp[:-1], self.period * periods)
         pulp[-1, periods > 0.0] = 0.0
 
-    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> None:
-        """Bring filters and tensions of cells up to date, in place.
+    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> NDArray[np.bool_]:
+        """Bring filters and tensions of cells up to date, in place; return which cells are touched.
 
         Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
         of a cell without a force is the expected one, at most the one at which a force would be measured.
+        With noise a cell is also touched where a force is expected, whatever is measured: a choice by what is
+        measured would take the cells whose noise is positive.
 
         Parameters
         ----------
@@ -117,14 +123,19 @@ class PulpEstimate:
             Tension under the predicted fingertip, N.
         """
         span = self.once
-        kept = span.kept.dot(pulp)
+        kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
+        untouched = force <= self.floor
         found = np.maximum(force, self.floor)
-        found *= 1.0 / (self.touch.contact.share * span.held)
+        if self.floor:
+            untouched &= (expected - kept[-1]) * share <= EXPECTED * self.floor
+            found = np.where(untouched, found, np.maximum(force, 0.0))
+        found *= 1.0 / share
         found += kept[-1]
-        np.minimum(found, expected, out=found, where=force <= self.floor)
+        np.minimum(found, expected, out=found, where=untouched)
         kept[-1] = 0.0
         np.multiply(span.late, found, out=pulp)
         pulp += kept
+        return ~untouched
 
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N.
