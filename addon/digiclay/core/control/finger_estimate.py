@@ -1,4 +1,4 @@
-"""Extended Kalman filter of the fingertip: position, velocity, size and elongation, from undersides over cells.
+"""Extended Kalman filter of the fingertip: position, velocity, size and elongation, from the undersides.
 
 The state is x, y, z of the lowest point, m; their velocities, m/s; the logarithm of the fingertip's size over
 the known one; its elongation along x and along the diagonal (`level_fingertip`). The last three are the
@@ -31,8 +31,7 @@ EYE = np.eye(6)
 LARGEST = 1.0
 #: The elongation is at most this: three times as long as wide.
 LONGEST = 0.8
-#: Share of the known elongation along x that a fingertip begins with.
-START = 0.0
+#: The elongation drifts like that of a turning fingertip whose own is at least this.
 LEAST = 0.05
 #: Standard deviations before the first contact: m, m/s, 1.
 FIRST = (2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2)
@@ -96,8 +95,7 @@ class FingerFilter:
         x, y, z : float
             Lowest point, m.
         """
-        mean = np.array([x, y, z, 0.0, 0.0, 0.0, 0.0, START * self._level.elongation, 0.0])
-        return Estimate(mean, np.diag(np.square(FIRST)))
+        return Estimate(np.array([x, y, z, *(0.0,) * (STATES - 3)]), np.diag(np.square(FIRST)))
 
     def predict(self, before: Estimate) -> Estimate:
         """Return the estimate a control period later, before its measurement."""

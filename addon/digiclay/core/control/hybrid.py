@@ -10,8 +10,6 @@ place of the finger, and ahead of it as far as the speed of the pins asks for.
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 from ..model.contact import Contact
 from ..model.fingertip import Fingertip
 from ..model.null_parts import Unrelaxed
@@ -32,8 +30,8 @@ __all__ = ["Hybrid", "HybridControl", "build"]
 BESIDE = 3e-3
 #: Standard deviation of the forces of sensors without noise that the filter counts on, N.
 QUIET = 2e-4
-#: Noise beyond which a finger is taken to accelerate the less the noisier its forces are, N: the filter would
-#: else follow the noise, to velocities of 40 mm/s at 10 mN.
+#: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
+#: follows the noise of 10 mN to velocities of 40 mm/s.
 STEADY = 5e-4
 
 
@@ -53,7 +51,7 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
     noise = max(device.force_floor / 5.0, QUIET)
     spread = Spread(
-        parameters.acceleration / max(noise / STEADY, 1.0),
+        parameters.acceleration * min(STEADY / noise, 1.0),
         parameters.turn,
         parameters.size_drift,
         parameters.underside_error,
@@ -75,14 +73,5 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
         max(parameters.felt_force, device.force_floor),
         noise,
         max(touch.fingertip.length, touch.fingertip.width) + BESIDE,
-        build_master(
-            VirtualMaster(
-                **{
-                    item.name: getattr(parameters, item.name)
-                    for item in fields(VirtualMaster)
-                    if hasattr(parameters, item.name)
-                }
-            ),
-            device,
-        ),
+        build_master(VirtualMaster(force_setpoint=asked, loss_time=parameters.loss_time), device),
     )

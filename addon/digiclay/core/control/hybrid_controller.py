@@ -19,7 +19,7 @@ from .device_info import DeviceInfo
 from .finger_estimate import Estimate, FingerFilter
 from .flow_servo import FlowServo
 from .force_height import Reach, find_top, lead_heights
-from .hybrid_memory import UNKNOWN, Follower
+from .hybrid_memory import Follower
 from .hybrid_parameters import Hybrid
 from .hybrid_rows import OWN_ROWS, OwnRows, number_rows
 from .lead_profile import LeadProfile
@@ -42,8 +42,8 @@ HELD, SLOW, EVERY = 0.02, 20e-3, 2
 JUMP = 1.5
 #: Underside where none is predicted, m.
 AWAY = 1.0
-#: Share of the set point by which predictions of the force may be off, rms over that many control periods:
-#: beyond it the model of the device or fingertip is wrong, and Method I takes over until the finger is lost.
+#: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
+#: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
 
 
@@ -105,6 +105,11 @@ class HybridControl:
         return JUMP * max(self.finger.fingertip.length, self.finger.fingertip.width)
 
     @cached_property
+    def _unknown(self) -> tuple[float, ...]:
+        """Forces until the heights aimed at, of which none is predicted."""
+        return (-1.0,) * round(self.servo.ahead / self.device.period)
+
+    @cached_property
     def _loss(self) -> LossRule:
         """When a finger is given up."""
         return LossRule(self.device.period, self.parameters.loss_time)
@@ -134,7 +139,7 @@ class HybridControl:
 
     def begin(self) -> Follower:
         """Return the memory before a session."""
-        return Follower()
+        return Follower(due=self._unknown)
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the finger; see `Controller`."""
@@ -161,7 +166,8 @@ class HybridControl:
         late = (memory.period - 1.0) - own[at.stamp]
         if np.count_nonzero(late):
             self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
-            own[at.coming, late != 0.0] = own[at.later, late != 0.0] = AWAY
+            np.putmask(own[at.later], late, AWAY)
+            np.putmask(own[at.coming], late, AWAY)
         own[at.stamp] = memory.period
         (here,) = (force > self.felt).nonzero()
         if memory.phase is Phase.IDLE:
@@ -218,6 +224,7 @@ class HybridControl:
             Heading(x, y),
             felt=height,
             losses=memory.losses,
+            due=self._unknown,
         )
         return self._fit(memory, touched, here, basis)
 
@@ -272,7 +279,9 @@ class HybridControl:
     ) -> Follower:
         """Turn the force into the height of the top; without contact go back to where it was felt."""
         top, felt, trim = memory.felt, memory.felt, memory.trim
-        if not memory.alone:
+        if memory.alone:
+            memory = memory._replace(due=self._unknown)
+        else:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
             holds = self._holds(memory, force)
             top, coming = self._set_top(memory, seen, region, moved, holds, raised=raised)
@@ -285,22 +294,22 @@ class HybridControl:
         return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
 
     def _doubt(self, memory: Follower, force: float, coming: float, cells: int, top: float) -> Follower:
-        """Compare a force of some cells with its prediction, N; hand over to Method I when they disagree."""
-        due, asked = memory.due, self.parameters.force_setpoint
-        error = min(abs(force - due[0]), LEARNED * asked) if due[0] >= 0.0 else 0.0
+        """Compare a force of some cells, N, with its prediction; hand over to Method I when they disagree."""
+        (due, *later), asked = memory.due, self.parameters.force_setpoint
+        error = min(abs(force - due), LEARNED * asked) if due >= 0.0 else 0.0
         doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
         if doubt <= (DOUBTED * asked) ** 2:
-            return memory._replace(due=(*due[1:], coming), doubt=doubt)
+            return memory._replace(due=(*later, coming), doubt=doubt)
         x, y = memory.estimate.mean[:2].tolist()
         master = Master(
             Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
         )
-        return memory._replace(master=master, doubt=0.0, due=UNKNOWN)
+        return memory._replace(master=master, doubt=0.0)
 
     def _set_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, held: bool, *, raised: bool
     ) -> tuple[float, float]:
-        """Return the height of the top, m, and the force it leads to, N: solved for, or along with the finger."""
+        """Return height of the top, m, and its force, N: solved for, or while held along with the finger."""
         guess = memory.top + float(memory.estimate.mean[5]) * self.device.period
         if held and memory.period % EVERY:
             seen.own[self._at.later] += guess - memory.top
@@ -312,7 +321,7 @@ class HybridControl:
     def _solve_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, guess: float, *, raised: bool
     ) -> tuple[float, float]:
-        """Return the height of the top at which the forces predicted add up to the set point, m, and their sum, N."""
+        """Return the height of the top at which predicted forces add up to the set point, m, and their sum."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
         if not near.size:
             return memory.felt, 0.0

@@ -10,11 +10,7 @@ from .finger_estimate import STATES, Estimate
 from .master_memory import Master, Phase
 from .travel import Heading
 
-__all__ = ["UNKNOWN", "Follower"]
-
-
-#: Forces of which none is predicted.
-UNKNOWN = (-1.0, -1.0)
+__all__ = ["Follower"]
 
 
 class Follower(NamedTuple):
@@ -42,8 +38,8 @@ class Follower(NamedTuple):
         How often the finger was lost.
     led_x, led_y, led_radius : float
         Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
-    due : (float, float)
-        Total forces predicted for this and the next period, N; below 0: none is.
+    due : tuple of float
+        Total forces predicted for this and the next periods, N; below 0: none is.
     doubt : float
         Mean square by which those of the last periods were off, N².
     master : Master
@@ -63,6 +59,6 @@ class Follower(NamedTuple):
     led_x: float = 0.0
     led_y: float = 0.0
     led_radius: float = 0.0
-    due: tuple[float, float] = UNKNOWN
+    due: tuple[float, ...] = ()
     doubt: float = 0.0
     master: Master = Master()
