@@ -321,7 +321,7 @@ class HybridControl:
     def _solve_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, guess: float, *, raised: bool
     ) -> tuple[float, float]:
-        """Return the height of the top at which predicted forces add up to the set point, m, and their sum."""
+        """Return the height of the top at which predicted forces add up to the set point, and that sum."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
         if not near.size:
             return memory.felt, 0.0

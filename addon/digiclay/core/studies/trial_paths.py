@@ -18,7 +18,7 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 #: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
 AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
-#: Seed of the random drags, and how far their fingertips are pitched and rolled at most, rad: 30 degrees in all.
+#: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
 DRAG_SEED, TILT = 1, 0.37
 
 
