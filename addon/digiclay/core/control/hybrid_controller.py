@@ -177,7 +177,7 @@ class HybridControl:
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
         found = self.pulp.observe(own[at.pulp], force, expected)
         own[at.coming] = own[at.later]
-        if self.device.force_floor and (here.size or self._is_felt(force[found])):
+        if here.size or (self.device.force_floor and self._is_felt(force[found])):
             (here,) = found.nonzero()
         if not here.size:
             own[at.residual] = 0.0

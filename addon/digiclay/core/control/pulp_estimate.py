@@ -21,8 +21,8 @@ __all__ = ["PulpEstimate", "Span"]
 Floats = NDArray[np.float64]
 
 
-#: Share of the least force that is no noise, from which on an expected force counts as contact.
-EXPECTED = 0.2
+#: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N.
+EXPECTED, LEAST = 0.2, 1e-3
 
 
 class Span(NamedTuple):
@@ -110,8 +110,8 @@ class PulpEstimate:
 
         Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
         of a cell without a force is the expected one, at most the one at which a force would be measured.
-        With noise a cell is also touched where a force is expected, whatever is measured: a choice by what is
-        measured would take the cells whose noise is positive.
+        A cell is also touched where a force is expected, whatever is measured: that there is none tells where
+        the fingertip ends; and a choice by noisy forces would take the cells whose noise is positive.
 
         Parameters
         ----------
@@ -124,11 +124,10 @@ class PulpEstimate:
         """
         span = self.once
         kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
-        untouched = force <= self.floor
-        found = np.maximum(force, self.floor)
-        if self.floor:
-            untouched &= (expected - kept[-1]) * share <= EXPECTED * self.floor
-            found = np.where(untouched, found, np.maximum(force, 0.0))
+        untouched = (expected - kept[-1]) * share <= max(EXPECTED * self.floor, LEAST)
+        untouched &= force <= self.floor
+        found = np.maximum(force, 0.0)
+        np.putmask(found, untouched, self.floor)
         found *= 1.0 / share
         found += kept[-1]
         np.minimum(found, expected, out=found, where=untouched)
