@@ -285,7 +285,9 @@ class HybridControl:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
             holds = self._holds(memory, force)
             top, coming = self._set_top(memory, seen, region, moved, holds, raised=raised)
-            memory = self._doubt(memory, force, coming - trim, seen.force.size, top)
+            # The trim belongs to a force that pins reach.
+            coming -= trim * (coming == asked + trim)
+            memory = self._doubt(memory, force, coming, seen.force.size, top)
             if abs(asked - force) <= LEARNED * asked:
                 trim += (asked - force) * self.device.period / self.parameters.trim_time
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
@@ -298,6 +300,7 @@ class HybridControl:
         (due, *later), asked = memory.due, self.parameters.force_setpoint
         error = min(abs(force - due), LEARNED * asked) if due >= 0.0 else 0.0
         doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
+        doubt = max(doubt, 0.0)
         if doubt <= (DOUBTED * asked) ** 2:
             return memory._replace(due=(*later, coming), doubt=doubt)
         x, y = memory.estimate.mean[:2].tolist()
@@ -333,6 +336,9 @@ class HybridControl:
         ends = moved.limits.take(near, 1)
         ends *= self.servo.span
         ends += moved.coasted.take(near)
+        *_, lowest, highest = self._limits[ends.shape]
+        np.maximum(ends, lowest, out=ends)
+        np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
         wanted, lost = self.parameters.force_setpoint + memory.trim, self.pulp.predict_loss(own[at.pulp])
         reach = Reach(part, region.drop.take(near), ends)
