@@ -169,31 +169,28 @@ class HybridControl:
             np.putmask(own[at.later], late, AWAY)
             np.putmask(own[at.coming], late, AWAY)
         own[at.stamp] = memory.period
-        (here,) = (force > self.felt).nonzero()
+        (felt,) = (force > self.felt).nonzero()
         if memory.phase is Phase.IDLE:
             self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
             own[at.coming] = own[at.later] = AWAY
-            return self._find(memory, touched, here) if here.size else memory
+            return self._find(memory, touched, felt) if felt.size else memory
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
-        found = self.pulp.observe(own[at.pulp], force, expected)
+        (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
         own[at.coming] = own[at.later]
-        if here.size or (self.device.force_floor and self._is_felt(force[found])):
-            (here,) = found.nonzero()
-        if not here.size:
+        if not felt.size and not self._is_felt(force.take(here)):
             own[at.residual] = 0.0
             waiting: Follower = self._loss.wait(memory)
             return waiting
         if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
             return memory if not memory.alone else memory._replace(alone=0)
         own[at.residual] = 0.0
-        basis = touched.quadratic_basis.take(here, 1)
-        if self._has_jumped(memory.estimate, basis):
-            return self._find(memory._replace(losses=memory.losses + 1), touched, here)
-        return self._fit(memory, touched, here, basis)
+        if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis.take(felt, 1)):
+            return self._find(memory._replace(losses=memory.losses + 1), touched, felt)
+        return self._fit(memory, touched, here, touched.quadratic_basis.take(here, 1))
 
     def _is_felt(self, force: Floats) -> bool:
         """Tell whether forces under the predicted fingertip, N, are more than their noise together."""
-        return bool(force.sum() > self.felt * math.sqrt(force.size))
+        return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
 
     def _holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a finger is slow, and a total force, N, near the set point: then less is solved."""

@@ -124,17 +124,16 @@ class PulpEstimate:
         """
         span = self.once
         kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
-        untouched = (expected - kept[-1]) * share <= max(EXPECTED * self.floor, LEAST)
-        untouched &= force <= self.floor
-        found = np.maximum(force, 0.0)
-        np.putmask(found, untouched, self.floor)
+        touched = expected > kept[-1] + max(EXPECTED * self.floor, LEAST) / share
+        touched |= force > self.floor
+        found = np.where(touched, np.maximum(force, 0.0), self.floor)
         found *= 1.0 / share
         found += kept[-1]
-        np.minimum(found, expected, out=found, where=untouched)
+        np.minimum(found, expected, out=found, where=~touched)
         kept[-1] = 0.0
         np.multiply(span.late, found, out=pulp)
         pulp += kept
-        return ~untouched
+        return touched
 
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N.
