@@ -107,7 +107,7 @@ class HybridControl:
     @cached_property
     def _unknown(self) -> tuple[float, ...]:
         """Forces until the heights aimed at, of which none is predicted."""
-        return (-1.0,) * round(self.servo.ahead / self.device.period)
+        return (-1.0,) * max(1, round(self.servo.ahead / self.device.period))
 
     @cached_property
     def _loss(self) -> LossRule:

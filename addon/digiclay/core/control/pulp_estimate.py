@@ -125,7 +125,7 @@ class PulpEstimate:
         """
         span = self.once
         kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
-        touched = expected > kept[-1] + max(EXPECTED * self.floor, LEAST) / share
+        touched: NDArray[np.bool_] = expected > kept[-1] + max(EXPECTED * self.floor, LEAST) / share
         touched |= force > self.floor
         found = np.where(touched, np.maximum(force, 0.0), self.floor)
         found *= 1.0 / share
