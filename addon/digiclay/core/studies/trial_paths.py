@@ -11,7 +11,7 @@ import numpy as np
 from ..model.trajectory import Path, Waypoint
 from ..scene.schema import Scene
 
-__all__ = ["DRAG_SEED", "Pose", "draw_drags", "lift_off", "list_paths", "with_path"]
+__all__ = ["DRAG_SEED", "Pose", "drag_row", "draw_drags", "lift_off", "list_paths", "with_path"]
 
 #: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
 Pose = tuple[float, float, float, float, float, float, float]
@@ -83,12 +83,22 @@ def _lift(x: float, y: float, height: float, turn: Sequence[float] = (0.0, 0.0, 
 
 
 def _drag(
-    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: float = 0.0
+    x: float,
+    y: float,
+    height: float,
+    speed: float,
+    hold: float = 0.5,
+    turn: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> list[Pose]:
-    """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with a turn, rad."""
-    poses = _lift(x, y, height, (turn, 0.0, 0.0))
+    """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
+    poses = _lift(x, y, height, turn)
     end = poses[-1][0] + abs(2.0 * x) / speed
-    return [*poses, *((t, -x, y, height, turn, 0.0, 0.0) for t in (end, end + hold))]
+    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]  # type: ignore[misc]
+
+
+def drag_row(turn: float, pitch: float) -> list[Pose]:
+    """Return a drag at 15 mm/s along a row of pins, 1.5 mm below the surface, with a turn and pitch, rad."""
+    return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
 
 
 def list_paths() -> dict[str, tuple[str, list[Pose]]]:
@@ -112,7 +122,7 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
         "dead-stop": ("linear", _drag(-18.0, 0.0, 12.0, 15.0, hold=1.0)),
         "edge": ("smooth", _drag(-25.0, -35.0, 8.0, 12.0)),
         "twisted": ("smooth", twisted),
-        "across": ("linear", _drag(-20.0, 1.5, 0.0, 15.0, turn=0.5 * math.pi)),
+        "across": ("linear", drag_row(0.5 * math.pi, 0.0)),
     }
 
 
