@@ -112,7 +112,8 @@ def _without_residuals(known: HybridControl) -> HybridControl:
 
 
 def _without_threshold(known: HybridControl) -> HybridControl:
-    return replace(known, felt=known.parameters.felt_force)
+    least = known.parameters.felt_force
+    return replace(known, felt=least, pulp=replace(known.pulp, floor=least))
 
 
 #: Parts that are left out by another value of a parameter.

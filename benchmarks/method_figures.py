@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import statistics
 import time
@@ -18,6 +19,7 @@ from digiclay.core.session.run_scene import run
 from digiclay.core.studies.evaluation import Record
 from digiclay.core.studies.method_trials import GROUPS, LIMITS, Trial, list_trials, measure_trial, place_trial
 from digiclay.core.studies.speed_limits import Drag, place_way
+from digiclay.core.studies.trial_paths import drag_row, lift_off, with_path
 from digiclay.plots.figure import empty
 
 from .plots import STYLE, write
@@ -49,6 +51,8 @@ WRITTEN = {
 }  # fmt: skip
 #: Speed of the ridge drag with parts left out, m/s.
 PARTS_SPEED = 40e-3
+#: Turns and tilts of the fingertip, degrees.
+ANGLES, TILTS = tuple(range(0, 181, 15)), (0, 15, 30)
 #: Parameters with which a part of Method III is left out.
 PARTS: dict[str, dict[str, str]] = {
     "all": {},
@@ -76,7 +80,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Run every trial, and print the tables."""
     groups = tuple(group for group in GROUPS if group not in LIMITS)
     trials = list_trials(groups, QUICK if arguments.quick else FULL)
-    total = len(SHOWN) * len(trials) + len(FAST) + 10 + len(PARTS)
+    total = len(SHOWN) * len(trials) + len(FAST) + 13 + len(PARTS)
+    total += len(SHOWN) * len(TILTS) * (1 if arguments.quick else len(ANGLES))
     with progress(arguments, "trials", total) as bar:
         rows = list(_run_trials(trials, bar))
         fast = [
@@ -88,11 +93,12 @@ def carry_out(arguments: argparse.Namespace) -> int:
             (name, "hybrid", _run(bar, name, _follow, _scene("hybrid", known), Drag(), PARTS_SPEED))
             for name, known in PARTS.items()
         ]
+        turned = list(_run_turns((90,) if arguments.quick else ANGLES, bar))
     cost = _compare_cost(2 if arguments.quick else TURNS)
-    text = "\n".join(_text(rows, fast, wrong, parts, cost))
+    text = "\n".join(_text(rows, fast, wrong, parts, turned, cost))
     print(text)
     head = ("trial", "method", *WRITTEN.values())
-    every = [*rows, *fast, *wrong, *parts]
+    every = [*rows, *fast, *wrong, *parts, *turned]
     figures = [[name, method, *map(found.get, WRITTEN)] for name, method, found in every]
     kept(arguments.out, "methods", text, head, figures)
     if arguments.out is not None:
@@ -150,6 +156,17 @@ def _run_models(bar: Callable[[str], None]) -> Iterator[Row]:
         yield name, "hybrid", _run(bar, name, _measure, scene, Trial("session", "session"))
 
 
+def _run_turns(turns: Sequence[int], bar: Callable[[str], None]) -> Iterator[Row]:
+    """Run drags along a row of pins with a turned and tilted fingertip, degrees, by both methods."""
+    for tilt, turn, method in itertools.product(TILTS, turns, SHOWN):
+        poses, name = (
+            drag_row(math.radians(turn), math.radians(tilt)),
+            f"turn {turn}°, tilt {tilt}°, {method}",
+        )
+        scene = lift_off(with_path(_scene(method), poses, "linear"))
+        yield name, method, _run(bar, name, lambda known: _take(measure_trial(known)), scene)
+
+
 def _compare_cost(turns: int) -> dict[str, float]:
     """Return the processor time of a control period by method, s: medians of sessions run by turns."""
     spent: dict[str, list[float]] = {method: [] for method in SHOWN}
@@ -163,7 +180,12 @@ def _compare_cost(turns: int) -> dict[str, float]:
 
 
 def _text(
-    rows: list[Row], fast: list[Row], wrong: list[Row], parts: list[Row], cost: dict[str, float]
+    rows: list[Row],
+    fast: list[Row],
+    wrong: list[Row],
+    parts: list[Row],
+    turned: list[Row],
+    cost: dict[str, float],
 ) -> Iterator[str]:
     """Give the lines of the report."""
     yield made_with()
@@ -180,6 +202,7 @@ def _text(
         ("Method III at speeds that Method I does not follow", fast),
         ("Method III made for another device, or with sensors", wrong),
         ("Method III with a part left out: ridge drag at 40 mm/s", parts),
+        ("Turned and tilted fingertip: drag along a row of pins at 15 mm/s", turned),
     ):
         yield f"\n{title}\n"
         yield from table(("", *columns), [[name, *_numbers(found)] for name, _, found in some])

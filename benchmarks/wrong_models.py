@@ -44,7 +44,7 @@ def list_models(true: Scene) -> dict[str, Scene]:
         f"valve × {share}": replace(
             true, valve=replace(true.valve, orifice_diameter=true.valve.orifice_diameter * share**0.25)
         )
-        for share in (0.7, 1.3)
+        for share in (0.7, 1.3, 3)
     }
     return {
         **valves,
@@ -54,6 +54,8 @@ def list_models(true: Scene) -> dict[str, Scene]:
         "exponent × 1.4": change_finger(true, "contact", exponent=1.4),
         "fingertip × 0.75": change_finger(true, "fingertip", **dict.fromkeys(sizes, 0.75)),
         "fingertip × 1.3": change_finger(true, "fingertip", **dict.fromkeys(sizes, 1.3)),
+        "length × 1.5": change_finger(true, "fingertip", length=1.5),
+        "width × 0.6": change_finger(true, "fingertip", width=0.6),
     }
 
 

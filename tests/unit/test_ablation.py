@@ -26,7 +26,7 @@ SMALL = {
 def press(**control: float) -> Scene:
     """Return a press, a lift and a drag on a small bed with Method III."""
     scene = resolve({**SMALL, "control": {"method": "hybrid", **control}})
-    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.6, -4.5, 43.0), (0.8, 4.5, 43.0)
+    drag = (0.0, -4.5, 40.5), (0.15, -4.5, 38.0), (0.8, -4.5, 46.0), (1.0, 4.5, 46.0)
     points = tuple(Waypoint(time=t, position=(1e-3 * x, 0.0, 1e-3 * z)) for t, x, z in drag)
     lasting = replace(scene.simulation, duration=drag[-1][0])
     return scene.with_sections(trajectory=Path("linear", points), simulation=lasting)

@@ -1,4 +1,4 @@
-"""The filter of Method III finds a fingertip from its undersides: place, velocity, turn and size."""
+"""The filter of Method III finds a fingertip from its undersides: place, velocity, size and elongation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread, invert_five
+from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread, invert_six
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from numpy.typing import NDArray
 
@@ -15,6 +15,8 @@ from tests.assemble import make_basis
 Floats = NDArray[np.float64]
 
 PERIOD = 5e-3
+#: Elongation of the default fingertip, 10 by 8 mm.
+LONG = (100.0 - 64.0) / (100.0 + 64.0)
 #: Cells about the origin, 3 mm apart.
 X, Y = (grid.ravel() * 3e-3 for grid in np.meshgrid(np.arange(-6.0, 7.0), np.arange(-6.0, 7.0)))
 
@@ -55,21 +57,39 @@ def test_the_velocity_of_a_drag_is_found() -> None:
     assert found.mean[3:6] == pytest.approx([20e-3, 0.0, 0.0], abs=0.2e-3)
 
 
-def test_a_turn_is_found() -> None:
-    found = follow(filter_of(Fingertip()), Fingertip(), speed=10e-3, turn=0.6)
-    assert found.mean[6] == pytest.approx(0.6, abs=0.01)
+@pytest.mark.parametrize("turn", [0.0, 0.6, 0.5 * math.pi, 2.5])
+def test_a_turn_is_found(turn: float) -> None:
+    found = follow(filter_of(Fingertip()), Fingertip(), speed=10e-3, turn=turn)
+    assert found.mean[7:] == pytest.approx(
+        [LONG * math.cos(2.0 * turn), LONG * math.sin(2.0 * turn)], abs=5e-3
+    )
 
 
 @pytest.mark.parametrize("size", [0.75, 1.3])
 def test_a_fingertip_of_another_size_than_known_is_found(size: float) -> None:
     tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
     found = follow(filter_of(Fingertip()), tip, speed=5e-3)
-    assert found.mean[7] == pytest.approx(math.log(size), abs=5e-3)
+    assert found.mean[6] == pytest.approx(math.log(size), abs=5e-3)
+
+
+@pytest.mark.parametrize("known", [Fingertip(15e-3), Fingertip(width=4.8e-3), Fingertip(8e-3)])
+def test_a_fingertip_known_too_long_too_narrow_or_round_is_found(known: Fingertip) -> None:
+    found = follow(filter_of(known), Fingertip(), speed=5e-3, turn=0.6)
+    curvatures = np.linalg.eigvalsh(
+        np.exp(-found.mean[6])
+        * known.height
+        * 0.5
+        * (known.length**-2 + known.width**-2)
+        * np.array([[1.0 - found.mean[7], -found.mean[8]], [-found.mean[8], 1.0 + found.mean[7]]])
+    )
+    # Of the lowest point: 8 mm over the squares of 10 and 8 mm. Farther off the known one is another body.
+    assert curvatures == pytest.approx([80.0, 125.0], rel=0.1)
 
 
 def test_the_errors_left_are_those_of_the_corrected_fingertip() -> None:
     known = filter_of(Fingertip())
     found, basis = known.begin(0.2e-3, 0.0, 40e-3), make_basis(X, Y)
+    found.mean[7] = LONG
     under = underside(Fingertip(), 0.0, 0.0, 40e-3, 0.0)
     here = under < 42e-3
     found, left = known.correct(
@@ -82,7 +102,7 @@ def test_the_errors_left_are_those_of_the_corrected_fingertip() -> None:
 
 def test_the_underside_at_another_place_is_that_of_the_physics() -> None:
     known = filter_of(Fingertip())
-    shape = Estimate(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0]), np.eye(8))
+    shape = Estimate(np.array([*(0.0,) * 7, LONG * math.cos(0.8), LONG * math.sin(0.8)]), np.eye(9))
     found = known.find_underside((1e-3, 2e-3, 40e-3), shape, make_basis(X, Y))
     true = underside(Fingertip(), 1e-3, 2e-3, 40e-3, 0.4)
     assert found == pytest.approx(true, abs=1e-15)
@@ -90,11 +110,11 @@ def test_the_underside_at_another_place_is_that_of_the_physics() -> None:
 
 def test_slopes_are_differences_of_the_underside() -> None:
     known, basis = filter_of(Fingertip()), make_basis(X, Y)
-    mean = np.array([0.5e-3, -0.3e-3, 40e-3, 0.0, 0.0, 0.0, 0.3, 0.02])
+    mean = np.array([0.5e-3, -0.3e-3, 40e-3, 0.0, 0.0, 0.0, 0.02, 0.2, 0.1])
     at = known.measure(mean, basis)
     near = at.under < 45e-3
-    for row, place in enumerate((7, 0, 1, 6, 2)):
-        step = np.zeros(8)
+    for row, place in enumerate((6, 0, 1, 7, 8, 2)):
+        step = np.zeros(9)
         step[place] = 1e-5
         slope = (known.measure(mean + step, basis).under - known.measure(mean - step, basis).under) / 2e-5
         assert at.slopes[row][near] == pytest.approx(slope[near], rel=1e-4, abs=1e-6)
@@ -102,5 +122,5 @@ def test_slopes_are_differences_of_the_underside() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_inverse_is_that_of_numpy(seed: int) -> None:
-    matrix = np.random.default_rng(seed).normal(size=(5, 5)) * np.logspace(-3, 3, 5)
-    assert invert_five(matrix) == pytest.approx(np.linalg.inv(matrix), rel=1e-9)
+    matrix = np.random.default_rng(seed).normal(size=(6, 6)) * np.logspace(-3, 3, 6)
+    assert invert_six(matrix) == pytest.approx(np.linalg.inv(matrix), rel=1e-9)

@@ -1,12 +1,14 @@
-"""Extended Kalman filter of the fingertip: position, velocity, turn and size, from undersides over cells.
+"""Extended Kalman filter of the fingertip: position, velocity, size and elongation, from the undersides.
 
-The state is x, y, z of the lowest point, m; their velocities, m/s; the turn about the vertical, rad; the
-logarithm of the fingertip's size over the known one. Size and turn are what undersides tell of the rest: a
-pulp that is stiffer than known makes the fingertip look flatter, that is larger.
+The state is x, y, z of the lowest point, m; their velocities, m/s; the logarithm of the fingertip's size over
+the known one; its elongation along x and along the diagonal (`level_fingertip`). The last three are the
+curvatures of the underside at the lowest point, which take in what is known wrongly: a pulp that is stiffer
+than known makes the fingertip look flatter, that is larger; a fingertip too long, or tilted, is elongated.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,18 +19,22 @@ from numpy.typing import NDArray
 from ..model.fingertip import Fingertip
 from .level_fingertip import LevelFingertip, Place, Slopes
 
-__all__ = ["Estimate", "FingerFilter", "Spread", "invert_five"]
+__all__ = ["Estimate", "FingerFilter", "Spread", "invert_six"]
 
 Floats = NDArray[np.float64]
 
 #: Places in the state of what an underside depends on, in the order of `Slopes`: size, x, y, turn, z.
-SEEN = np.array([7, 0, 1, 6, 2])
-STATES = 8
-EYE = np.eye(5)
+SEEN = np.array([6, 0, 1, 7, 8, 2])
+STATES = 9
+EYE = np.eye(6)
 #: The size is at most this, as a logarithm: a factor of 2.7.
 LARGEST = 1.0
-#: Standard deviations before the first contact: m, m/s, rad, 1.
-FIRST = (2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.5, 0.1)
+#: The elongation is at most this: three times as long as wide.
+LONGEST = 0.8
+#: The elongation drifts like that of a turning fingertip whose own is at least this.
+LEAST = 0.05
+#: Standard deviations before the first contact: m, m/s, 1.
+FIRST = (2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2)
 
 
 class Estimate(NamedTuple):
@@ -36,9 +42,9 @@ class Estimate(NamedTuple):
 
     Attributes
     ----------
-    mean : ndarray (8,)
+    mean : ndarray (9,)
         State.
-    covariance : ndarray (8, 8)
+    covariance : ndarray (9, 9)
     """
 
     mean: Floats
@@ -89,7 +95,7 @@ class FingerFilter:
         x, y, z : float
             Lowest point, m.
         """
-        return Estimate(np.array([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]), np.diag(np.square(FIRST)))
+        return Estimate(np.array([x, y, z, *(0.0,) * (STATES - 3)]), np.diag(np.square(FIRST)))
 
     def predict(self, before: Estimate) -> Estimate:
         """Return the estimate a control period later, before its measurement."""
@@ -108,7 +114,8 @@ class FingerFilter:
             noise[place, place] = strength * time * time / 3.0
             noise[place, speed] = noise[speed, place] = strength * time / 2.0
             noise[speed, speed] = strength
-        noise[6, 6], noise[7, 7] = spread.turn**2 * time, spread.size**2 * time
+        noise[6, 6] = spread.size**2 * time
+        noise[7, 7] = noise[8, 8] = (2.0 * spread.turn * max(abs(self._level.elongation), LEAST)) ** 2 * time
         return step, noise
 
     def correct(self, guess: Estimate, at: Slopes, seen: Floats, variance: Floats) -> tuple[Estimate, Floats]:
@@ -130,12 +137,17 @@ class FingerFilter:
         weight = weighted.dot(slopes.T)
         wide = guess.covariance.take(SEEN, 0)
         spread = weight.dot(wide)
-        gain = wide.T.dot(invert_five(EYE + spread.take(SEEN, 1)))
+        gain = wide.T.dot(invert_six(EYE + spread.take(SEEN, 1)))
         change = gain.dot(weighted.dot(error))
         covariance = guess.covariance - gain.dot(spread)
         error -= change.take(SEEN).dot(slopes)
         mean = guess.mean + change
-        mean[7] = min(max(mean[7], -LARGEST), LARGEST)
+        *_, size, along, askew = mean.tolist()
+        if abs(size) > LARGEST:
+            mean[6] = math.copysign(LARGEST, size)
+        longest = math.hypot(along, askew)
+        if longest > LONGEST:
+            mean[7:] *= LONGEST / longest
         return Estimate(mean, 0.5 * (covariance + covariance.T)), error
 
     def measure(self, mean: Floats, basis: Floats) -> Slopes:
@@ -143,13 +155,13 @@ class FingerFilter:
 
         Parameters
         ----------
-        mean : ndarray (8,)
+        mean : ndarray (9,)
             State.
         basis : ndarray (6, m)
             Rows 1, x, y, ... of the cells.
         """
-        x, y, z, _, _, _, turn, size = mean.tolist()
-        return self._level.measure(Place(x, y, z, turn, size), basis)
+        x, y, z, _, _, _, *shape = mean.tolist()
+        return self._level.measure(Place(x, y, z, *shape), basis)
 
     def find_underside(self, place: tuple[float, float, float], known: Estimate, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m, of the estimated fingertip at another place.
@@ -159,12 +171,11 @@ class FingerFilter:
         place : tuple of float
             x, y, z of the lowest point, m.
         known : Estimate
-            Gives turn and size.
+            Gives size and elongation.
         basis : ndarray (6, m)
             Rows 1, x, y, ... of the cells.
         """
-        *_, turn, size = known.mean.tolist()
-        return self._level.find_underside(Place(*place, turn, size), basis)
+        return self._level.find_underside(Place(*place, *known.mean[6:].tolist()), basis)
 
     @cached_property
     def _level(self) -> LevelFingertip:
@@ -172,27 +183,30 @@ class FingerFilter:
         return LevelFingertip(self.fingertip)
 
 
-def invert_five(matrix: Floats) -> Floats:
-    """Return the inverse of a matrix of five rows by elimination with pivots, in plain numbers.
+def invert_six(matrix: Floats) -> Floats:
+    """Return the inverse of a matrix of six rows by elimination with pivots, in plain numbers.
 
     LAPACK wakes threads, which takes milliseconds on a busy machine.
 
     Parameters
     ----------
-    matrix : ndarray (5, 5)
+    matrix : ndarray (6, 6)
     """
     rows: list[tuple[float, ...]] = list(map(tuple, matrix.tolist()))
     swaps = []
-    for step in range(5):
-        pivot = max(range(step, 5), key=[abs(row[0]) for row in rows].__getitem__)
+    for step in range(6):
+        pivot = max(range(step, 6), key=[abs(row[0]) for row in rows].__getitem__)
         if pivot != step:
             rows[step], rows[pivot] = rows[pivot], rows[step]
             swaps.append((step, pivot))
-        first, a, b, c, d = rows[step]
+        first, a, b, c, d, e = rows[step]
         scale = 1.0 / first
-        head = a, b, c, d, _ = a * scale, b * scale, c * scale, d * scale, scale
+        head = a, b, c, d, e, _ = a * scale, b * scale, c * scale, d * scale, e * scale, scale
         # The first column is eliminated; that of the inverse comes in as the last one.
-        rows = [(v - by * a, w - by * b, x - by * c, y - by * d, -by * scale) for by, v, w, x, y in rows]
+        rows = [
+            (u - by * a, v - by * b, w - by * c, x - by * d, y - by * e, -by * scale)
+            for by, u, v, w, x, y in rows
+        ]
         rows[step] = head
     made = np.array(rows)
     for one, other in reversed(swaps):

@@ -85,8 +85,8 @@ def find_top(
     pulp: PulpEstimate,
     *,
     raised: bool,
-) -> float:
-    """Return the height of the top at which the predicted forces add up to a force, m.
+) -> tuple[float, float]:
+    """Return the height of the top at which the predicted forces add up to a force, m, and their sum, N.
 
     Where none does, it is the end of the range nearest to it.
 
@@ -118,4 +118,6 @@ def find_top(
     np.maximum(depths, reach.ends[0], out=depths)
     np.minimum(depths, reach.ends[1], out=depths)
     depths -= under
-    return float(np.interp(wanted, np.add.reduce(pulp.predict_force(depths, lost), axis=1), tops))
+    forces = np.add.reduce(pulp.predict_force(depths, lost), axis=1)
+    least, *_, most = forces.tolist()
+    return float(np.interp(wanted, forces, tops)), min(max(wanted, least), most)

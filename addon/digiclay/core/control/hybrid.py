@@ -21,7 +21,8 @@ from .hybrid_controller import HybridControl
 from .hybrid_parameters import Hybrid
 from .lead_profile import LeadProfile
 from .pulp_estimate import PulpEstimate
-from .virtual_master import HEAVIEST
+from .virtual_master import HEAVIEST, VirtualMaster
+from .virtual_master import build as build_master
 
 __all__ = ["Hybrid", "HybridControl", "build"]
 
@@ -29,6 +30,9 @@ __all__ = ["Hybrid", "HybridControl", "build"]
 BESIDE = 3e-3
 #: Standard deviation of the forces of sensors without noise that the filter counts on, N.
 QUIET = 2e-4
+#: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
+#: follows the noise of 10 mN to velocities of 40 mm/s.
+STEADY = 5e-4
 
 
 def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
@@ -45,8 +49,12 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     # Without a finger nothing is ever felt.
     touch = device.cell.touch or Touch(Fingertip(), Contact(), Unrelaxed())
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
+    noise = max(device.force_floor / 5.0, QUIET)
     spread = Spread(
-        parameters.acceleration, parameters.turn, parameters.size_drift, parameters.underside_error
+        parameters.acceleration * min(STEADY / noise, 1.0),
+        parameters.turn,
+        parameters.size_drift,
+        parameters.underside_error,
     )
     share = parameters.speed_share
     return HybridControl(
@@ -63,6 +71,7 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
         ),
         servo,
         max(parameters.felt_force, device.force_floor),
-        max(device.force_floor / 5.0, QUIET),
+        noise,
         max(touch.fingertip.length, touch.fingertip.width) + BESIDE,
+        build_master(VirtualMaster(force_setpoint=asked, loss_time=parameters.loss_time), device),
     )

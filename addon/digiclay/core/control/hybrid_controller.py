@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Constants
 from ..model.control_interface import Commands, Measurement
+from ..model.layout import enclose_discs
 from .blister import Blister
 from .blister_cells import BlisterRule
 from .device_info import DeviceInfo
@@ -23,9 +24,10 @@ from .hybrid_parameters import Hybrid
 from .hybrid_rows import OWN_ROWS, OwnRows, number_rows
 from .lead_profile import LeadProfile
 from .led_blister import LedBlister, Region
-from .master_memory import LossRule, Phase
+from .master_memory import LossRule, Master, Phase
 from .pulp_estimate import PulpEstimate
 from .travel import Heading, update_heading
+from .virtual_master import VirtualMasterControl
 
 __all__ = ["HybridControl"]
 
@@ -38,6 +40,11 @@ LEARNED = 0.5
 HELD, SLOW, EVERY = 0.02, 20e-3, 2
 #: How far a touched cell may be from the predicted place of the finger, in semi-axes: beyond is a new touch.
 JUMP = 1.5
+#: Underside where none is predicted, m.
+AWAY = 1.0
+#: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
+#: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
+DOUBTED, PERIODS = 0.4, 20.0
 
 
 class Moved(NamedTuple):
@@ -74,6 +81,8 @@ class HybridControl:
         Standard deviation of forces, N.
     contact_radius : float
         Within which the finger may touch, m.
+    substitute : VirtualMasterControl
+        Method I, for a finger that the model does not predict.
     """
 
     parameters: Hybrid
@@ -86,6 +95,7 @@ class HybridControl:
     felt: float
     noise: float
     contact_radius: float
+    substitute: VirtualMasterControl
 
     name = "hybrid"
 
@@ -93,6 +103,11 @@ class HybridControl:
     def farthest(self) -> float:
         """Distance from the predicted place beyond which a touch is a new one, m."""
         return JUMP * max(self.finger.fingertip.length, self.finger.fingertip.width)
+
+    @cached_property
+    def _unknown(self) -> tuple[float, ...]:
+        """Forces until the heights aimed at, of which none is predicted."""
+        return (-1.0,) * max(1, round(self.servo.ahead / self.device.period))
 
     @cached_property
     def _loss(self) -> LossRule:
@@ -124,15 +139,26 @@ class HybridControl:
 
     def begin(self) -> Follower:
         """Return the memory before a session."""
-        return Follower()
+        return Follower(due=self._unknown)
 
     def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the finger; see `Controller`."""
+        if memory.master.phase is not Phase.IDLE:
+            return self._substitute(memory, touched)
         idle, period = memory.phase is Phase.IDLE, memory.period + 1
         estimate = memory.estimate if idle else self.finger.predict(memory.estimate)
         memory = memory._replace(period=period, estimate=estimate)
         memory = self._observe(memory, touched) if touched.force.size else self._loss.wait(memory)
         return memory, self._surface.find_disc(memory)
+
+    def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
+        """Let Method I follow the finger; the next one is predicted again."""
+        master, disc = self.substitute.locate(memory.master, touched)
+        if memory.led_radius:
+            led = (memory.led_x, memory.led_y, memory.led_radius)
+            disc = enclose_discs(disc, led) if disc else led
+        period, phase, losses = memory.period + 1, master.phase, master.losses
+        return memory._replace(period=period, phase=phase, losses=losses, master=master), disc
 
     def _observe(self, memory: Follower, touched: Measurement) -> Follower:
         """Observe the pulp of the cells the finger may touch, and follow or find the finger."""
@@ -140,25 +166,31 @@ class HybridControl:
         late = (memory.period - 1.0) - own[at.stamp]
         if np.count_nonzero(late):
             self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
+            np.putmask(own[at.later], late, AWAY)
+            np.putmask(own[at.coming], late, AWAY)
         own[at.stamp] = memory.period
-        (here,) = (force > self.felt).nonzero()
+        (felt,) = (force > self.felt).nonzero()
         if memory.phase is Phase.IDLE:
             self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
-            return self._find(memory, touched, here) if here.size else memory
+            own[at.coming] = own[at.later] = AWAY
+            return self._find(memory, touched, felt) if felt.size else memory
         expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
-        self.pulp.observe(own[at.pulp], force, expected)
+        (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
         own[at.coming] = own[at.later]
-        if not here.size:
+        if not felt.size and not self._is_felt(force.take(here)):
             own[at.residual] = 0.0
             waiting: Follower = self._loss.wait(memory)
             return waiting
         if memory.period % EVERY and self._holds(memory, float(np.add.reduce(force))):
             return memory if not memory.alone else memory._replace(alone=0)
         own[at.residual] = 0.0
-        basis = touched.quadratic_basis.take(here, 1)
-        if self._has_jumped(memory.estimate, basis):
-            return self._find(memory._replace(losses=memory.losses + 1), touched, here)
-        return self._fit(memory, touched, here, basis)
+        if felt.size and self._has_jumped(memory.estimate, touched.quadratic_basis.take(felt, 1)):
+            return self._find(memory._replace(losses=memory.losses + 1), touched, felt)
+        return self._fit(memory, touched, here, touched.quadratic_basis.take(here, 1))
+
+    def _is_felt(self, force: Floats) -> bool:
+        """Tell whether forces under the predicted fingertip, N, are more than their noise together."""
+        return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
 
     def _holds(self, memory: Follower, force: float) -> bool:
         """Tell whether a finger is slow, and a total force, N, near the set point: then less is solved."""
@@ -189,6 +221,7 @@ class HybridControl:
             Heading(x, y),
             felt=height,
             losses=memory.losses,
+            due=self._unknown,
         )
         return self._fit(memory, touched, here, basis)
 
@@ -212,6 +245,11 @@ class HybridControl:
     def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
         """Form the blister, and drive all pins to their heights; see `Controller`."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
+        if memory.master.phase is not Phase.IDLE:
+            known = seen._replace(target=seen.target - lead)
+            lead[:] = speeds[:] = 0.0
+            master, commands = self.substitute.command(memory.master, known)
+            return memory._replace(master=master, led_radius=0.0), commands
         moved = Moved(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
@@ -238,9 +276,15 @@ class HybridControl:
     ) -> Follower:
         """Turn the force into the height of the top; without contact go back to where it was felt."""
         top, felt, trim = memory.felt, memory.felt, memory.trim
-        if not memory.alone:
+        if memory.alone:
+            memory = memory._replace(due=self._unknown)
+        else:
             asked, force = self.parameters.force_setpoint, float(np.add.reduce(seen.force))
-            top = self._set_top(memory, seen, region, moved, self._holds(memory, force), raised=raised)
+            holds = self._holds(memory, force)
+            top, coming = self._set_top(memory, seen, region, moved, holds, raised=raised)
+            # The trim belongs to a force that pins reach.
+            coming -= trim * (coming == asked + trim)
+            memory = self._doubt(memory, force, coming, seen.force.size, top)
             if abs(asked - force) <= LEARNED * asked:
                 trim += (asked - force) * self.device.period / self.parameters.trim_time
                 felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
@@ -248,32 +292,50 @@ class HybridControl:
         reach = self.profile.find_reach(top - memory.edge, region.speed)
         return memory._replace(top=top, felt=felt, trim=trim, led_x=x, led_y=y, led_radius=reach)
 
+    def _doubt(self, memory: Follower, force: float, coming: float, cells: int, top: float) -> Follower:
+        """Compare a force of some cells, N, with its prediction; hand over to Method I when they disagree."""
+        (due, *later), asked = memory.due, self.parameters.force_setpoint
+        error = min(abs(force - due), LEARNED * asked) if due >= 0.0 else 0.0
+        doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
+        doubt = max(doubt, 0.0)
+        if doubt <= (DOUBTED * asked) ** 2:
+            return memory._replace(due=(*later, coming), doubt=doubt)
+        x, y = memory.estimate.mean[:2].tolist()
+        master = Master(
+            Phase.SHAPING, x, y, top, 0.0, top, memory.edge, memory.heading, top, 0, memory.losses
+        )
+        return memory._replace(master=master, doubt=0.0)
+
     def _set_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, held: bool, *, raised: bool
-    ) -> float:
-        """Return the height of the top, m: solved for, or while the force is held along with the finger."""
+    ) -> tuple[float, float]:
+        """Return height of the top, m, and its force, N: solved for, or while held along with the finger."""
         guess = memory.top + float(memory.estimate.mean[5]) * self.device.period
         if held and memory.period % EVERY:
             seen.own[self._at.later] += guess - memory.top
-            top = guess
+            top, force = guess, self.parameters.force_setpoint + memory.trim
         else:
-            top = self._solve_top(memory, seen, region, moved, guess, raised=raised)
-        return min(max(top, 0.0), self.device.cell.actuator.stroke)
+            top, force = self._solve_top(memory, seen, region, moved, guess, raised=raised)
+        return min(max(top, 0.0), self.device.cell.actuator.stroke), force
 
     def _solve_top(
         self, memory: Follower, seen: Measurement, region: Region, moved: Moved, guess: float, *, raised: bool
-    ) -> float:
-        """Return the height of the top at which the forces predicted add up to the set point, m."""
+    ) -> tuple[float, float]:
+        """Return the height of the top at which predicted forces add up to the set point, and that sum."""
         (near,) = (region.cells.distance <= self.contact_radius).nonzero()
         if not near.size:
-            return memory.felt
+            return memory.felt, 0.0
         at, own = self._at, seen.own.take(near, 1)
         under = self.finger.find_underside(region.aim, memory.estimate, seen.quadratic_basis.take(near, 1))
         under += own[at.residual]
+        seen.own[at.later] = AWAY
         seen.own[at.later, near] = under
         ends = moved.limits.take(near, 1)
         ends *= self.servo.span
         ends += moved.coasted.take(near)
+        *_, lowest, highest = self._limits[ends.shape]
+        np.maximum(ends, lowest, out=ends)
+        np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
         wanted, lost = self.parameters.force_setpoint + memory.trim, self.pulp.predict_loss(own[at.pulp])
         reach = Reach(part, region.drop.take(near), ends)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .finger_estimate import STATES, Estimate
-from .master_memory import Phase
+from .master_memory import Master, Phase
 from .travel import Heading
 
 __all__ = ["Follower"]
@@ -38,6 +38,12 @@ class Follower(NamedTuple):
         How often the finger was lost.
     led_x, led_y, led_radius : float
         Disc within which pins may stand where they will not be left, m; a radius of 0: none does.
+    due : tuple of float
+        Total forces predicted for this and the next periods, N; below 0: none is.
+    doubt : float
+        Mean square by which those of the last periods were off, N².
+    master : Master
+        Memory of Method I while it takes over; IDLE: it does not.
     """
 
     phase: Phase = Phase.IDLE
@@ -53,3 +59,6 @@ class Follower(NamedTuple):
     led_x: float = 0.0
     led_y: float = 0.0
     led_radius: float = 0.0
+    due: tuple[float, ...] = ()
+    doubt: float = 0.0
+    master: Master = Master()

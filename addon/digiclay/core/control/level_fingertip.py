@@ -1,8 +1,10 @@
-"""Underside of a level fingertip of any turn and size, and its slopes.
+"""Underside of a level fingertip of any size, elongation and turn, and its slopes.
 
-The squared reduced radius of a cell is ``q = A u² + B v²``, with u and v from the lowest point along the axes
-of the fingertip, and A and B one over their squares. The underside depends on q alone, and goes with the size
-k: ``H = z + k h(q)``, ``A, B ~ 1/k²``. So its slopes by place, turn and size follow from those of q and h'.
+The squared reduced radius of a cell is ``q = M ((1 - e) u² + (1 + e) v² - 2 d u v)``, with u and v from the
+lowest point along x and y. A fingertip with the semi-axes a and b has ``M = (1/a² + 1/b²) / 2``; turned by φ
+``e = n cos 2φ`` and ``d = n sin 2φ`` with ``n = (a² - b²) / (a² + b²)``. q is linear in e and d, as it is not
+in φ: a fingertip across the expected one is found like any other. The underside depends on q alone, and goes
+with the size k: ``H = z + k h(q)``, ``M ~ 1/k²``. So its slopes follow from those of q and h'.
 """
 
 from __future__ import annotations
@@ -31,17 +33,18 @@ class Place(NamedTuple):
     ----------
     x, y, z : float
         Lowest point, m.
-    turn : float
-        About the vertical, rad.
     size : float
         Logarithm of its size over the known one.
+    along, askew : float
+        Elongation along x, and along the diagonal between x and y; see above.
     """
 
     x: float
     y: float
     z: float
-    turn: float
     size: float
+    along: float
+    askew: float
 
 
 class Slopes(NamedTuple):
@@ -51,8 +54,8 @@ class Slopes(NamedTuple):
     ----------
     under : ndarray (m,)
         m.
-    slopes : ndarray (5, m)
-        By size, x, y, turn and z.
+    slopes : ndarray (6, m)
+        By size, x, y, the two elongations and z.
     """
 
     under: Floats
@@ -66,16 +69,15 @@ class _Profile(NamedTuple):
 
     Attributes
     ----------
-    along, across : float
-        A and B of the known fingertip, 1/m².
+    mean : float
+        M of the known fingertip, 1/m².
     slope, bend, lowest, least : float
         m.
     root : float
         Root of `least`.
     """
 
-    along: float
-    across: float
+    mean: float
     slope: float
     bend: float
     lowest: float
@@ -83,12 +85,10 @@ class _Profile(NamedTuple):
     root: float
 
     def resize(self, size: float) -> _Profile:
-        """Return the numbers of k h(q), and A and B, at the logarithm of a size."""
+        """Return the numbers of k h(q), and M, at the logarithm of a size."""
         k = math.exp(size)
-        along, across, slope, bend, lowest, least, root = self
-        return _Profile(
-            along / (k * k), across / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root
-        )
+        mean, slope, bend, lowest, least, root = self
+        return _Profile(mean / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +103,20 @@ class LevelFingertip:
     fingertip: Fingertip
 
     @cached_property
+    def elongation(self) -> float:
+        """Elongation n of the known fingertip, below 0 where it is wider than long."""
+        length, width = self.fingertip.length**2, self.fingertip.width**2
+        return (length - width) / (length + width)
+
+    @cached_property
     def _profile(self) -> _Profile:
         """What the underside is computed with."""
         outline = self.fingertip.outline(np.array([[0.0, 0.0, 0.0, *LEVEL]]))
         (inner, tangent), join = compute_forms(outline)
-        along, across = outline[0, 3], outline[0, 5]
         bend, (least, root) = inner[0], join.ravel()
         lowest = (math.sqrt(bend) - root) ** 2
-        return _Profile(*map(float, (along, across, tangent[3] / along, bend, lowest, least, root)))
+        mean, slope = 0.5 * (outline[0, 3] + outline[0, 5]), tangent[3] / outline[0, 3]
+        return _Profile(*map(float, (mean, slope, bend, lowest, least, root)))
 
     def find_underside(self, place: Place, basis: Floats) -> Floats:
         """Return the underside over cells, (m,), m.
@@ -136,30 +142,28 @@ class LevelFingertip:
         """
         known = self._profile.resize(place.size)
         radius = _find_radius(known, place)
-        rows = np.empty((7, basis.shape[1]))
+        rows = np.empty((8, basis.shape[1]))
         forms = (*_list_surfaces(known, place, radius), *_list_slopes(known, place, radius))
-        np.array(forms).dot(basis, out=rows[:6])
+        np.array(forms).dot(basis, out=rows[:7])
         under, tangent, slopes = rows[0], rows[1], rows[2:]
         bend = np.sqrt(np.maximum(under, known.least))
         join_surfaces(under, tangent, known.least, known.root)
         # h'(q) of each cell: what the slopes of q are to be multiplied with.
         np.divide(known.bend * known.root, bend, out=bend)
         bend += known.slope - known.bend
-        slopes[:4] *= bend
+        slopes[:5] *= bend
         # With the size h grows, while q shrinks.
         slopes[0] += under
         slopes[0] -= place.z
-        slopes[4] = 1.0
+        slopes[5] = 1.0
         return Slopes(under, slopes)
 
 
 def _find_radius(known: _Profile, place: Place) -> Form:
     """Return q."""
-    x, y, _, turn, _ = place
-    a, b = known.along, known.across
-    c, s = math.cos(turn), math.sin(turn)
-    xx, xy, yy = a * c * c + b * s * s, (a - b) * c * s, a * s * s + b * c * c
-    return _place_form(x, y, xx, 2.0 * xy, yy)
+    x, y, _, _, along, askew = place
+    mean = known.mean
+    return _place_form(x, y, mean * (1.0 - along), -2.0 * mean * askew, mean * (1.0 + along))
 
 
 def _place_form(x: float, y: float, xx: float, xy: float, yy: float) -> Form:
@@ -179,13 +183,13 @@ def _list_surfaces(known: _Profile, place: Place, radius: Form) -> tuple[Form, F
 
 
 def _list_slopes(known: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
-    """Return the slopes of q by size, x, y and turn."""
+    """Return the slopes of q by size, x, y and the two elongations."""
     one, x, y, xx, xy, yy = radius
-    cosine, sine = math.cos(2.0 * place.turn), math.sin(2.0 * place.turn)
-    skew = known.along - known.across
+    mean = known.mean
     return (
         (-2.0 * one, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
         (-x, -2.0 * xx, -xy, 0.0, 0.0, 0.0),
         (-y, -xy, -2.0 * yy, 0.0, 0.0, 0.0),
-        _place_form(place.x, place.y, -skew * sine, 2.0 * skew * cosine, skew * sine),
+        _place_form(place.x, place.y, -mean, 0.0, mean),
+        _place_form(place.x, place.y, 0.0, -2.0 * mean, 0.0),
     )

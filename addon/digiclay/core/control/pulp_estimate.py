@@ -21,6 +21,11 @@ __all__ = ["PulpEstimate", "Span"]
 Floats = NDArray[np.float64]
 
 
+#: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N. At
+#: 1 mN cells at the rim are taken whose undersides are known less exactly, and tilted fingertips are lost.
+EXPECTED, LEAST = 0.2, 10e-3
+
+
 class Span(NamedTuple):
     """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
@@ -101,11 +106,13 @@ class PulpEstimate:
         self.touch.pulp.age(pulp[:-1], self.period * periods)
         pulp[-1, periods > 0.0] = 0.0
 
-    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> None:
-        """Bring filters and tensions of cells up to date, in place.
+    def observe(self, pulp: Floats, force: Floats, expected: Floats) -> NDArray[np.bool_]:
+        """Bring filters and tensions of cells up to date, in place; return which cells are touched.
 
         Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
         of a cell without a force is the expected one, at most the one at which a force would be measured.
+        A cell is also touched where a force is expected, whatever is measured: that there is none tells where
+        the fingertip ends; and a choice by noisy forces would take the cells whose noise is positive.
 
         Parameters
         ----------
@@ -117,14 +124,17 @@ class PulpEstimate:
             Tension under the predicted fingertip, N.
         """
         span = self.once
-        kept = span.kept.dot(pulp)
-        found = np.maximum(force, self.floor)
-        found *= 1.0 / (self.touch.contact.share * span.held)
+        kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
+        touched: NDArray[np.bool_] = expected > kept[-1] + max(EXPECTED * self.floor, LEAST) / share
+        touched |= force > self.floor
+        found = np.where(touched, np.maximum(force, 0.0), self.floor)
+        found *= 1.0 / share
         found += kept[-1]
-        np.minimum(found, expected, out=found, where=force <= self.floor)
+        np.minimum(found, expected, out=found, where=~touched)
         kept[-1] = 0.0
         np.multiply(span.late, found, out=pulp)
         pulp += kept
+        return touched
 
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N.

@@ -11,15 +11,15 @@ import numpy as np
 from ..model.trajectory import Path, Waypoint
 from ..scene.schema import Scene
 
-__all__ = ["DRAG_SEED", "Pose", "draw_drags", "lift_off", "list_paths", "with_path"]
+__all__ = ["DRAG_SEED", "Pose", "drag_row", "draw_drags", "lift_off", "list_paths", "with_path"]
 
 #: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
 Pose = tuple[float, float, float, float, float, float, float]
 
 #: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
 AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
-#: Seed of the random drags.
-DRAG_SEED = 1
+#: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
+DRAG_SEED, TILT = 1, 0.37
 
 
 def with_path(scene: Scene, poses: Sequence[Pose], interpolation: str = "smooth") -> Scene:
@@ -82,12 +82,23 @@ def _lift(x: float, y: float, height: float, turn: Sequence[float] = (0.0, 0.0, 
     return [(t, x, y, z, *turn) for t, z in ways]  # type: ignore[misc]
 
 
-def _drag(x: float, y: float, height: float, speed: float, hold: float = 0.5) -> list[Pose]:
-    """Return a lift at (x, y), and a drag to the place opposite, mm and mm/s."""
-    poses = _lift(x, y, height)
-    start, way = poses[-1][0], (-x, y) if y < -20.0 else (-x, -y)
-    end = start + math.dist((x, y), way) / speed
-    return [*poses, *((t, *way, height, 0.0, 0.0, 0.0) for t in (end, end + hold))]
+def _drag(
+    x: float,
+    y: float,
+    height: float,
+    speed: float,
+    hold: float = 0.5,
+    turn: Sequence[float] = (0.0, 0.0, 0.0),
+) -> list[Pose]:
+    """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
+    poses = _lift(x, y, height, turn)
+    end = poses[-1][0] + abs(2.0 * x) / speed
+    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]  # type: ignore[misc]
+
+
+def drag_row(turn: float, pitch: float) -> list[Pose]:
+    """Return a drag at 15 mm/s along a row of pins, 1.5 mm below the surface, with a turn and pitch, rad."""
+    return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
 
 
 def list_paths() -> dict[str, tuple[str, list[Pose]]]:
@@ -111,11 +122,12 @@ def list_paths() -> dict[str, tuple[str, list[Pose]]]:
         "dead-stop": ("linear", _drag(-18.0, 0.0, 12.0, 15.0, hold=1.0)),
         "edge": ("smooth", _drag(-25.0, -35.0, 8.0, 12.0)),
         "twisted": ("smooth", twisted),
+        "across": ("linear", drag_row(0.5 * math.pi, 0.0)),
     }
 
 
 def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
-    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, with a turned fingertip.
+    """Return random drags at 5 to 16 mm/s, 8 mm below to 15 mm above the bed, with a fingertip of any turn.
 
     Parameters
     ----------
@@ -129,7 +141,8 @@ def draw_drags(count: int) -> list[tuple[str, list[Pose]]]:
             random.uniform(-10.0, 10.0, 2),
             0.5 * length * np.array((math.cos(angle), math.sin(angle))),
         )
-        first, last = (random.uniform((-1.0, -0.2, -0.2), (1.0, 0.2, 0.2)).tolist() for _ in range(2))
+        facing, turned = random.uniform((-math.pi, -1.0), (math.pi, 1.0)).tolist()
+        first, last = ((turn, *random.uniform(-TILT, TILT, 2).tolist()) for turn in (facing, facing + turned))
         poses = _lift(float(x - dx), float(y - dy), height, first)
         end = poses[-1][0] + length / speed
         poses += [(t, float(x + dx), float(y + dy), height, *last) for t in (end, end + 0.5)]
