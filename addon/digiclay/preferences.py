@@ -77,13 +77,13 @@ def take_methods(preferences: Any, context: Any) -> None:
     context : bpy.types.Context
     """
     if preferences.run_own_methods:
-        own_folder.load(bpy.path.abspath(preferences.methods_folder))
+        own_folder.load(preferences.methods_folder)
     else:
         own_folder.clear()
 
 
 def take_folder(preferences: Any, context: Any) -> None:
-    """Take the permission back: it was given for another folder.
+    """Take the permission back, which was given for another folder; store the full path of this one.
 
     Parameters
     ----------
@@ -91,6 +91,11 @@ def take_folder(preferences: Any, context: Any) -> None:
     context : bpy.types.Context
     """
     preferences.run_own_methods = False
+    full = own_folder.find_full_path(preferences.methods_folder)
+    if full != preferences.methods_folder:
+        preferences.methods_folder = full
+    elif not own_folder.is_full(full):
+        own_folder.load(full)  # refuses it, which the preferences show
 
 
 class Preferences(bpy.types.AddonPreferences):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..device import form
-from ..device.view import bed_of
+from ..device.view import bed_of, is_edited
 from ..live import running
 from ..live.waiting import active_session, blocking_reason
 from ..recorded import takes
@@ -54,8 +54,7 @@ def edited(context: Any, message: str = "Go back to Object Mode first") -> str:
     message : str
         Returned where it is so.
     """
-    bed = bed_of(context)
-    return "" if context.mode == "OBJECT" and (bed is None or bed.mode == "OBJECT") else message
+    return message if is_edited(context) else ""
 
 
 def linked(context: Any) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 import socket
 import struct
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from digiclay.device import view
 from digiclay.live import follow, running
 from digiclay.live.follow_messages import pack_subscription, parse_address, read_pose
 
-from tests.blender.session.live import FLOAT32, Clock, exact, started
+from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
 from tests.timeouts import TIMEOUT
 
 TOKEN = "a-token-of-tests"
@@ -108,7 +110,7 @@ def test_a_server_that_has_gone_stalls_nothing(bed: Any, clock: Clock, server: s
     followed(bed, server, clock)
     server.close()
     period = running.find(bed).state.period
-    assert ["No pose from" in note.message for note in clock.tick(200)] == [True]
+    assert ["No server at" in note.message for note in clock.tick(200)] == [True]
     assert running.find(bed).state.period > period
 
 
@@ -174,3 +176,33 @@ def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Pa
             client.send(pack_pose(Pose(PRESS)))
             clock.tick()
     assert read_pose(state(*PRESS)).tolist() == list(PRESS)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("websockets") is None, reason="digiclay[serve] is not installed")
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (signal.SIGKILL, "has ended"),
+        (signal.SIGINT, "has ended"),  # in order
+        (signal.SIGSTOP, "No pose from"),  # its port is open still
+    ],
+)
+def test_the_end_of_a_server_is_told_within_two_seconds(
+    bed: Any, clock: Clock, tmp_path: Path, number: int, words: str
+) -> None:
+    from tests.served import serve
+
+    started(bed)
+    with serve(tmp_path) as one:
+        bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{one.osc_port}", token=TOKEN)
+        while follow.find(bed.session_uid).pose is None:
+            assert clock.tick() == []
+            time.sleep(TICK)
+        one.process.send_signal(number)
+        clock.tick()
+        notes, ended = [], clock.now
+        while not notes:
+            time.sleep(TICK)
+            notes = clock.tick()
+    assert [words in note.message for note in notes] == [True]
+    assert clock.now - ended < 2.0
