@@ -92,19 +92,7 @@ def _require_cells(bed: Any, pins: int | None = None) -> None:
 
 
 def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
-    """Write pins into a bed's mesh.
-
-    Parameters
-    ----------
-    bed : bpy.types.Mesh
-        From `points`, with n vertices.
-    position : ndarray (n, 2)
-        Axes of the pins, m.
-    height : ndarray (n,)
-        Pin tops, m.
-    **values : ndarray (n,)
-        `mode` and `force`, as many as have changed.
-    """
+    """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `mode` and `force` (n,) what changed."""
     _require_cells(bed, len(height))
     placed = np.column_stack([position, height]) * SCALE
     bed.vertices.foreach_set("co", np.ascontiguousarray(placed, np.float32).ravel())

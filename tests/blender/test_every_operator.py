@@ -2,42 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import bpy
 import pytest
 from digiclay import operators
-from digiclay.live import tick
+from digiclay.device import view
+from digiclay.live import handlers, running, tick
+from digiclay.live.stroke_queue import queue_stroke
 from digiclay.press import tool
 
-from tests.blender.odd import ODD
+from tests.blender.at_hand import select
 from tests.blender.session.live import Clock
 
 OPERATORS = [kind for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
 #: Settings with which long work takes less time.
 QUICK: dict[str, dict[str, Any]] = {"digiclay.bake": {"last": 3}, "digiclay.add_sample": {"take": False}}
+BPY = bpy.ops
+
+
+def enter(mode: str) -> None:
+    BPY.object.mode_set(mode=mode)
+
+
+def convert(bed: Any, target: str) -> None:
+    select(bed)
+    BPY.object.convert(target=target)
+
+
+#: What can be active, and what can become of a bed that was active.
+ODD: dict[str, Callable[[Any], object]] = {
+    "a bed": lambda bed: None,
+    "its fingertip": lambda bed: select(view.fingertip_of(bed)),
+    "nothing": lambda bed: setattr(bpy.context.view_layer.objects, "active", None),
+    "another mesh": lambda bed: select(bpy.data.objects["Cube"]),
+    "a light": lambda bed: select(bpy.data.objects["Light"]),
+    "no bed in the file": lambda bed: BPY.wm.read_homefile(use_empty=True),
+    "a linked duplicate": lambda bed: BPY.object.duplicate(linked=True),
+    "edited": lambda bed: enter("EDIT"),
+    "edited by a linked duplicate": lambda bed: (
+        BPY.object.duplicate(linked=True), enter("EDIT"),
+        setattr(bpy.context.view_layer.objects, "active", bed),
+    ),
+    "sculpted": lambda bed: enter("SCULPT"),
+    "painted": lambda bed: enter("VERTEX_PAINT"),
+    "weighted": lambda bed: enter("WEIGHT_PAINT"),
+    "another mesh edited": lambda bed: (select(bpy.data.objects["Cube"]), enter("EDIT")),
+    "pins deleted": lambda bed: (
+        enter("EDIT"), BPY.mesh.select_all(action="SELECT"), BPY.mesh.delete(type="VERT"),
+    ),
+    "no vertices": lambda bed: bed.data.clear_geometry(),
+    "mesh swapped": lambda bed: setattr(bed, "data", bpy.data.meshes["Cube"]),
+    "attribute removed": lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]),
+    "converted to points": lambda bed: convert(bed, "POINTCLOUD"),
+    "converted as it is drawn": lambda bed: convert(bed, "MESH"),
+    "joined with a cube": lambda bed: (select(bpy.data.objects["Cube"], bed), BPY.object.join()),
+    "joined into a cube": lambda bed: (select(bed, bpy.data.objects["Cube"]), BPY.object.join()),
+    "geometry nodes removed": lambda bed: bed.modifiers.clear(),
+    "fingertip deleted": lambda bed: bpy.data.objects.remove(view.fingertip_of(bed)),
+    "fingertip without parent": lambda bed: setattr(view.fingertip_of(bed), "parent", None),
+    "hidden": lambda bed: bed.hide_set(True),
+    "stretched": lambda bed: setattr(bed, "scale", (1.0, 2.0, 1.0)),
+    "mirrored": lambda bed: setattr(bed, "scale", (-1.0, 1.0, 1.0)),
+    "scaled to nothing": lambda bed: setattr(bed, "scale", (0.0, 0.0, 0.0)),
+}  # fmt: skip
 
 
 @pytest.fixture
 def file(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A file with a small bed, active, beside Blender's cube: it loads quicker than a bed is made."""
     monkeypatch.chdir(tmp_path)  # for what is exported
-    monkeypatch.setenv("HOME", str(tmp_path))
-    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    BPY.mesh.digital_clay_add(rows=5, columns=5)
     tool.take_up(bpy.context)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    BPY.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     return bpy.data.filepath
 
 
 def prepare(file: str, odd: str, live: bool) -> Any:
-    """Load the file, with a session on its bed, and do what is odd; return what tells that it was undone."""
-    bpy.ops.wm.open_mainfile(filepath=file)
+    """Load the file, in mid-stroke of a session if wanted, do what is odd, and return the state."""
+    BPY.wm.open_mainfile(filepath=file)
+    bed, clock = bpy.context.object, Clock()
     if live:
-        tick.start(bpy.context, bpy.context.object)
-    ODD[odd](bpy.context.object)
-    Clock().tick(2)
+        tick.start(bpy.context, bed)
+        running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+        clock.tick(10)
+        assert running.find(bed).strokes[0].height is not None  # it has begun
+    ODD[odd](bed)
+    clock.tick(2)
     return state()
 
 
@@ -50,13 +103,12 @@ def calls() -> Iterator[tuple[Any, str, dict[str, Any]]]:
     """Give every operator, how to call it, and its settings; once more with either value of what has two."""
     for kind in OPERATORS:
         area, _, name = kind.bl_idname.partition(".")
-        operator, quick = getattr(getattr(bpy.ops, area), name), QUICK.get(kind.bl_idname, {})
+        operator, quick = getattr(getattr(BPY, area), name), QUICK.get(kind.bl_idname, {})
         how = "EXEC_DEFAULT" if hasattr(kind, "execute") else "INVOKE_DEFAULT"
         yield operator, how, quick
         for known in operator.get_rna_type().properties:
-            if known.type == "ENUM" and len(known.enum_items) == 2:
-                for item in known.enum_items:
-                    yield operator, how, {**quick, known.identifier: item.identifier}
+            for item in known.enum_items if known.type == "ENUM" and len(known.enum_items) == 2 else ():
+                yield operator, how, {**quick, known.identifier: item.identifier}
 
 
 def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
@@ -83,3 +135,12 @@ def test_no_operator_fails(file: str, odd: str, live: bool, capfd: pytest.Captur
             before = prepare(file, odd, live)
     assert [words for words in said if "Traceback" in words[2]] == []
     assert "Traceback" not in "".join(capfd.readouterr())  # of a poll, for instance
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_a_session_in_mid_stroke_is_ended_in_order(file: str, odd: str) -> None:
+    prepare(file, odd, live=True)
+    assert tick.withdraw_strokes(bpy.context) == bool(running.list_sessions())  # Esc, and Esc again
+    assert [session.strokes for session in running.list_sessions()] in ([], [()])
+    handlers.end_all(handlers.STOPPED)
+    assert running.list_sessions() == ()

@@ -14,7 +14,7 @@ __all__ = ["Action", "FileAction", "Polled"]
 
 
 def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
-    """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator without a word."""
+    """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator unsaid."""
 
     @wraps(step)
     def guarded(self: Any, context: Any, event: Any) -> set[str]:
@@ -24,7 +24,7 @@ def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
             words = str(error)
         except Exception as error:
             traceback.print_exc()  # a fault of the extension: the console has what a report of it needs
-            words = localize("{} ended by a fault: {}", localize(self.bl_label), one_line(error))
+            words = localize("Fault of the extension: {}: {}", type(error).__name__, one_line(error))
         if step.__name__ == "modal":
             self.give_up(context, words)
         self.report({"ERROR"}, words)
@@ -39,7 +39,6 @@ class Polled:
     It needs Object Mode, unless `in_any_mode` is set; `end_in_order` surrounds its `invoke` and `modal`.
     """
 
-    bl_label: str
     report: Any
     poll_message_set: Any
     in_any_mode = False

@@ -30,12 +30,12 @@ def read_present() -> FolderMethods:
 
 
 def is_full(folder: str) -> bool:
-    """Return whether a folder, or none, is the same whatever file is open, and wherever Blender was started."""
-    return not folder or Path(folder).is_absolute() and not folder.startswith("//")
+    """Return whether a folder, or none, is the same whatever file is open."""
+    return not folder or (Path(folder).is_absolute() and not folder.startswith("//"))
 
 
 def find_full_path(folder: str) -> str:
-    """Return the full path of a folder beside the open file; the folder itself where that has no place yet."""
+    """Return the full path of a folder beside the open file; the folder as it is while that is unsaved."""
     return folder if is_full(folder) or not bpy.data.filepath else str(bpy.path.abspath(folder))
 
 
