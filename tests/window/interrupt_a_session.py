@@ -29,11 +29,13 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
     """Draw a stroke, go to Edit Mode before the finger has finished it, and take it back with Esc there."""
     blender.select(blender.beds()[0])
     yield None
-    for kind, value, x in (("MOUSEMOVE", "NOTHING", -15), ("LEFTMOUSE", "PRESS", -15),
-                           ("MOUSEMOVE", "NOTHING", 15), ("LEFTMOUSE", "RELEASE", 15)):  # fmt: skip
+    move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
+    way = [(*move, x) for x in (15, -15) * 4]  # more than the finger goes until Tab
+    for kind, value, x in ((*move, -15), (press, "PRESS", -15), *way, (press, "RELEASE", -15)):
         blender.event(kind, value, blender.on_the_bed(x, -25.0))  # beside the sidebar
-        yield 0.1
-    yield from blender.settle(5)
+        yield 0.05
+    (session,) = blender.part("live.running").list_sessions()
+    yield from blender.until(lambda: blender.part("live.running").list_sessions()[0].tick > session.tick)
     blender.key("TAB", blender.middle())
     yield from blender.settle()
     strokes = [len(session.strokes) for session in blender.part("live.running").list_sessions()]
