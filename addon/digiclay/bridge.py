@@ -14,10 +14,11 @@ from .core.base.errors import DigiclayError
 from .core.model.fingertip import Fingertip
 from .device.primitives import Shape
 from .device.roles import ELLIPSOID, ROLE
+from .ui_text import localize
 
 __all__ = [
-    "SCALE", "finger_of", "linear", "mesh", "move_fingertip", "place_fingertip", "points", "pose",
-    "read_cells", "resize_fingertip", "srgb", "uniform", "write_cells",
+    "SCALE", "find_fault", "find_scale_fault", "finger_of", "linear", "mesh", "move_fingertip",
+    "place_fingertip", "points", "pose", "read_cells", "resize_fingertip", "srgb", "uniform", "write_cells",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -72,20 +73,27 @@ def points(name: str, count: int) -> Any:
     return made
 
 
-def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
-    """Write pins into a bed's mesh.
+def find_fault(bed: Any, pins: int | None = None) -> str:
+    """Return why a bed's mesh can be neither read nor written as that of its pins now, or an empty text."""
+    if not isinstance(bed, bpy.types.Mesh) or not ATTRIBUTES.keys() <= set(bed.attributes.keys()):
+        return localize("the bed's mesh is no longer that of its pins: undo that to go on")
+    if bed.is_editmode:  # its attributes have length 0
+        return localize("the bed is being edited: go back to Object Mode to go on")
+    if pins not in (None, len(bed.vertices)):
+        return localize("the bed has {} pins now instead of {}: undo that to go on", len(bed.vertices), pins)
+    return ""
 
-    Parameters
-    ----------
-    bed : bpy.types.Mesh
-        From `points`, with n vertices.
-    position : ndarray (n, 2)
-        Axes of the pins, m.
-    height : ndarray (n,)
-        Pin tops, m.
-    **values : ndarray (n,)
-        `mode` and `force`, as many as have changed.
-    """
+
+def _require_cells(bed: Any, pins: int | None = None) -> None:
+    """Refuse a mesh that has a fault, by a DigiclayError."""
+    fault = find_fault(bed, pins)
+    if fault:
+        raise DigiclayError(f"{bed.name}: {fault}.")
+
+
+def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
+    """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `mode` and `force` (n,) what changed."""
+    _require_cells(bed, len(height))
     placed = np.column_stack([position, height]) * SCALE
     bed.vertices.foreach_set("co", np.ascontiguousarray(placed, np.float32).ravel())
     for name, array in values.items():
@@ -97,6 +105,7 @@ def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[An
 
 def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
     """Return `position` (n, 2) and `height` (n,), m, `mode` and `force` of a bed's mesh."""
+    _require_cells(bed)
     count = len(bed.vertices)
     placed = np.empty(3 * count, np.float32)
     bed.vertices.foreach_get("co", placed)
@@ -200,11 +209,17 @@ def uniform(bed: Any) -> float:
         When the bed, or what it is parented to, is scaled differently along its axes, sheared,
         mirrored, or scaled to nothing: lengths in it would mean nothing.
     """
-    scale, fault = _judge_scale(tuple(tuple(row) for row in bed.matrix_world))
+    fault = find_scale_fault(bed)
     if fault:
-        remedy = "Set it with Object > Apply or in the sidebar's Item tab."
-        raise DigiclayError(f"The scale of {bed.name}, that of its parents included, {fault}. {remedy}")
-    return scale
+        raise DigiclayError(fault)
+    return _judge_scale(tuple(map(tuple, bed.matrix_world)))[0]
+
+
+def find_scale_fault(bed: Any) -> str:
+    """Return why lengths in a bed mean nothing, or an empty text; see `uniform`."""
+    fault = _judge_scale(tuple(map(tuple, bed.matrix_world)))[1]
+    remedy = "Set it with Object > Apply or in the sidebar's Item tab."
+    return fault and f"The scale of {bed.name}, that of its parents included, {fault}. {remedy}"
 
 
 @lru_cache(maxsize=32)  # A session asks in every tick, and a bed seldom moves.

@@ -45,52 +45,33 @@ class Choices:
 
 
 def take_palette(preferences: Any, context: Any) -> None:
-    """Recolor the beds of the open file.
-
-    Parameters
-    ----------
-    preferences : bpy.types.AddonPreferences
-    context : bpy.types.Context
-    """
+    """Recolor the beds of the open file."""
     palettes.set_palette(preferences.palette)
 
 
 def redraw_views(preferences: Any, context: Any) -> None:
-    """Draw the 3D views anew.
-
-    Parameters
-    ----------
-    preferences : bpy.types.AddonPreferences
-    context : bpy.types.Context
-    """
+    """Draw the 3D views anew."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             area.tag_redraw()
 
 
 def take_methods(preferences: Any, context: Any) -> None:
-    """Run the files of the folder of own control methods where that is allowed; else take them back.
-
-    Parameters
-    ----------
-    preferences : bpy.types.AddonPreferences
-    context : bpy.types.Context
-    """
+    """Run the files of the folder of own control methods where that is allowed; else take them back."""
     if preferences.run_own_methods:
-        own_folder.load(bpy.path.abspath(preferences.methods_folder))
+        own_folder.load(preferences.methods_folder)
     else:
         own_folder.clear()
 
 
 def take_folder(preferences: Any, context: Any) -> None:
-    """Take the permission back: it was given for another folder.
-
-    Parameters
-    ----------
-    preferences : bpy.types.AddonPreferences
-    context : bpy.types.Context
-    """
+    """Take the permission back, which was given for another folder; store the full path of this one."""
     preferences.run_own_methods = False
+    full = own_folder.find_full_path(preferences.methods_folder)
+    if full != preferences.methods_folder:
+        preferences.methods_folder = full
+    elif not own_folder.is_full(full):
+        own_folder.load(full)  # refuses it, which the preferences show
 
 
 class Preferences(bpy.types.AddonPreferences):

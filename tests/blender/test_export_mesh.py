@@ -275,14 +275,6 @@ def test_the_heights_are_measured_from_the_rest_height_of_the_settings(bed):
     np.testing.assert_allclose(formed_bed.read_formed(bed).former, 0.035, rtol=0, atol=1e-12)
 
 
-def test_without_a_bed_nothing_can_be_exported_or_made(extension):
-    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
-    for name in ("keep_surface", "forget_surface", "find_features"):
-        assert not getattr(bpy.ops.digiclay, name).poll()
-    assert not bpy.ops.export_mesh.digital_clay.poll()
-    assert not bpy.ops.mesh.digital_clay_make.poll()
-
-
 def test_a_bed_of_one_row_has_no_surface_to_export(extension):
     bpy.ops.mesh.digital_clay_add(rows=1, columns=9)
     with pytest.raises(RuntimeError, match=r"must have 2 x 2 pins at least to carry a skin \(got 1 x 9\)"):

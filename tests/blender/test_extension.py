@@ -108,13 +108,6 @@ def test_a_new_bed_stands_on_the_cursor_selected_with_its_fingertip_above_the_pi
 
 
 @pytest.mark.usefixtures("extension")
-def test_a_bed_is_not_added_in_edit_mode() -> None:
-    bpy.ops.object.mode_set(mode="EDIT")
-    assert not bpy.ops.mesh.digital_clay_add.poll()
-    bpy.ops.object.mode_set(mode="OBJECT")
-
-
-@pytest.mark.usefixtures("extension")
 def test_an_imported_run_shows_the_row_asked_for(tmp_path: Path, formed: Instant) -> None:
     heights = np.stack([formed.height, formed.height[::-1]])
     scene = 'control = "absent"\n[layout]\nrows = 6\ncolumns = 8\narrangement = "staggered"\n'

@@ -79,6 +79,28 @@ def test_no_code_is_run_until_the_preferences_allow_it(chosen: Any, tmp_path: Pa
     assert own_folder.read_present() == ((), ())
 
 
+def test_a_folder_beside_the_open_file_is_stored_as_a_full_path_or_refused(
+    chosen: Any, tmp_path: Path
+) -> None:
+    def enter() -> None:
+        """Type the folder as in the preferences: Blender 4.5 crashes where a script assigns such a path."""
+        chosen["methods_folder"] = "//own"
+        preferences.take_folder(chosen, bpy.context)
+
+    enter()  # beside a file that was never saved
+    (line,) = own_folder.read_present().refused
+    assert line.startswith("Own Methods must be a full path (got '//own')")
+    (tmp_path / "own").mkdir()
+    write_method(tmp_path / "own")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    chosen.run_own_methods = True  # as older preferences do when Blender starts: not of whatever file is open
+    assert (list_added(), own_folder.read_present().refused) == ({}, (line,))
+    enter()
+    assert (chosen.methods_folder, chosen.run_own_methods) == (str(tmp_path / "own"), False)
+    chosen.run_own_methods = True
+    assert list(list_added()) == ["soft_pad"]
+
+
 def test_its_parameters_are_properties_with_units_and_bounds(chosen: Any) -> None:
     chosen.run_own_methods = True
     bed = add_bed()

@@ -122,8 +122,3 @@ def test_a_folder_that_cannot_be_made_is_told_of(bed: Any) -> None:
             own_presets.save("Mine", properties.scene_of(bed))
     finally:
         os.unlink(folder)
-
-
-@pytest.mark.parametrize("operator", ["preset_apply", "preset_save", "preset_remove", "rebuild"])
-def test_without_a_bed_the_buttons_are_disabled(operator: str) -> None:
-    assert not getattr(bpy.ops.digiclay, operator).poll()

@@ -209,11 +209,6 @@ def test_a_take_is_exported_while_a_session_runs_and_records(bed: Any, tmp_path:
     tick.stop(bed.session_uid)
 
 
-@pytest.mark.parametrize("name", ["take_record", "take_keep", "take_replay", "take_export", "take_remove"])
-def test_a_button_without_what_it_needs_is_disabled(bed: Any, name: str) -> None:
-    assert not getattr(bpy.ops.digiclay, name).poll()
-
-
 def test_the_session_recorded_by_hand_is_the_one_sculpting_records(bed: Any) -> None:
     begin(bed)
     running.put(sculpting.set_recording(running.find(bed), True))

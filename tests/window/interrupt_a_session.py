@@ -25,6 +25,31 @@ def press(blender: Any) -> Iterator[float | None]:
     yield None
 
 
+def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
+    """Draw a stroke, go to Edit Mode before the finger has finished it, and take it back with Esc there."""
+    blender.select(blender.beds()[0])
+    yield None
+    move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
+    way = [(*move, x) for x in (15, -15) * 4]  # more than the finger goes until Tab
+    for kind, value, x in ((*move, -15), (press, "PRESS", -15), *way, (press, "RELEASE", -15)):
+        blender.event(kind, value, blender.on_the_bed(x, -25.0))  # beside the sidebar
+        yield 0.05
+    (session,) = blender.part("live.running").list_sessions()
+    yield from blender.until(lambda: blender.part("live.running").list_sessions()[0].tick > session.tick)
+    blender.key("TAB", blender.middle())
+    yield from blender.settle()
+    strokes = [len(session.strokes) for session in blender.part("live.running").list_sessions()]
+    blender.look("edited")
+    blender.shot("session_edited")
+    blender.key("ESC", blender.middle())
+    yield from blender.settle()
+    left = [len(session.strokes) for session in blender.part("live.running").list_sessions()]
+    blender.SEEN["strokes"] = [strokes, left]
+    blender.key("TAB", blender.middle())
+    yield from blender.settle()
+    blender.look("edited no more")
+
+
 def script(blender: Any) -> Iterator[float | None]:
     """Do to a session what can be done to it."""
     yield from blender.empty_scene()
@@ -66,18 +91,14 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
     blender.look("scene back")
 
-    blender.select(blender.beds()[0])
-    yield None
-    blender.key("TAB", blender.middle())
-    yield from blender.settle()
-    blender.look("edited")
-    blender.key("TAB", blender.middle())
-    yield from blender.settle()
-    blender.look("edited no more")
+    yield from edit_in_mid_stroke(blender)
 
     blender.beds()[0].scale = (1.0, 1.0, 1.5)
     yield from blender.settle()
     blender.look("scaled")
+    blender.key("F", blender.on_the_bed(0.0, -25.0))  # at every redraw it would fail
+    yield 1.0
+    blender.SEEN["adjusting"] = [operator.bl_idname for operator in blender.window().modal_operators]
     blender.beds()[0].scale = (1.0, 1.0, 1.0)
     yield from blender.settle()
     blender.look("scaled no more")

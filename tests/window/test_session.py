@@ -144,6 +144,14 @@ def test_a_session_waits_with_the_reason_and_goes_on(
     assert lowest(later) == pytest.approx(lowest(interrupted["formed"]), abs=2 * SETTLING)
 
 
+def test_esc_in_edit_mode_takes_a_stroke_back_and_a_stretched_bed_is_not_adjusted(
+    interrupted: dict[str, Any],
+) -> None:
+    # That nothing failed meanwhile is seen to by `played`.
+    assert interrupted["strokes"] == [[1], [0]]
+    assert "DIGICLAY_OT_press_size" not in interrupted["adjusting"]
+
+
 def test_a_session_goes_on_in_another_workspace(interrupted: dict[str, Any]) -> None:
     there = interrupted["in another workspace"]
     assert (there["sessions"], there["waits"]) == (1, "")

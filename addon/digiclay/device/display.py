@@ -70,18 +70,16 @@ def pick_pins(bed: Any, pins: Iterable[int]) -> None:
 
 def _rewrite(bed: Any) -> None:
     """Write the forces, which nothing wanted until now; those kept last where no session runs."""
-    session = running.find(bed)
-    if session is not None:
-        view.show_state(bed, session.system, session.state)
-        return
-    kept = bed_state.read_snapshot(bed)
-    if kept is not None:
-        try:
+    session, kept = running.find(bed), bed_state.read_snapshot(bed)
+    try:
+        if session is not None:
+            view.show_state(bed, session.system, session.state)
+        elif kept is not None:
             system = assemble(properties.scene_of(bed))
             view.show_state(bed, system, snapshot.load(system, kept))
-        except DigiclayError:
-            # The settings have changed since the state was kept: what was last drawn stays.
-            return
+    except DigiclayError:
+        # The bed is edited, or its settings have changed since the state was kept: what was last drawn stays.
+        return
 
 
 def _form(display: Any) -> int:

@@ -31,7 +31,7 @@ from .roles import BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, ROLE
 __all__ = [
     "BED", "COLORINGS", "ELLIPSOID", "FINGERTIP", "HOUSING", "ROLE", "add_modifier", "arrow_length",
     "bed_of", "build", "color_by", "color_source", "fingertip_of", "hold_parts", "housing_of", "is_bed",
-    "is_drawn", "material", "scale_arrows", "scale_colors", "show", "show_arrows", "show_state",
+    "is_drawn", "is_edited", "material", "scale_arrows", "scale_colors", "show", "show_arrows", "show_state",
     "shows_arrows", "shows_force", "sources_of", "top_color", "underside", "wants_force",
 ]  # fmt: skip
 
@@ -227,7 +227,7 @@ def is_drawn(bed: Any) -> bool:
 
 def is_bed(thing: Any) -> bool:
     """Return whether an object is a bed of this extension."""
-    return thing is not None and thing.get(ROLE) == BED
+    return thing is not None and thing.get(ROLE) == BED and thing.type == "MESH"
 
 
 def bed_of(context: Any) -> Any:
@@ -236,6 +236,12 @@ def bed_of(context: Any) -> Any:
     while thing is not None and not is_bed(thing):
         thing = thing.parent
     return thing
+
+
+def is_edited(context: Any) -> bool:
+    """Return whether the active object, or the bed it belongs to, is being edited, painted or posed."""
+    bed = bed_of(context)
+    return context.mode != "OBJECT" or (bed is not None and bed.mode != "OBJECT")
 
 
 def fingertip_of(bed: Any) -> Any | None:

@@ -22,8 +22,11 @@ Floats = NDArray[np.float64]
 
 #: Poses a second asked for: some between two ticks.
 RATE = 120.0
-#: Time between two subscriptions, and that after which a server is silent, s.
-RENEW, SILENT = 1.0, 3.0
+#: Time between two subscriptions, and that after which a server is silent, s: its end is told within 2 s.
+RENEW, SILENT = 1.0, 1.5
+#: What is told of a server whose port is closed, and of one that sends nothing.
+ENDED = "No server at {}: it has ended, or is not started yet"
+UNHEARD = "No pose from {}: is the server running, and the token right?"
 #: Most datagrams read in a tick: more than a server sends meanwhile.
 MOST = 1000
 
@@ -122,15 +125,15 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     if now - following.asked >= RENEW:
         _send(following.door, pack_subscription(following.token, RATE))
         following = replace(following, asked=now)
-    pose, told = _receive(following.door), ""
+    (pose, closed), told = _receive(following.door), ""
     heard = now if following.heard is None else following.heard
     if pose is not None:
         if following.silent:
             told = localize("The server at {} is heard again", following.address)
         following = replace(following, pose=pose, heard=now, silent=False)
-    elif not following.silent and now - heard >= SILENT:
+    elif not following.silent and (closed or now - heard >= SILENT):
         following = replace(following, silent=True)
-        told = localize("No pose from {}: is the server running, and the token right?", following.address)
+        told = localize(ENDED if closed else UNHEARD, following.address)
     else:
         following = replace(following, heard=heard)
     _FOLLOWED[uid] = following
@@ -145,16 +148,17 @@ def _send(door: socket.socket, data: bytes) -> None:
         return
 
 
-def _receive(door: socket.socket) -> Floats | None:
-    """Return the newest pose that has come, None for none."""
-    newest = None
+def _receive(door: socket.socket) -> tuple[Floats | None, bool]:
+    """Return the newest pose that has come, None for none; and whether nobody listens at the port."""
+    newest, closed = None, False
     for _ in range(MOST):
         try:
             data = door.recv(2048)
         except BlockingIOError:
             break
-        except OSError:  # nobody listens there now
+        except OSError as error:
+            closed = closed or isinstance(error, ConnectionError)
             continue
         pose = read_pose(data)
         newest = newest if pose is None else pose
-    return newest
+    return newest, closed

@@ -97,14 +97,17 @@ def end(how: str, *sessions: Running) -> None:
     recovery.clear_recovery()
     sessions = sessions or running.list_sessions()
     words = [localize("The session of {} {}", ", ".join(session.name for session in sessions), localize(how))]
-    words += filter(None, [tick.stop(session.uid) for session in sessions])
+    try:
+        words += filter(None, [tick.stop(session.uid) for session in sessions])
+    finally:  # whatever cannot be kept, none of them stays listed without a loop
+        for session in sessions:
+            running.drop(session.uid)
+            running.set_message(". ".join(words))
+        if not running.list_sessions():
+            loop.end()
+            unwatch()
+        views.follow()
     selection.select_active(frozenset(session.uid for session in sessions))
-    if sessions:
-        running.set_message(". ".join(words))
-    if not running.list_sessions():
-        loop.end()
-        unwatch()
-    views.follow()
 
 
 def end_all(how: str) -> None:

@@ -78,7 +78,7 @@ def stop(uid: int) -> str:
 
 
 def show(bed: Any, session: Running) -> None:
-    """Make a value the present one of a session, kept and shown by its bed.
+    """Make a value the present one of a session, kept by its bed, and shown as soon as its mesh can be.
 
     Parameters
     ----------
@@ -87,7 +87,8 @@ def show(bed: Any, session: Running) -> None:
     """
     running.put(session)
     bed_state.write(bed, session)
-    view.show_state(bed, session.system, session.state)
+    if not bridge.find_fault(bed.data, session.system.grid.count):
+        view.show_state(bed, session.system, session.state)
 
 
 def place_finger(context: Any, bed: Any, session: Running) -> None:
@@ -162,8 +163,9 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         running.put(replace(session, stale=session.stale - 1))
         return []
     before = session
+    followed, heard = follow.follow(session.uid, now)
     why, session, said = _read_changes(context, bed, session)
-    notes = [Note("WARNING", f"{bed.name}: {said}")] if said else []
+    notes = [Note("WARNING", f"{bed.name}: {words}") for words in (said, heard) if words]
     if why:
         waiting = replace(session, blocking_reason=why, clock=session.clock.stopped(), name=bed.name)
         running.put(replace(waiting, tick=waiting.tick + 1))
@@ -178,9 +180,6 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         notes.append(Note("INFO", localize("The session of {} goes on", bed.name)))
     session = replace(session, blocking_reason="", name=bed.name)
     seen = _visible_rows(session)
-    followed, heard = follow.follow(session.uid, now)
-    if heard:
-        notes.append(Note("WARNING", f"{bed.name}: {heard}"))
     try:
         # The finger of a stroke is where the session has put it.
         pose = session.pose if session.strokes else followed
@@ -194,7 +193,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
     moved = (bool(session.strokes) or followed is not None) and _move_finger(bed, later)
     bed_state.write(bed, later, before)
     # Drawing is what costs most: where nothing has changed, nothing is drawn anew.
-    if before.stale or said or not np.array_equal(seen, _visible_rows(later)):
+    if before.stale or before.blocking_reason or said or not np.array_equal(seen, _visible_rows(later)):
         view.show_state(bed, later.system, later.state)
     if moved:  # One evaluation of pins and fingertip takes less time than one of each.
         _evaluate(context)

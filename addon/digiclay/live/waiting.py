@@ -8,7 +8,6 @@ import numpy as np
 
 from .. import bridge
 from ..compat import bpy
-from ..core.base.errors import DigiclayError
 from ..device import view
 from ..ui_text import localize
 from . import running
@@ -29,7 +28,7 @@ def find_bed(uid: int, name: str) -> Any | None:
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
-    if bed is None or not view.is_bed(bed):
+    if bed is None or bed.get(view.ROLE) != view.BED:  # one that was converted can come back by undo
         return None
     # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
     return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
@@ -56,14 +55,11 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
     if not _is_shown(context, bed):
         return localize("no window shows its scene, or its collection is left out: show it to go on")
     # A mesh can also be edited through another object that shares it.
-    if bed.mode != "OBJECT" or (bed.type == "MESH" and bed.data.is_editmode):
+    if bed.mode != "OBJECT":
         return localize("the bed is being edited: go back to Object Mode to go on")
-    if bed.type != "MESH" or not bridge.ATTRIBUTES.keys() <= set(bed.data.attributes.keys()):
-        return localize("the bed's mesh is no longer that of its pins: undo that to go on")
-    if pins is not None and len(bed.data.vertices) != pins:
-        return localize(
-            "the bed has {} pins now instead of {}: undo that to go on", len(bed.data.vertices), pins
-        )
+    fault = bridge.find_fault(bed.data, pins)
+    if fault:
+        return fault
     tip = view.fingertip_of(bed)
     if tip is None:
         return localize(
@@ -71,10 +67,9 @@ def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
         )
     if not _is_shown(context, tip):
         return localize("its fingertip stands in no scene shown: link it to a collection to go on")
-    try:
-        bridge.uniform(bed)
-    except DigiclayError as error:
-        return str(error)
+    fault = bridge.find_scale_fault(bed)
+    if fault:
+        return fault
     matrix = np.array(tip.matrix_world)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         return localize("its fingertip is scaled to nothing: clear its scale to go on")

@@ -18,6 +18,7 @@ class FollowServer(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.follow_server"
     bl_label = "Follow a Server"
+    in_any_mode = True
 
     address: bpy.props.StringProperty(
         name="Address",
@@ -56,6 +57,7 @@ class LeaveServer(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.leave_server"
     bl_label = "Stop Following"
+    in_any_mode = True
 
     @classmethod
     def poll_message(cls, context: Any) -> str:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Generator
 from typing import Any
 
-from ..core.base.errors import DigiclayError
 from ..ui_text import localize
 from . import status
 from .action import Action
@@ -60,10 +59,6 @@ class LongWork(Action):
         except StopIteration:
             self._end(context)
             return {"FINISHED"}
-        except DigiclayError as error:
-            self._end(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
         context.window_manager.progress_update(100.0 * share)
         said = localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
         status.show(context, said)

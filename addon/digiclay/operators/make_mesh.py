@@ -12,7 +12,6 @@ from ..exchange import body_mesh, formed_bed
 from ..ui_text import localize
 from .add_bed import select_only
 from .mesh_options import SurfaceOptions, chosen_bed
-from .poll_messages import edited, no_surface
 
 __all__ = ["MakeMesh"]
 
@@ -34,12 +33,6 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
         description="Place the mesh beside the bed instead of on its surface",
         default=True,
     )
-
-    @classmethod
-    def poll_message(cls, context: Any) -> str:
-        """A bed is needed, and no edit mode of another object."""
-        why = edited(context, "Leave Edit Mode first: the mesh is an object of its own")
-        return why or no_surface(context)
 
     def draw(self, context: Any) -> None:
         """Draw the redo panel."""
@@ -81,7 +74,7 @@ def _beside(context: Any, bed: Any, width: float) -> Any:
         Of its pins, in its own space.
     """
     step, half = (1.0 + GAP) * width, width / 2
-    to_bed = np.array(bed.matrix_world.inverted(), np.float64)
+    to_bed = np.array(bed.matrix_world.inverted_safe(), np.float64)
     place = 1
     for low, high in sorted(_spans(context, to_bed, half)):
         if low < place * step + half and place * step - half < high:

@@ -9,7 +9,7 @@ from ..live import running, tick
 from ..live.recorded_strokes import play_strokes, read_strokes
 from ..ui_text import localize
 from .action import FileAction
-from .poll_messages import baked, edited, linked, no_bed, session_runs
+from .poll_messages import baked, linked, no_bed, session_runs
 
 __all__ = ["PlayStrokes"]
 
@@ -27,8 +27,7 @@ class PlayStrokes(FileAction, bpy.types.Operator):
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """A bed is needed that a session could begin on."""
-        stands = no_bed(context) or session_runs(context) or linked(context)
-        return stands or baked(context) or edited(context)
+        return no_bed(context) or session_runs(context) or linked(context) or baked(context)
 
     def perform(self, context: Any) -> None:
         """Play them in a session of their own; when one of them fails, the bed stays as it was."""

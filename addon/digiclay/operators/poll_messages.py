@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..device import form
-from ..device.view import bed_of
+from ..device.view import bed_of, is_edited
 from ..live import running
 from ..live.waiting import active_session, blocking_reason
 from ..recorded import takes
@@ -22,40 +22,18 @@ __all__ = [
 
 
 def no_bed(context: Any, message: str = "Select a bed or its fingertip first") -> str:
-    """No part of a bed is active; `linked`, `baked` and `no_take` are to be asked after this.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    message : str
-        Returned where it is so.
-    """
+    """No part of a bed is active; `linked`, `baked` and `no_take` are to be asked after this."""
     return "" if bed_of(context) is not None else message
 
 
 def session_runs(context: Any, message: str = "Stop the session first") -> str:
-    """A session runs on the bed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    message : str
-        Returned where it is so.
-    """
+    """A session runs on the bed."""
     return message if running.find(bed_of(context)) is not None else ""
 
 
 def edited(context: Any, message: str = "Go back to Object Mode first") -> str:
-    """The active object, or the bed it belongs to, is being edited, painted or posed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    message : str
-        Returned where it is so.
-    """
-    bed = bed_of(context)
-    return "" if context.mode == "OBJECT" and (bed is None or bed.mode == "OBJECT") else message
+    """The active object, or the bed it belongs to, is being edited, painted or posed."""
+    return message if is_edited(context) else ""
 
 
 def linked(context: Any) -> str:
@@ -68,14 +46,7 @@ def linked(context: Any) -> str:
 def baked(
     context: Any, message: str = "The bed plays a baked session: free the bake in the Takes panel first"
 ) -> str:
-    """The bed plays a bake.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    message : str
-        Returned where it is so.
-    """
+    """The bed plays a bake."""
     return message if is_baked(bed_of(context)) else ""
 
 

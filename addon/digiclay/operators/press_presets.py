@@ -5,14 +5,15 @@ from typing import Any
 from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 
 from ..compat import bpy
+from ..core.base.errors import DigiclayError
 from ..press import brush, brush_presets
-from .action import Polled
+from .action import Action, Polled
 from .radial import no_tool
 
 __all__ = ["ApplyBrush", "BrushMenu", "SaveBrush"]
 
 
-class ApplyBrush(Polled, bpy.types.Operator):
+class ApplyBrush(Action, bpy.types.Operator):
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
 
     bl_idname = "digiclay.press_brush"
@@ -20,17 +21,19 @@ class ApplyBrush(Polled, bpy.types.Operator):
     bl_options = {"UNDO", "INTERNAL"}
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    menu_idname: bpy.props.StringProperty(options={"SKIP_SAVE"})
+    menu_idname: bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"})
 
     @classmethod
     def poll_message(cls, context: Any) -> str:
         """The Press tool is needed, and a bed."""
         return no_tool(context)
 
-    def execute(self, context: Any) -> set[str]:
+    def perform(self, context: Any) -> None:
         """Apply it."""
-        done: set[str] = bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=self.menu_idname)
-        return done
+        try:
+            bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=self.menu_idname)
+        except RuntimeError as error:  # what Blender says of the file
+            raise DigiclayError(str(error).removeprefix("Error: ").strip()) from None
 
 
 class BrushMenu(bpy.types.Menu):

@@ -116,7 +116,7 @@ class AdjustMixin(Polled):
     def modal(self, context: Any, event: Any) -> set[str]:
         """Follow the mouse or the keyboard, until confirmed or cancelled."""
         bed = brush.find_bed(context, self.uid)
-        if bed is None or self.poll_message(context):
+        if bed is None or not self.poll(context):
             return self._end(context, {"CANCELLED", "PASS_THROUGH"})
         if event.type.startswith(PASSED):
             return {"PASS_THROUGH"}
@@ -181,7 +181,7 @@ class AdjustMixin(Polled):
         context = bpy.context
         bed = brush.find_bed(context, self.uid)
         tip = bed and view.fingertip_of(bed)
-        if tip is None or context.area != area:
+        if tip is None or context.area != area or not self.poll(context):
             return
         from ..overlay.draw import cursor
 
@@ -222,7 +222,9 @@ def no_bed(context: Any) -> str:
     bed = brush.bed_in_use(context)
     if bed is None or view.fingertip_of(bed) is None:
         return "Select a bed of Digital Clay, or its fingertip"
-    return "" if bed.library is None else "The bed is linked from another file: make it local first"
+    if bed.library is not None:
+        return "The bed is linked from another file: make it local first"
+    return bridge.find_scale_fault(bed)
 
 
 def find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:

@@ -16,6 +16,7 @@ class ReloadMethods(Action, bpy.types.Operator):
 
     bl_idname = "digiclay.methods_reload"
     bl_label = "Reload Methods"
+    in_any_mode = True
 
     @classmethod
     def poll_message(cls, context: Any) -> str:

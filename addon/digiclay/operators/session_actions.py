@@ -17,7 +17,7 @@ from ..recorded import takes
 from ..settings import properties
 from ..ui_text import localize
 from .action import Action
-from .poll_messages import edited, no_bed, no_session, session_waits
+from .poll_messages import no_bed, no_session, session_waits
 
 __all__ = ["PauseSession", "ResetSession", "RewindSession", "StepSession", "StopSession"]
 
@@ -54,6 +54,7 @@ class PauseSession(OfSession, bpy.types.Operator):
 
     bl_idname = "digiclay.session_pause"
     bl_label = "Pause or Resume"
+    in_any_mode = True
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Turn it over."""
@@ -66,6 +67,7 @@ class StepSession(OfSession, bpy.types.Operator):
 
     bl_idname = "digiclay.session_step"
     bl_label = "Single Step"
+    in_any_mode = True
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Request one more; the next tick simulates it."""
@@ -79,6 +81,7 @@ class StopSession(OfSession, bpy.types.Operator):
     bl_idname = "digiclay.session_stop"
     bl_label = "Stop Session"
     bl_options = {"UNDO"}
+    in_any_mode = True
 
     def change(self, context: Any, bed: Any, session: Running) -> None:
         """Stop it."""
@@ -125,7 +128,7 @@ class ResetSession(OfSession, bpy.types.Operator):
         """A bed that has left its rest is needed."""
         if active_session(context) is not None:
             return session_waits(context)
-        return no_bed(context) or _at_rest(context) or edited(context)
+        return no_bed(context) or _at_rest(context)
 
     def perform(self, context: Any) -> set[str] | None:
         """Begin anew; what a session has done can be taken back."""

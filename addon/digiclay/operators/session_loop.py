@@ -11,6 +11,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..live import handlers, loop, recovery, running, tick
+from ..ui_text import localize
 from .action import Action, Polled
 
 __all__ = ["Escape", "GoOn", "LoopMixin"]
@@ -23,6 +24,8 @@ CLOSED = "ended: its window was closed"
 
 class LoopMixin(Polled):
     """Mixin of the modal operators for the sessions of a window."""
+
+    in_any_mode = True
 
     def drive(self, context: Any) -> set[str]:
         """Begin to drive the loop that there is."""
@@ -68,6 +71,10 @@ class LoopMixin(Polled):
         else:
             handlers.end_all(CLOSED)
 
+    def give_up(self, context: Any, words: str) -> None:
+        """End all sessions: nobody drives them any more."""
+        handlers.end_all(localize("ended: {}", words))
+
     def tell(self, notes: list[tick.Note]) -> None:
         """Report the messages, and keep them for the panel."""
         for note in notes:
@@ -98,6 +105,7 @@ class Escape(Action, bpy.types.Operator):
     bl_idname = "digiclay.session_escape"
     bl_label = "Stop Sessions"
     bl_options = {"INTERNAL"}
+    in_any_mode = True
 
     @classmethod
     def poll_message(cls, context: Any) -> str:

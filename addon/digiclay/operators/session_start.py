@@ -28,6 +28,7 @@ class LeaveMode(Action, bpy.types.Operator):
     bl_idname = "digiclay.leave_mode"
     bl_label = "Back to Object Mode"
     bl_options = {"REGISTER", "UNDO"}
+    in_any_mode = True
 
     @classmethod
     def poll_message(cls, context: Any) -> str:

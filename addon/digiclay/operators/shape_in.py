@@ -13,7 +13,7 @@ from ..settings.declared import title
 from ..settings.shown_units import SHOWN, to_si
 from ..ui_text import localize
 from .action import Action, FileAction
-from .poll_messages import baked, edited, linked, no_bed, session_runs
+from .poll_messages import baked, linked, no_bed, session_runs
 
 __all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
 
@@ -74,7 +74,6 @@ class Shaped(Action):
         return (
             no_bed(context)
             or session_runs(context, "Stop the session first: the bed is going to be shaped anew")
-            or edited(context)
             or baked(context)
             or linked(context)
             or cls.missing(context, bed_of(context))

@@ -65,11 +65,7 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Play it in the window."""
-        try:
-            self._begin(context)
-        except DigiclayError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        self._begin(context)
         manager, rate = context.window_manager, preferences.get(context).redraw_rate
         self._timer = manager.event_timer_add(1.0 / rate, window=context.window)
         manager.modal_handler_add(self)
@@ -84,21 +80,19 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
         bed = bed_of(context)
         if bed is None or bed.session_uid != self._uid:
             return self._left(context)
+        if bridge.find_fault(bed.data):  # it goes on when it can be drawn again
+            self._clock = self._clock.stopped()
+            return {"PASS_THROUGH"}
         period = self._system.period
         count, self._clock = periods_due(
             self._clock, time.perf_counter(), period, preferences.get(context).most_periods
         )
-        try:
-            for _ in range(min(count, self._took.periods - self._at)):
-                self._state = next(self._states)
-                self._at += 1
-            if self._at == self._took.periods:
-                self._ended(context)
-                return self._finish(context)
-        except DigiclayError as error:
-            self._left(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        for _ in range(min(count, self._took.periods - self._at)):
+            self._state = next(self._states)
+            self._at += 1
+        if self._at == self._took.periods:
+            self._ended(context)
+            return self._finish(context)
         view.show_state(bed, self._system, self._state)
         self._place(bed)
         seconds, whole = self._at * period, self._took.duration
@@ -108,6 +102,10 @@ class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     def cancel(self, context: Any) -> None:
         """Stop when Blender takes the operator away, such as at the loading of a file."""
         self._ended(context)
+
+    def give_up(self, context: Any, words: str) -> None:
+        """Show the bed as it was before."""
+        self._left(context)
 
     def _begin(self, context: Any) -> None:
         """Read the take and put everything to its start."""

@@ -7,7 +7,7 @@ from typing import Any
 from ..compat import bpy
 from ..device import display, form, view
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_number
+from .base import Panel, bed_of, draw_number, is_edited
 
 __all__ = ["CLASSES", "Display"]
 
@@ -22,6 +22,7 @@ class Display(Panel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         """Draw the panel."""
         bed, layout = bed_of(context), self.layout
+        layout.enabled = not is_edited(context)
         layout.use_property_split = True
         layout.use_property_decorate = False
         shown, drawn = bed.digiclay_display, view.is_drawn(bed)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from ..device.view import bed_of
+from ..device.view import bed_of, is_edited
 
-__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_number"]
+__all__ = ["CATEGORY", "Panel", "bed_of", "draw_lines", "draw_number", "is_edited"]
 
 CATEGORY = "Digital Clay"
 #: Letters a line of the sidebar holds at its usual width.

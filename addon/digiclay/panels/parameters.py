@@ -15,7 +15,7 @@ from ..settings.chosen_method import method_of, method_property
 from ..settings.declared import title
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import Panel, bed_of, draw_lines
+from .base import Panel, bed_of, draw_lines, is_edited
 
 __all__ = ["CLASSES", "Control", "Device", "Finger", "Presets", "Start", "section_panel"]
 
@@ -110,7 +110,7 @@ class Control(Panel, bpy.types.Panel):
         """Draw the choice of the method."""
         settings = bed_of(context).digiclay
         row = self.layout.row()
-        row.active = settings.use_control
+        row.active, row.enabled = settings.use_control, not is_edited(context)
         row.prop(settings, method_property(settings))
         method = method_of(settings)
         if method not in list_methods():
@@ -153,13 +153,14 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
             return method is not None and (section == "control" or method.blister is not None)
 
         def draw_header(self, context: Any) -> None:
+            self.layout.enabled = not is_edited(context)
             if section in OPTIONAL:
                 self.layout.prop(bed_of(context).digiclay, f"use_{section}", text="")
 
         def draw(self, context: Any) -> None:
             settings = bed_of(context).digiclay
             column = self.layout.column(align=True)
-            column.active = in_use(settings, section)
+            column.active, column.enabled = in_use(settings, section), not is_edited(context)
             group = part_group(settings, section)
             for name in list_quantities(import_parameters(section, method_of(settings))):
                 place = column.row(align=True)

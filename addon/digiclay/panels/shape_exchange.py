@@ -6,7 +6,7 @@ from typing import Any
 
 from ..compat import bpy
 from ..exchange import formed_bed
-from .base import Panel, bed_of
+from .base import Panel, bed_of, is_edited
 
 __all__ = ["CLASSES", "LISTED", "Export", "Shapes"]
 
@@ -27,6 +27,7 @@ class Shapes(Panel, bpy.types.Panel):
     def draw(self, context: Any) -> None:
         """Draw the ways in, what is displayed, and the way out."""
         settings = bed_of(context).digiclay
+        self.layout.enabled = not is_edited(context)
         column = self.layout.column(align=True)
         column.operator("digiclay.shape_from_object", icon="OBJECT_DATA")
         column.operator_context = "INVOKE_DEFAULT"

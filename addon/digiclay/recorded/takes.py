@@ -132,7 +132,8 @@ def read(bed: Any, number: str = "") -> Take:
     DigiclayError
         When there is no such take, or it is damaged.
     """
-    return from_bytes(bytes(bed[PROPERTY][find(bed, number).number]["data"]))
+    number = find(bed, number).number  # first: a bed without takes has no such property
+    return from_bytes(bytes(bed[PROPERTY][number]["data"]))
 
 
 def remove(bed: Any, number: str) -> None:
@@ -148,7 +149,8 @@ def remove(bed: Any, number: str) -> None:
     DigiclayError
         When there is none of that number.
     """
-    del bed[PROPERTY][find(bed, number).number]
+    number = find(bed, number).number
+    del bed[PROPERTY][number]
 
 
 def simulate(scene: Scene) -> Take | None:

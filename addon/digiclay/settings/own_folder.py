@@ -9,11 +9,15 @@ from ..core.base.errors import one_line
 from ..core.control.methods import remove_method
 from ..core.scene.schema import import_parameters
 from ..plugins.method_folder import FolderMethods, load_folder
+from ..ui_text import localize
 from .chosen_method import name_pointer
 from .declared import group, title
 from .groups import CONTROL
 
-__all__ = ["clear", "load", "read_present"]
+__all__ = ["clear", "find_full_path", "is_full", "load", "read_present"]
+
+#: What is told of a folder whose place depends on the file that is open.
+RELATIVE = "Own Methods must be a full path (got {!r}): choose the folder again, after the .blend was saved."
 
 #: What is loaded, and the groups of the methods' parameters; Blender's classes are of the process as well.
 _PRESENT: list[FolderMethods] = [FolderMethods()]
@@ -23,6 +27,16 @@ _GROUPS: dict[str, type] = {}
 def read_present() -> FolderMethods:
     """Return what is loaded, and what was refused."""
     return _PRESENT[0]
+
+
+def is_full(folder: str) -> bool:
+    """Return whether a folder, or none, is the same whatever file is open."""
+    return not folder or (Path(folder).is_absolute() and not folder.startswith("//"))
+
+
+def find_full_path(folder: str) -> str:
+    """Return the full path of a folder beside the open file; the folder as it is while that is unsaved."""
+    return folder if is_full(folder) or not bpy.data.filepath else str(bpy.path.abspath(folder))
 
 
 def load(folder: str) -> None:
@@ -35,6 +49,9 @@ def load(folder: str) -> None:
     """
     clear()
     if not folder:
+        return
+    if not is_full(folder):
+        _PRESENT[0] = FolderMethods((), (localize(RELATIVE, folder),))
         return
     found = load_folder(Path(folder))
     names, refused = [], list(found.refused)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 import socket
 import struct
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,12 @@ from digiclay.device import view
 from digiclay.live import follow, running
 from digiclay.live.follow_messages import pack_subscription, parse_address, read_pose
 
-from tests.blender.session.live import FLOAT32, Clock, exact, started
+from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
 from tests.timeouts import TIMEOUT
 
+SERVES = pytest.mark.skipif(
+    importlib.util.find_spec("websockets") is None, reason="digiclay[serve] is not installed"
+)
 TOKEN = "a-token-of-tests"
 PRESS = (0.0, 0.0, 0.037, 1.0, 0.0, 0.0, 0.0)
 
@@ -104,14 +109,6 @@ def test_a_silent_server_is_told_once_and_again_when_it_is_heard(
     assert ["heard again" in note.message for note in clock.tick(2)] == [True]
 
 
-def test_a_server_that_has_gone_stalls_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
-    followed(bed, server, clock)
-    server.close()
-    period = running.find(bed).state.period
-    assert ["No pose from" in note.message for note in clock.tick(200)] == [True]
-    assert running.find(bed).state.period > period
-
-
 def test_the_subscription_is_renewed_and_ends_with_the_session(
     bed: Any, clock: Clock, server: socket.socket
 ) -> None:
@@ -162,7 +159,7 @@ def test_another_machine_needs_online_access() -> None:
     assert parse_address("[::1]:1", online=False) == ("::1", 1)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("websockets") is None, reason="digiclay[serve] is not installed")
+@SERVES
 def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Path) -> None:
     from digiclay_serve.protocol import Pose, pack_pose
     from tests.served import serve
@@ -174,3 +171,34 @@ def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Pa
             client.send(pack_pose(Pose(PRESS)))
             clock.tick()
     assert read_pose(state(*PRESS)).tolist() == list(PRESS)
+
+
+@SERVES
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (signal.SIGKILL, "has ended"),
+        (signal.SIGINT, "has ended"),  # in order
+        (signal.SIGSTOP, "No pose from"),  # its port is open still
+    ],
+)
+def test_the_end_of_a_server_is_told_within_two_seconds(
+    bed: Any, clock: Clock, tmp_path: Path, number: int, words: str
+) -> None:
+    from tests.served import serve
+
+    started(bed)
+    with serve(tmp_path) as one:
+        bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{one.osc_port}", token=TOKEN)
+        while follow.find(bed.session_uid).pose is None:
+            assert clock.tick() == []
+            time.sleep(TICK)
+        one.process.send_signal(number)
+        clock.tick()
+        notes, ended, period = [], clock.now, running.find(bed).state.period
+        while not notes:
+            time.sleep(TICK)
+            notes = clock.tick()
+    assert [words in note.message for note in notes] == [True]
+    assert clock.now - ended < 2.0
+    assert running.find(bed).state.period > period  # nothing stalls

@@ -1,8 +1,28 @@
-"""The operator that drives sessions ends for a moment now and then: what holds without a window."""
+"""The operator that drives sessions: what holds of it without a window."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import bpy
+from digiclay.live import running
+from digiclay.operators.session_loop import LoopMixin
+
+from tests.blender.session.live import started
+
+
+def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any) -> None:
+    class Drive(LoopMixin):
+        token, newer, report = 0, frozenset(), staticmethod(lambda level, words: said.append(words))
+
+    said: list[str] = []
+    started(bed)
+    # There is no loop that could be due.
+    assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
+    assert running.list_sessions() == ()
+    assert said == ["Fault of the extension: KeyError: 'ticked'"]
+    assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
 
 
 def test_without_a_session_there_is_nothing_to_go_on_with() -> None:

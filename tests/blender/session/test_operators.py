@@ -23,16 +23,6 @@ from tests.blender.session.live import (
 )
 
 
-@pytest.mark.parametrize("name", ["session_rewind", "session_reset"])
-def test_a_bed_that_is_edited_is_not_written(bed: Any, clock: Clock, name: str) -> None:
-    started(bed)
-    press(bed, clock)
-    bpy.ops.object.mode_set(mode="EDIT")
-    assert not getattr(bpy.ops.digiclay, name).poll()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert getattr(bpy.ops.digiclay, name).poll()
-
-
 def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
     started(bed)
     press(bed, clock, -6.0)
@@ -87,17 +77,6 @@ def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_o
     bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
     assert bpy.ops.digiclay.session_pause() == {"FINISHED"}
     assert running.find(bed).paused
-
-
-@pytest.mark.parametrize("name", ["session_pause", "session_step", "session_rewind", "session_stop"])
-def test_without_a_session_the_operators_decline(bed: Any, name: str) -> None:
-    assert not getattr(bpy.ops.digiclay, name).poll()
-
-
-def test_a_live_session_declines_without_a_window_or_a_bed(bed: Any) -> None:
-    assert not bpy.ops.digiclay.session.poll()  # this is Blender without a window
-    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
-    assert not bpy.ops.digiclay.session.poll()
 
 
 def test_a_session_does_not_start_on_settings_that_do_not_fit(bed: Any) -> None:

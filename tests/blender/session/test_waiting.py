@@ -6,16 +6,13 @@ from typing import Any
 
 import bpy
 import digiclay
+import numpy as np
+import pytest
 from digiclay.device import view
-from digiclay.live import bed_state, handlers, running
+from digiclay.live import bed_state, handlers, running, tick
+from digiclay.live.stroke_queue import queue_stroke
 
-from tests.blender.session.live import (
-    Clock,
-    goes_on,
-    press,
-    started,
-    waits,
-)
+from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
 
 
 def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed: Any, clock: Clock) -> None:
@@ -30,65 +27,63 @@ def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed: Any,
     goes_on(clock)
 
 
-def test_a_session_waits_while_its_scene_is_not_shown(bed: Any, clock: Clock) -> None:
-    started(bed)
-    home = bpy.context.window.scene
-    bpy.context.window.scene = bpy.data.scenes.new("Other")
-    waits(bed, clock, words="no window shows its scene")
-    bpy.context.window.scene = home
-    goes_on(clock)
+def look_at(name: str) -> None:
+    bpy.context.window.scene = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
 
 
-def test_a_session_waits_while_the_bed_is_edited(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bpy.ops.object.mode_set(mode="EDIT")
-    waits(bed, clock, words="back to Object Mode")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    goes_on(clock)
+def edit(mode: str = "EDIT") -> None:
+    bpy.ops.object.mode_set(mode=mode)
 
 
-def test_a_session_waits_while_its_pins_are_edited_through_another_bed(bed: Any, clock: Clock) -> None:
-    started(bed)
+def scale(bed: Any, y: float) -> None:
+    bed.scale.y = y
+
+
+def lay_out(bed: Any, rows: int) -> None:
+    bed.digiclay.layout.rows = rows
+
+
+def edit_through_a_linked_duplicate(bed: Any) -> None:
     bpy.ops.object.duplicate(linked=True)
-    bpy.ops.object.mode_set(mode="EDIT")
+    edit()
     assert bed.mode == "OBJECT"
-    waits(bed, clock, words="back to Object Mode")
-    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize(
+    ("hinder", "words", "free"),
+    [
+        (lambda bed: look_at("Other"), "no window shows its scene", lambda bed: look_at("Scene")),
+        (lambda bed: edit(), "back to Object Mode", lambda bed: edit("OBJECT")),
+        (edit_through_a_linked_duplicate, "back to Object Mode", lambda bed: edit("OBJECT")),
+        (lambda bed: scale(bed, 2.0), "must be the same along x, y and z", lambda bed: scale(bed, 1.0)),
+        (lambda bed: lay_out(bed, 14), "169 pins, not 182", lambda bed: lay_out(bed, 13)),
+        (lambda bed: bed.data.vertices.add(1), "170 pins now instead of 169", None),
+        (lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]), "no longer that of", None),
+        (lambda bed: view.fingertip_of(bed).scale.zero(), "scaled to nothing", None),
+    ],
+)
+def test_a_session_waits_and_goes_on_when_nothing_hinders_it(
+    bed: Any, clock: Clock, hinder: Any, words: str, free: Any
+) -> None:
+    started(bed)
+    hinder(bed)
+    waits(bed, clock, words=words)
+    if free is not None:
+        free(bed)
+        goes_on(clock)
+
+
+def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock: Clock) -> None:
+    started(bed)
+    running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+    clock.tick(20)
+    assert shown(bed).min() < 39e-3
+    edit()
+    clock.tick()
+    tick.withdraw_strokes(bpy.context)
+    edit("OBJECT")
     goes_on(clock)
-
-
-def test_a_session_waits_while_pins_are_missing(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bed.data.vertices.add(1)
-    waits(bed, clock, words="170 pins now instead of 169")
-
-
-def test_a_session_waits_for_a_mesh_that_has_lost_its_attributes(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bed.data.attributes.remove(bed.data.attributes["mode"])
-    waits(bed, clock, words="no longer that of its pins")
-
-
-def test_a_session_waits_while_the_bed_is_scaled_unevenly(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bed.scale = (1.0, 2.0, 1.0)
-    waits(bed, clock, words="must be the same along x, y and z")
-    bed.scale = (1.0, 1.0, 1.0)
-    goes_on(clock)
-
-
-def test_a_session_waits_while_the_pins_are_not_those_of_the_layout(bed: Any, clock: Clock) -> None:
-    started(bed)
-    bed.digiclay.layout.rows = 14
-    waits(bed, clock, words="169 pins, not 182")
-    bed.digiclay.layout.rows = 13
-    goes_on(clock)
-
-
-def test_a_session_waits_for_a_fingertip_scaled_to_nothing(bed: Any, clock: Clock) -> None:
-    started(bed)
-    view.fingertip_of(bed).scale = (0.0, 0.0, 0.0)
-    waits(bed, clock, words="scaled to nothing")
+    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
 
 
 def test_a_deleted_bed_ends_its_session_with_a_message(bed: Any, clock: Clock) -> None:

@@ -1,0 +1,136 @@
+"""Every operator with odd things active, in every mode: it is refused or does its work, and never fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+from digiclay import operators
+from digiclay.device import view
+from digiclay.live import handlers, running, tick
+from digiclay.live.stroke_queue import queue_stroke
+from digiclay.press import tool
+
+from tests.blender.at_hand import select
+from tests.blender.session.live import Clock
+
+OPERATORS = [kind for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
+#: Settings with which long work takes less time.
+QUICK: dict[str, dict[str, Any]] = {"digiclay.bake": {"last": 3}, "digiclay.add_sample": {"take": False}}
+BPY = bpy.ops
+
+
+def enter(mode: str) -> None:
+    BPY.object.mode_set(mode=mode)
+
+
+#: What can be active, and what can become of a bed that was active.
+ODD: dict[str, Callable[[Any], object]] = {
+    "a bed": lambda bed: None,
+    "its fingertip": lambda bed: select(view.fingertip_of(bed)),
+    "nothing": lambda bed: setattr(bpy.context.view_layer.objects, "active", None),
+    "another mesh": lambda bed: select(bpy.data.objects["Cube"]),
+    "a light": lambda bed: select(bpy.data.objects["Light"]),
+    "no bed in the file": lambda bed: BPY.wm.read_homefile(use_empty=True),
+    "a linked duplicate": lambda bed: BPY.object.duplicate(linked=True),
+    "edited": lambda bed: enter("EDIT"),
+    "edited by a linked duplicate": lambda bed: (
+        BPY.object.duplicate(linked=True), enter("EDIT"),
+        setattr(bpy.context.view_layer.objects, "active", bed),
+    ),
+    "sculpted": lambda bed: enter("SCULPT"),
+    "painted": lambda bed: enter("VERTEX_PAINT"),
+    "weighted": lambda bed: enter("WEIGHT_PAINT"),
+    "another mesh edited": lambda bed: (select(bpy.data.objects["Cube"]), enter("EDIT")),
+    "pins deleted": lambda bed: (
+        enter("EDIT"), BPY.mesh.select_all(action="SELECT"), BPY.mesh.delete(type="VERT"),
+    ),
+    "no vertices": lambda bed: bed.data.clear_geometry(),
+    "mesh swapped": lambda bed: setattr(bed, "data", bpy.data.meshes["Cube"]),
+    "attribute removed": lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]),
+    "converted to points": lambda bed: BPY.object.convert(target="POINTCLOUD"),
+    "converted as it is drawn": lambda bed: BPY.object.convert(target="MESH"),
+    "joined with a cube": lambda bed: (select(bpy.data.objects["Cube"], bed), BPY.object.join()),
+    "joined into a cube": lambda bed: (select(bed, bpy.data.objects["Cube"]), BPY.object.join()),
+    "geometry nodes removed": lambda bed: bed.modifiers.clear(),
+    "fingertip deleted": lambda bed: bpy.data.objects.remove(view.fingertip_of(bed)),
+    "fingertip without parent": lambda bed: setattr(view.fingertip_of(bed), "parent", None),
+    "hidden": lambda bed: bed.hide_set(True),
+    "stretched": lambda bed: setattr(bed, "scale", (1.0, 2.0, 1.0)),
+    "mirrored": lambda bed: setattr(bed, "scale", (-1.0, 1.0, 1.0)),
+    "scaled to nothing": lambda bed: setattr(bed, "scale", (0.0, 0.0, 0.0)),
+}  # fmt: skip
+
+
+@pytest.fixture
+def file(extension: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A file with a small bed, active, beside Blender's cube: it loads quicker than a bed is made."""
+    monkeypatch.chdir(tmp_path)  # for what is exported
+    BPY.mesh.digital_clay_add(rows=5, columns=5)
+    tool.take_up(bpy.context)
+    BPY.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
+    return bpy.data.filepath
+
+
+def prepare(file: str, odd: str, live: bool) -> Any:
+    """Load the file, in mid-stroke of a session if wanted, do what is odd, and return the state."""
+    BPY.wm.open_mainfile(filepath=file)
+    bed, clock = bpy.context.object, Clock()
+    if live:
+        tick.start(bpy.context, bed)
+        running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+        clock.tick(10)
+        assert running.find(bed).strokes[0].height is not None  # it has begun
+    ODD[odd](bed)
+    clock.tick(2)
+    return state()
+
+
+def state() -> Any:
+    """Return what is active, in which mode, and among how many objects."""
+    return getattr(bpy.context.object, "name", ""), bpy.context.mode, len(bpy.data.objects)
+
+
+def calls() -> Iterator[tuple[Any, str, dict[str, Any]]]:
+    """Give every operator, how to call it, and its settings; once more with either value of what has two."""
+    for kind in OPERATORS:
+        area, _, name = kind.bl_idname.partition(".")
+        operator, quick = getattr(getattr(BPY, area), name), QUICK.get(kind.bl_idname, {})
+        how = "EXEC_DEFAULT" if hasattr(kind, "execute") else "INVOKE_DEFAULT"
+        yield operator, how, quick
+        for known in operator.get_rna_type().properties:
+            for item in known.enum_items if known.type == "ENUM" and len(known.enum_items) == 2 else ():
+                yield operator, how, {**quick, known.identifier: item.identifier}
+
+
+def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
+    """Call an operator as the 3D view would; return why it declines, or what it says of an error."""
+    (window,) = bpy.context.window_manager.windows
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        try:
+            operator(how, **settings)
+        except RuntimeError as error:
+            return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("live", [False, True])
+@pytest.mark.parametrize("odd", ODD)
+def test_no_operator_fails(file: str, odd: str, live: bool, capfd: pytest.CaptureFixture[str]) -> None:
+    before, said = prepare(file, odd, live), []
+    for operator, how, settings in calls():
+        said.append((operator.idname(), settings, call(operator, how, settings)))
+        if state() != before:
+            before = prepare(file, odd, live)
+    assert [words for words in said if "Traceback" in words[2] or "context is incorrect" in words[2]] == []
+    prepare(file, odd, live)
+    assert tick.withdraw_strokes(bpy.context) == bool(running.list_sessions())  # Esc, and Esc again
+    assert [session.strokes for session in running.list_sessions()] in ([], [()])
+    handlers.end_all(handlers.STOPPED)
+    assert running.list_sessions() == ()
+    assert "Traceback" not in "".join(capfd.readouterr())  # of a poll, for instance
