@@ -49,6 +49,8 @@ def add(blender: Any) -> Iterator[float | None]:
     typed = " ".join(f"key {letter} sleep 0.05" for letter in letters)
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
     blender.SEEN["added"] = len(blender.beds())
+    blender.shot("first_added")
+    blender.SEEN["names"] = sorted(thing.name for thing in blender.window().scene.objects)
     blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
 
 
@@ -63,6 +65,7 @@ def open_tab(blender: Any) -> Iterator[float | None]:
 def start(blender: Any) -> Iterator[float | None]:
     """Press the panel's first button."""
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
+    blender.shot("first_started")
     blender.SEEN["started"] = len(blender.part("live.running").list_sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
 
@@ -110,8 +113,6 @@ def along(blender: Any) -> float:
 
 def script(blender: Any) -> Iterator[float | None]:
     """Do what the page says; then take hold of the ball."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
     catch_up(blender)
     yield from focus_window()
     began, waited = time.perf_counter(), waiting()

@@ -11,12 +11,14 @@ from .node_tree import FAR, FORM, MEMBRANE
 from .skin_lattice import KINDS
 
 __all__ = [
-    "FORMS", "KINDS", "can_show_skin", "is_far", "is_skin_shown", "read_form", "read_kind", "set_far",
-    "set_form", "set_kind",
+    "BEFORE", "FORMS", "KINDS", "can_show_skin", "is_far", "is_skin_shown", "read_form", "read_kind",
+    "set_far", "set_form", "set_kind",
 ]  # fmt: skip
 
 #: Forms, in the order of the numbers in the settings of the geometry nodes.
 FORMS = ("automatic", "pins", "skin", "both")
+#: Where a bed keeps the form that it had before its skin was toggled, until a form is chosen.
+BEFORE = "digiclay_form_before"
 
 
 def can_show_skin(bed: Any) -> bool:
@@ -47,6 +49,7 @@ def set_form(bed: Any, form: str) -> None:
         On another word, or for a bed without a skin.
     """
     set_node_setting(_require_skin(bed), FORM, _index(form, FORMS, "form"))
+    bed.pop(BEFORE, None)
 
 
 def read_kind(bed: Any) -> str:

@@ -100,7 +100,7 @@ def end(how: str, *sessions: Running) -> None:
     words += filter(None, [tick.stop(session.uid) for session in sessions])
     selection.select_active(frozenset(session.uid for session in sessions))
     if sessions:
-        running.set_message(". ".join(words))
+        running.set_message(". ".join(words), *(session.uid for session in sessions))
     if not running.list_sessions():
         loop.end()
         unwatch()

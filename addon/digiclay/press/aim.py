@@ -16,9 +16,9 @@ from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
 from ..live import running
 from ..settings import properties
-from .occlusion import is_hidden, shown_stretch
+from .occlusion import find_hider, shown_stretch
 
-__all__ = ["Target", "find_target", "find_view", "hit_point", "project", "read_surface"]
+__all__ = ["Target", "find_target", "find_view", "hit_point", "look_at", "project", "read_surface"]
 
 Floats = NDArray[np.float64]
 
@@ -50,17 +50,16 @@ class Target:
 
 
 def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
-    """Return the nearest place on a visible bed under a pixel of the context's region.
+    """Return the nearest place on a bed that is seen under a pixel of the context's region."""
+    found, hider = look_at(context, xy)
+    return found if hider is None else None
+
+
+def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any | None]:
+    """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any.
 
     A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
-    through; pressing on it says why. Where another object hides the pins there is no place: a click
-    there is for that object.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    xy : (float, float)
-        Pixels in the region.
+    through; pressing on it says why. A click on what hides the pins is for that object.
     """
     found, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
@@ -77,9 +76,9 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
         distance = bridge.uniform(bed) * float((point - origin) @ direction)
         if distance < nearest:
             found, nearest, eye = Target(bed, cells, height, point), distance, origin
-    if found is None or is_hidden(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point)):
-        return None
-    return found
+    if found is None:
+        return None, None
+    return found, find_hider(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point))
 
 
 def read_surface(bed: Any) -> tuple[Grid, Floats]:

@@ -15,7 +15,7 @@ from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.named_shapes import SHAPES
 from .shown_units import to_shown, unit_of
 
-__all__ = ["INT_MAX", "Update", "format_list", "group", "title"]
+__all__ = ["INT_MAX", "Update", "format_list", "group", "title", "whole"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
@@ -50,6 +50,21 @@ def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
 
+def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Update) -> Any:
+    """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
+    known: Quantity = field.metadata["quantity"]
+    known = dataclasses.replace(known, doc=known.whole, symbol=f"2 {known.symbol}")
+    unit, power = unit_of(known.unit, field.default)
+    return bpy.props.FloatProperty(
+        **_numbers(known, 2.0 * field.default, power),
+        name=f"{title(field.name)} ({unit})",
+        description=_tooltip(known, 2.0 * field.default, unit, power),
+        get=get,
+        set=put,
+        options=set(),
+    )
+
+
 def title(name: str) -> str:
     """Return a name of the core as a label: ``valve_lag`` is Valve Lag."""
     return LABELS.get(name) or name.replace("_", " ").title()
@@ -60,8 +75,9 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
     known: Quantity = field.metadata["quantity"]
     default = field.default
     unit, power = unit_of(known.unit, default)
+    label = f"Half {title(field.name)}" if known.whole else title(field.name)
     said: dict[str, Any] = {
-        "name": f"{title(field.name)} ({unit})" if unit else title(field.name),
+        "name": f"{label} ({unit})" if unit else label,
         "description": _tooltip(known, default, unit, power),
         "update": update,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from typing import Any
 
@@ -15,7 +16,7 @@ from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from . import finger_size
 from .chosen_method import choose, list_offered, method_of, place_of
-from .declared import Update, group, title
+from .declared import Update, group, title, whole
 from .table import assign, read, reset
 
 __all__ = ["CLASSES", "PRESET_WORDS", "SETTINGS", "method_items"]
@@ -167,12 +168,23 @@ def pointers(groups: dict[str, type]) -> dict[str, Any]:
     return {name: bpy.props.PointerProperty(type=kind, name=title(name)) for name, kind in groups.items()}
 
 
+def whole_axis(field: dataclasses.Field[Any]) -> Any:
+    """Return the property of a fingertip's whole length, width or height, by the stored semi-axis."""
+    return whole(
+        field,
+        lambda group: 2.0 * getattr(group, field.name),
+        lambda group, size: finger_size.set_axis(group.id_data.digiclay, field.name, size),
+    )
+
+
 METHOD_GROUPS = {name: group(name, import_parameters("control", name), {}) for name in METHODS}
 CONTROL = make_group("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
 GROUPS = {
     section: group(section, import_parameters(section, "virtual_master"), UPDATES.get(section, {}))
     for section in PLAIN
 }
+for axis in dataclasses.fields(Fingertip):
+    GROUPS["fingertip"].__annotations__[f"whole_{axis.name}"] = whole_axis(axis)
 SETTINGS = make_group(
     "settings",
     "Every parameter of a bed's scene.",
