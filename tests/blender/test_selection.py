@@ -38,6 +38,13 @@ def test_after_the_session_the_active_bed_is_selected_again(bed: Any) -> None:
     assert bed.select_get()
 
 
+def test_a_bed_that_was_not_selected_before_the_session_is_not_after_it(bed: Any) -> None:
+    bed.select_set(False)
+    selection.deselect(bed)
+    selection.select_active(frozenset({bed.session_uid}))
+    assert not bed.select_get()
+
+
 def test_what_was_selected_meanwhile_stays_the_selection(bed: Any) -> None:
     selection.deselect(bed)
     tip = view.fingertip_of(bed)

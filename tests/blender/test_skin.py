@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.device import form, view
+from digiclay.device import detail, form, view
 from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
 from digiclay.settings import properties
@@ -131,14 +131,45 @@ def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Pa
     assert (np.abs(pictures["skin"] - pictures["pins"]) > 0.02).sum() > 100
 
 
+@pytest.mark.parametrize("scale", [1.0, 50.0])
+@pytest.mark.parametrize("chosen", form.FORMS)
+def test_the_key_always_changes_what_is_seen_and_every_other_time_comes_back_to_what_was_chosen(
+    bed: Any, chosen: str, scale: float
+) -> None:
+    # Of the factory file's view, where a bed is small, or large.
+    bed.scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    bed.digiclay_display.form = chosen
+    detail.follow()
+    seen = [form.is_skin_shown(bed)]
+    for _ in range(4):
+        bpy.ops.digiclay.skin_toggle()
+        seen.append(form.is_skin_shown(bed))
+    assert seen == [seen[0], not seen[0]] * 2 + [seen[0]]
+    assert bed.digiclay_display.form == chosen
+    assert form.BEFORE not in bed
+
+
+def test_where_automatic_has_come_to_show_the_same_the_key_shows_the_other(bed: Any) -> None:
+    bed.scale = (50.0,) * 3
+    bpy.ops.digiclay.skin_toggle()
+    bed.scale = (1.0,) * 3
+    bpy.context.view_layer.update()
+    bpy.ops.digiclay.skin_toggle()
+    assert bed.digiclay_display.form == "pins"
+    bpy.ops.digiclay.skin_toggle()
+    assert (bed.digiclay_display.form, form.is_skin_shown(bed)) == ("automatic", True)
+
+
 def test_the_key_shows_the_skin_and_the_pins_again_as_undo_steps(bed: Any) -> None:
+    bed.scale = (50.0,) * 3
     done("Bed")
     shown = []
     for _ in range(2):
         bpy.ops.digiclay.skin_toggle()
         done("Toggle Skin")
         shown.append(bpy.context.object.digiclay_display.form)
-    assert shown == ["skin", "pins"]
+    assert shown == ["skin", "automatic"]
     bpy.ops.ed.undo()
     assert bpy.context.object.digiclay_display.form == "skin"
     assert_skin(bpy.context.object, expected(bpy.context.object, "smooth"))

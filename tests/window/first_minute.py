@@ -44,14 +44,23 @@ def done(blender: Any, *words: str) -> Iterator[float | None]:
 
 
 def add(blender: Any) -> Iterator[float | None]:
-    """Add a bed from the menu, by typing its name."""
-    letters = ("space" if letter == " " else letter for letter in "digital clay")
-    typed = " ".join(f"key {letter} sleep 0.05" for letter in letters)
+    """Add a bed from the menu, by typing the beginning of its name."""
+    typed = " ".join(f"key {letter} sleep 0.05" for letter in "dig")
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
     blender.SEEN["added"] = len(blender.beds())
-    blender.shot("first_added")
-    blender.SEEN["names"] = sorted(thing.name for thing in blender.window().scene.objects)
+    blender.SEEN["things"] = [thing.name for thing in blender.window().scene.objects]
+    blender.SEEN["selected"] = [thing.name for thing in bpy.context.selected_objects]
+    blender.SEEN["seen"] = count_seen(blender)
     blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
+
+
+def count_seen(blender: Any) -> int:
+    """Return how many of 25 places on the pins nothing hides."""
+    aim, (area, region) = blender.part("press.aim"), blender.view()
+    places = [blender.on_the_bed(x, y) for x in range(-60, 61, 30) for y in range(-60, 61, 30)]
+    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
+        found = [aim.find_target(bpy.context, (x - region.x, y - region.y)) for x, y in places]
+    return sum(one is not None for one in found)
 
 
 def open_tab(blender: Any) -> Iterator[float | None]:
@@ -65,7 +74,6 @@ def open_tab(blender: Any) -> Iterator[float | None]:
 def start(blender: Any) -> Iterator[float | None]:
     """Press the panel's first button."""
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
-    blender.shot("first_started")
     blender.SEEN["started"] = len(blender.part("live.running").list_sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
 
@@ -89,7 +97,7 @@ def stop(blender: Any) -> Iterator[float | None]:
 
 #: Steps of the guide's first page: the first sentence of each, and what a hand does.
 STEPS = (
-    ("Press **Shift A** over the 3D view, type `digital clay` and press Enter.", add),
+    ("Press **Shift A** over the 3D view, type `dig` and press Enter.", add),
     ("Press **N** and select the tab *Digital Clay*.", open_tab),
     ("Press **Start Sculpting** in the panel *Session*.", start),
     ("Hold **Ctrl** and drag across the pins.", draw),
@@ -112,7 +120,7 @@ def along(blender: Any) -> float:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what the page says; then take hold of the ball."""
+    """Do what the page says, in the file that Blender starts with; then take hold of the ball."""
     catch_up(blender)
     yield from focus_window()
     began, waited = time.perf_counter(), waiting()

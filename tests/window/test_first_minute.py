@@ -34,6 +34,14 @@ def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
     assert 1.0 < seen["distance"] < 6.0
 
 
+def test_the_bed_is_seen_among_all_the_factory_file_has_and_no_outline_is_drawn_about_its_pins(
+    seen: dict[str, Any],
+) -> None:
+    assert {"Cube", "Camera", "Light", "Digital Clay"} <= set(seen["things"])
+    assert seen["seen"] == 25
+    assert seen["selected"] == []
+
+
 def test_add_makes_a_bed_to_design_on(seen: dict[str, Any]) -> None:
     assert np.array(seen["drawn"]["bed"]).shape == (BEDS[FIRST].rows, BEDS[FIRST].columns) == (100, 100)
 

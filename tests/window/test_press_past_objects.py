@@ -38,3 +38,18 @@ def test_in_a_quad_view_each_quarter_sees_for_itself(seen: dict[str, Any]) -> No
     assert found["count"] == 4
     assert found["top covered"] == [False]
     assert found["top bare"] == [True]
+
+
+def test_a_click_on_an_object_in_front_says_what_hides_the_bed(seen: dict[str, Any]) -> None:
+    # In three views; Blender prints what it reports.
+    assert seen["output"].count("Warning: Cube hides the bed here") == 3
+
+
+@pytest.mark.parametrize("view", ["from above", "from the front"])
+def test_a_bed_that_is_added_in_a_cube_stands_on_top_of_it(seen: dict[str, Any], view: str) -> None:
+    assert seen[view] == [0.0, 0.0, 1.0]
+
+
+def test_from_below_it_stands_beside_the_cube(seen: dict[str, Any]) -> None:
+    x, y, low = seen["from below"]
+    assert (max(x, y) > 1.0, min(x, y), low) == (True, 0.0, 0.0)

@@ -15,7 +15,7 @@ from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.named_shapes import SHAPES
 from .shown_units import to_shown, unit_of
 
-__all__ = ["INT_MAX", "Update", "format_list", "group", "title", "whole"]
+__all__ = ["INT_MAX", "WHOLE", "Update", "format_list", "group", "title", "whole"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
@@ -27,6 +27,8 @@ REACH = 10.0
 #: Fields that take a shape's name or file.
 SHAPED = ("shape", "field", "file")
 
+#: What the names of properties of twice a parameter begin with.
+WHOLE = "whole_"
 #: Labels of parameters whose names, stored in files, are spelled otherwise.
 LABELS = {"centring_time": "Centering Time"}
 

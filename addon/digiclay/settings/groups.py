@@ -16,7 +16,7 @@ from ..core.scene.toml_table import HEXAGONAL_SHARE, PRESETS
 from ..device import view
 from . import finger_size
 from .chosen_method import choose, list_offered, method_of, place_of
-from .declared import Update, group, title, whole
+from .declared import WHOLE, Update, group, title, whole
 from .table import assign, read, reset
 
 __all__ = ["CLASSES", "PRESET_WORDS", "SETTINGS", "method_items"]
@@ -184,7 +184,7 @@ GROUPS = {
     for section in PLAIN
 }
 for axis in dataclasses.fields(Fingertip):
-    GROUPS["fingertip"].__annotations__[f"whole_{axis.name}"] = whole_axis(axis)
+    GROUPS["fingertip"].__annotations__[WHOLE + axis.name] = whole_axis(axis)
 SETTINGS = make_group(
     "settings",
     "Every parameter of a bed's scene.",
