@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -12,7 +12,6 @@ from digiclay.bridge import SCALE
 from digiclay.device import view
 from digiclay.device.roles import ROLE
 from digiclay.live import running
-from digiclay.operators.press_stroke import find_pressed
 from digiclay.press import aim
 from mathutils import Vector
 
@@ -219,95 +218,50 @@ def test_an_object_the_user_has_parented_to_the_bed_hides(context: Any) -> None:
     assert not points_at(context, COVERED)
 
 
-class Heard(list):  # type: ignore[type-arg]
-    """What an operator reports."""
-
-    def report(self, level: set[str], words: str) -> None:
-        """Take it down."""
-        self.append(words)
-
-
-def test_a_press_on_an_object_in_front_says_what_hides_the_bed_and_one_beside_it_nothing(
-    context: Any,
-) -> None:
-    cover(context).name = "Suzanne"
-    context.view_layer.update()
-    told = []
-    for place in (COVERED, BARE):
-        (xy,) = aim.project(context, bed(), place)
-        heard = Heard()
-        pressed = find_pressed(heard, context, (float(xy[0]), float(xy[1])))
-        told.append((pressed is None, [words.partition(" hides ")[0] for words in heard]))
-    assert told == [(True, ["Suzanne"]), (False, [])]
-
-
-def alter(**values: Any) -> Callable[[Any], None]:
-    """Return what sets properties of the factory file's cube."""
-    return lambda context: [setattr(bpy.data.objects["Cube"], *item) for item in values.items()] and None
-
-
-def exchange(add: Callable[..., Any], **values: Any) -> Callable[[Any], None]:
-    """Return what has another object in the cube's place."""
-
-    def change(context: Any) -> None:
-        bpy.data.objects.remove(bpy.data.objects["Cube"])
-        add(**values)
-
-    return change
-
-
-def put_cursor(context: Any, place: float) -> None:
-    """Put the 3D cursor to a place with the same three coordinates."""
-    context.scene.cursor.location = (place,) * 3
-
-
 ON_TOP, BESIDE, CURSOR = "on top of it", "beside it", ""
-#: What the factory file's cube, its cursor, or its view is changed to, and where a bed of 25 x 25 pins,
-#: 0.89 units wide, stands then; and how high.
-PLACES: dict[str, tuple[Callable[[Any], None], str, float]] = {
-    "the cube swallows it": (lambda context: None, ON_TOP, 1.0),
-    "the cube is mirrored and scaled": (alter(scale=(-1.0, 1.5, 1.2)), ON_TOP, 1.2),
-    "the cube is turned on its edge": (alter(rotation_euler=(np.pi / 4, 0.0, 0.3)), ON_TOP, 2.0**0.5),
-    "the eye is inside the cube": (alter(scale=(30.0, 30.0, 30.0)), CURSOR, 0.0),
-    "the cube is out of the way": (alter(location=(3.0, 0.0, 0.0)), CURSOR, 0.0),
-    "the cube is hidden": (lambda context: bpy.data.objects["Cube"].hide_set(True), CURSOR, 0.0),
-    "the cube is drawn as wires": (alter(display_type="WIRE"), CURSOR, 0.0),
-    "the cube is as small as a pin": (alter(scale=(0.05, 0.05, 2.0)), CURSOR, 0.0),
-    "the cube is the ground": (alter(scale=(9.0, 9.0, 0.02)), CURSOR, 0.0),
-    "the cube is a column": (alter(scale=(0.4, 0.4, 9.0)), BESIDE, 0.0),
-    "a monkey": (exchange(bpy.ops.mesh.primitive_monkey_add, size=3.0), ON_TOP, 1.477),
-    "a thick text": (exchange(bpy.ops.object.text_add, radius=3.0, location=(-1.0, -1.0, 0.0)), CURSOR, 0.0),
-    "another bed": (exchange(bpy.ops.mesh.digital_clay_add, location=(0.1, 0.1, 0.0)), BESIDE, 0.0),
-    "the cursor is elsewhere": (lambda context: put_cursor(context, 4.0), CURSOR, 4.0),
-    "through X-ray": (lambda context: setattr(context.space_data.shading, "show_xray", True), CURSOR, 0.0),
-}  # fmt: skip
+#: The factory file's cube, changed, or what is added in place of it; and where a bed of 25 x 25 pins, 0.89
+#: units wide, stands then, and how high.
+PLACES: dict[str, tuple[dict[str, Any], str, float]] = {
+    "the cube swallows it": ({}, ON_TOP, 1.0),
+    "the cube is mirrored and scaled": ({"scale": (-1.0, 1.5, 1.2)}, ON_TOP, 1.2),
+    "the cube is turned on its edge": ({"rotation_euler": (np.pi / 4, 0.0, 0.3)}, ON_TOP, 2.0**0.5),
+    "the eye is inside the cube": ({"scale": (30.0, 30.0, 30.0)}, CURSOR, 0.0),
+    "the cube is away from the cursor": ({"location": (3.0, 0.0, 0.0)}, CURSOR, 0.0),
+    "the cube is hidden": ({"hide_viewport": True}, CURSOR, 0.0),
+    "the cube is drawn as wires": ({"display_type": "WIRE"}, CURSOR, 0.0),
+    "the cube is as small as a pin": ({"scale": (0.05, 0.05, 2.0)}, CURSOR, 0.0),
+    "the cube is the ground": ({"scale": (9.0, 9.0, 0.02)}, CURSOR, 0.0),
+    "the cube is a column": ({"scale": (0.4, 0.4, 9.0)}, BESIDE, 0.0),
+    "a monkey": ({"add": bpy.ops.mesh.primitive_monkey_add, "size": 3.0}, ON_TOP, 1.477),
+    "a text that lies flat": ({"add": bpy.ops.object.text_add, "radius": 3.0}, CURSOR, 0.0),
+    "another bed": ({"add": bpy.ops.mesh.digital_clay_add, "location": (0.1, 0.1, 0.0)}, BESIDE, 0.0),
+}
 
 
 @pytest.mark.parametrize("case", PLACES)
 def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_view: Any, case: str) -> None:
-    change, where, height = PLACES[case]
-    change(factory_view)
+    values, where, height = PLACES[case]
+    cube, add = bpy.data.objects["Cube"], values.get("add")
+    if add is not None:
+        bpy.data.objects.remove(cube)
+        add(**{name: value for name, value in values.items() if name != "add"})
+    for name, value in values.items() if add is None else ():
+        setattr(cube, name, value)
     bpy.context.view_layer.update()
-    there = set(bpy.context.scene.objects)
     bpy.ops.mesh.digital_clay_add()
     new = bpy.context.object
     words = running.last_message(new)
     assert (words.endswith(where), bool(words)) == (True, bool(where)), words
     assert new.location.z + view.underside(new) == pytest.approx(height, abs=1e-3)
-    level = bpy.context.scene.cursor.location - new.location
-    assert (level.xy.length > 0.4) is (where == BESIDE)
-    assert there <= set(bpy.context.scene.objects)
+    assert (new.location.xy.length > 0.4) is (where == BESIDE)
     # No outline about every pin; panels and keys go by the active object.
     assert bpy.context.selected_objects == []
 
 
-def test_a_bed_with_a_location_is_put_there_whatever_hides_it(factory_view: Any) -> None:
+def test_a_bed_with_a_location_is_put_there_and_a_sample_where_it_is_seen(factory_view: Any) -> None:
     bpy.ops.mesh.digital_clay_add(location=(0.0, 0.2, 0.1))
     new = bpy.context.object
     assert [*new.location.xy, new.location.z + view.underside(new)] == pytest.approx([0.0, 0.2, 0.1])
-    assert running.last_message(new) == ""
-
-
-def test_a_sample_in_the_cube_is_put_on_top_of_it(factory_view: Any) -> None:
-    assert bpy.ops.digiclay.add_sample(sample="session:tap", take=False) == {"FINISHED"}
+    bpy.data.objects.remove(new)
+    bpy.ops.digiclay.add_sample(sample="session:tap", take=False)
     assert bpy.context.object.location.z > 1.0

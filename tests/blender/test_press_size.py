@@ -57,11 +57,8 @@ def test_the_panel_shows_whole_widths_and_what_is_stored_are_semi_axes(
     (finger,) = properties.scene_of(bed).fingers
     assert getattr(finger.fingertip, name) == 6.3e-3
     assert bed.digiclay.size == pytest.approx(12.6 if name == "width" else 16.0)
-    assert lengths(bed)[1] == pytest.approx(15.0 * 12.6 / 16.0 if name == "width" else 15.0, rel=1e-6)
     np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), lowest, rtol=0, atol=1e-7)
-    shown = group.bl_rna.properties[f"whole_{name}"]
-    assert (shown.name, shown.default) == (f"{name.title()} (mm)", usual)
-    assert shown.description.endswith(f"by default {usual:g} mm")
+    assert group.bl_rna.properties[f"whole_{name}"].description.endswith(f"by default {usual:g} mm")
 
 
 @pytest.mark.parametrize(

@@ -131,12 +131,11 @@ def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Pa
     assert (np.abs(pictures["skin"] - pictures["pins"]) > 0.02).sum() > 100
 
 
-@pytest.mark.parametrize("scale", [1.0, 50.0])
+@pytest.mark.parametrize("scale", [1.0, 50.0])  # small and large in the factory file's view
 @pytest.mark.parametrize("chosen", form.FORMS)
 def test_the_key_always_changes_what_is_seen_and_every_other_time_comes_back_to_what_was_chosen(
     bed: Any, chosen: str, scale: float
 ) -> None:
-    # Of the factory file's view, where a bed is small, or large.
     bed.scale = (scale,) * 3
     bpy.context.view_layer.update()
     bed.digiclay_display.form = chosen
@@ -147,18 +146,12 @@ def test_the_key_always_changes_what_is_seen_and_every_other_time_comes_back_to_
         seen.append(form.is_skin_shown(bed))
     assert seen == [seen[0], not seen[0]] * 2 + [seen[0]]
     assert bed.digiclay_display.form == chosen
-    assert form.BEFORE not in bed
-
-
-def test_where_automatic_has_come_to_show_the_same_the_key_shows_the_other(bed: Any) -> None:
-    bed.scale = (50.0,) * 3
+    # Where the view has come to show the same by the form that was chosen, the key goes on to the other.
     bpy.ops.digiclay.skin_toggle()
-    bed.scale = (1.0,) * 3
+    bed.scale /= scale
     bpy.context.view_layer.update()
     bpy.ops.digiclay.skin_toggle()
-    assert bed.digiclay_display.form == "pins"
-    bpy.ops.digiclay.skin_toggle()
-    assert (bed.digiclay_display.form, form.is_skin_shown(bed)) == ("automatic", True)
+    assert form.is_skin_shown(bed) is seen[0]
 
 
 def test_the_key_shows_the_skin_and_the_pins_again_as_undo_steps(bed: Any) -> None:

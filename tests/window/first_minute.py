@@ -50,17 +50,7 @@ def add(blender: Any) -> Iterator[float | None]:
     blender.SEEN["added"] = len(blender.beds())
     blender.SEEN["things"] = [thing.name for thing in blender.window().scene.objects]
     blender.SEEN["selected"] = [thing.name for thing in bpy.context.selected_objects]
-    blender.SEEN["seen"] = count_seen(blender)
     blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
-
-
-def count_seen(blender: Any) -> int:
-    """Return how many of 25 places on the pins nothing hides."""
-    aim, (area, region) = blender.part("press.aim"), blender.view()
-    places = [blender.on_the_bed(x, y) for x in range(-60, 61, 30) for y in range(-60, 61, 30)]
-    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
-        found = [aim.find_target(bpy.context, (x - region.x, y - region.y)) for x, y in places]
-    return sum(one is not None for one in found)
 
 
 def open_tab(blender: Any) -> Iterator[float | None]:

@@ -8,18 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 from hand_strokes import add_bed, drag, finish, focus_window, hand, on_the_screen, reset, to
-from mathutils import Euler, Vector
+from mathutils import Vector
 
 #: Places of the pins, mm: behind the cube, and beside it.
 COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
 #: How far the cube is from the place it covers, Blender units.
 DISTANCE = 0.25
-#: Views from which a bed is added: the angles of their rotation, degrees, and their kind.
-ANGLES = (
-    ("from above", (0, 0, 0), "ORTHO"),
-    ("from the front", (90, 0, 0), "ORTHO"),
-    ("from below", (150, 0, 20), "PERSP"),
-)
 
 
 def covered_place(blender: Any) -> Vector:
@@ -130,20 +124,14 @@ def quarters(blender: Any) -> Iterator[float | None]:
 
 
 def add_from_elsewhere(blender: Any) -> Iterator[float | None]:
-    """Add a small bed into the cube, seen from other angles; write down where its underside is."""
+    """Add a small bed into a cube that is seen along each axis; write down where the bed is."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.primitive_cube_add)
-    cube = bpy.context.object
-    looking = blender.view()[0].spaces.active.region_3d
-    for name, angles, kind in ANGLES:
-        looking.view_rotation = Euler(np.radians(angles)).to_quaternion()
-        looking.view_location, looking.view_distance, looking.view_perspective = (0.0, 0.0, 0.0), 12.0, kind
+    for axis in ("TOP", "FRONT", "BOTTOM"):
+        blender.call(bpy.ops.view3d.view_axis, type=axis)
         yield 0.5
         blender.call(bpy.ops.mesh.digital_clay_add, rows=6, columns=6)
-        bed = blender.beds()[0]
-        low = bed.location.z + blender.part("device.view").underside(bed)
-        blender.SEEN[name] = [round(abs(place), 2) for place in (*bed.location.xy, low)]
-        blender.shot(f"past_{name}")
-        for thing in [thing for thing in bpy.context.scene.objects if thing.name != cube.name]:
-            bpy.data.objects.remove(thing)
+        (bed,) = blender.beds()
+        blender.SEEN[axis] = [float(bed.location.xy.length), bed.location.z]
+        bpy.data.batch_remove([bed, *bed.children_recursive])

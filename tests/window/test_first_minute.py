@@ -34,11 +34,8 @@ def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
     assert 1.0 < seen["distance"] < 6.0
 
 
-def test_the_bed_is_seen_among_all_the_factory_file_has_and_no_outline_is_drawn_about_its_pins(
-    seen: dict[str, Any],
-) -> None:
-    assert {"Cube", "Camera", "Light", "Digital Clay"} <= set(seen["things"])
-    assert seen["seen"] == 25
+def test_all_the_factory_file_has_is_kept_and_no_pin_has_an_outline(seen: dict[str, Any]) -> None:
+    assert {"Cube", "Camera", "Light"} <= set(seen["things"])
     assert seen["selected"] == []
 
 

@@ -45,11 +45,9 @@ def test_a_click_on_an_object_in_front_says_what_hides_the_bed(seen: dict[str, A
     assert seen["output"].count("Warning: Cube hides the bed here") == 3
 
 
-@pytest.mark.parametrize("view", ["from above", "from the front"])
-def test_a_bed_that_is_added_in_a_cube_stands_on_top_of_it(seen: dict[str, Any], view: str) -> None:
-    assert seen[view] == [0.0, 0.0, 1.0]
-
-
-def test_from_below_it_stands_beside_the_cube(seen: dict[str, Any]) -> None:
-    x, y, low = seen["from below"]
-    assert (max(x, y) > 1.0, min(x, y), low) == (True, 0.0, 0.0)
+def test_a_bed_that_is_added_in_a_cube_goes_on_top_of_it_or_beside_it_where_that_is_seen(
+    seen: dict[str, Any],
+) -> None:
+    # Its origin is the floor of the bed, a little above its underside; the cube is 2 units large.
+    where = {axis: (away > 1.0, height > 1.0) for axis, (away, height) in seen.items() if axis.isupper()}
+    assert where == {"TOP": (False, True), "FRONT": (False, True), "BOTTOM": (True, False)}

@@ -38,11 +38,6 @@ def read_form(bed: Any) -> str:
 def set_form(bed: Any, form: str) -> None:
     """Show a bed as one of `FORMS`.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    form : str
-
     Raises
     ------
     DigiclayError
@@ -60,11 +55,6 @@ def read_kind(bed: Any) -> str:
 def set_kind(bed: Any, kind: str) -> None:
     """Give a bed one of the skins `skin_lattice.KINDS`.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    kind : str
-
     Raises
     ------
     DigiclayError
@@ -79,13 +69,7 @@ def is_far(bed: Any) -> bool:
 
 
 def set_far(bed: Any, far: bool) -> None:
-    """Note whether the pins of a bed are too small in the views to be drawn one by one.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    far : bool
-    """
+    """Note whether the pins of a bed are too small in the views to be drawn one by one."""
     set_node_setting(_require_skin(bed), FAR, bool(far))
 
 

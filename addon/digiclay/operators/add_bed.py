@@ -34,26 +34,14 @@ OFFERED: list[tuple[str, str, str]] = []
 
 
 def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
-    """Return the core's presets and the user's own.
-
-    Parameters
-    ----------
-    operator : bpy.types.Operator
-    context : bpy.types.Context
-    """
+    """Return the core's presets and the user's own."""
     OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
     OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
     return OFFERED
 
 
 def take_bed(operator: Any, context: Any) -> None:
-    """Set the plan of the chosen bed.
-
-    Parameters
-    ----------
-    operator : bpy.types.Operator
-    context : bpy.types.Context
-    """
+    """Set the plan of the chosen bed."""
     bed = BEDS[operator.bed]
     operator.rows, operator.columns = bed.rows, bed.columns
     operator.pitch = bed.pitch * 1e3
@@ -211,26 +199,13 @@ class Rebuild(Action, bpy.types.Operator):
 
 
 def add(context: Any, scene: Scene) -> Any:
-    """Add the device of a scene, at rest, in the context's collection; return its bed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    scene : Scene
-    """
+    """Add the device of a scene, at rest, in the context's collection; return its bed."""
     finger = find_ellipsoid(scene)
     return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
 
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
-    """Add the device of a scene as it is at an instant, in the context's collection; return its bed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    scene : Scene
-    instant : Instant
-    """
+    """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
     colored = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
     if not colored:
@@ -271,11 +246,5 @@ def frame(context: Any, bed: Any) -> None:
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in Add > Mesh.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the entry in Add > Mesh."""
     menu.layout.operator(AddBed.bl_idname, icon="MESH_GRID")

@@ -96,17 +96,7 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
 
 
 def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
-    """Return where the ray through a pixel meets a bed's pins (3,), m; None when it passes by.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    cells : Grid
-    height : ndarray (n,)
-        Pin tops, m.
-    xy : (float, float)
-        Pixels in the region.
+    """Return where the ray through a region's pixel meets pins of a height (n,), m, or None.
 
     Raises
     ------
@@ -122,15 +112,7 @@ def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[flo
 
 
 def project(context: Any, bed: Any, points: Floats) -> Floats:
-    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    points : ndarray (k, 3)
-        m.
-    """
+    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
     to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
     clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
@@ -139,13 +121,7 @@ def project(context: Any, bed: Any, points: Floats) -> Floats:
 
 
 def find_view(context: Any, bed: Any) -> Floats:
-    """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    """
+    """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each."""
     seen = np.array(context.region_data.view_matrix @ bed.matrix_world, np.float64)[:3, :3].T
     return np.asarray(seen / np.linalg.norm(seen, axis=0))
 

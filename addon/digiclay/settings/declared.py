@@ -36,17 +36,7 @@ Update = Callable[[Any, Any], None]
 
 
 def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
-    """Make the property group of a part.
-
-    Parameters
-    ----------
-    name : str
-        The part's own, unique among groups.
-    kind : type
-        The part's parameters.
-    updates : dict
-        For some fields, what happens after a change: a function of the group and the context.
-    """
+    """Make the property group of a part; `updates` of its fields are called with group and context."""
     properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}
     content = {"__annotations__": properties, "__module__": __name__, "__doc__": kind.__doc__}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
@@ -101,15 +91,7 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
 
 
 def format_list(values: tuple[float, ...], power: int) -> str:
-    """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``.
-
-    Parameters
-    ----------
-    values : tuple of float
-        SI.
-    power : int
-        Of ten, shown units per SI unit.
-    """
+    """Write a list of SI values in the unit they are shown in, 10**power to an SI unit: ``4, 70, 1400``."""
     return ", ".join(repr(to_shown(value, power)).removesuffix(".0") for value in values)
 
 

@@ -47,14 +47,7 @@ def set_size(settings: Any, size: float) -> None:
 
 
 def resize(settings: Any, finger: Fingertip) -> None:
-    """Give a bed's fingertip another size; its lowest point, and so what it touches, stays where it is.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-        Of the bed. Its blister follows in proportion to the width, unless `blister_follows` is off.
-    finger : Fingertip
-    """
+    """Give a bed's fingertip another size; its lowest point stays, its blister follows, if that is on."""
     before, tip = read_finger(settings), view.fingertip_of(settings.id_data)
     lowest = _pose(tip)
     for name in ("length", "width", "height"):

@@ -32,13 +32,7 @@ PRESET_WORDS = {
 
 
 def take_preset(settings: Any, context: Any) -> None:
-    """Set what the chosen preset, or another one, changes of the defaults.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set what the chosen preset, or another one, changes of the defaults."""
     changed = {
         (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
     }
@@ -52,26 +46,14 @@ def take_preset(settings: Any, context: Any) -> None:
 
 
 def take_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen built-in method is made for; it takes the place of one of one's own.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the blister the chosen built-in method is made for; it takes the place of one of one's own."""
     if settings.own_method:
         settings.own_method = ""
     _take_blister(settings)
 
 
 def take_own_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen method of one's own is made for.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the blister the chosen method of one's own is made for."""
     _take_blister(settings)
 
 
@@ -90,13 +72,7 @@ def _take_blister(settings: Any) -> None:
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
-    """Set the share of the contact law a cell carries, which depends on how close the cells stand.
-
-    Parameters
-    ----------
-    layout : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
     settings = layout.id_data.digiclay
     kind = import_parameters("contact", "")
     if layout.arrangement == "hexagonal":
@@ -106,13 +82,7 @@ def take_arrangement(layout: Any, context: Any) -> None:
 
 
 def take_size(fingertip: Any, context: Any) -> None:
-    """Show the fingertip in its new size.
-
-    Parameters
-    ----------
-    fingertip : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Show the fingertip in its new size."""
     bed = fingertip.id_data
     tip = view.fingertip_of(bed)
     if tip is not None:
@@ -150,15 +120,7 @@ def use_properties() -> dict[str, Any]:
 
 
 def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
-    """Make a property group of properties.
-
-    Parameters
-    ----------
-    name, words : str
-        Of the class, and its docstring.
-    properties : dict
-        By name.
-    """
+    """Make a property group of properties."""
     content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
