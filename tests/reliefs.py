@@ -34,7 +34,7 @@ def heighten(system: System, relief: Floats) -> State:
 
 
 def make_orders(periods: int, start: float, end: float, y: float, radius: float, settle: int = 60) -> Floats:
-    """Return the orders of a stroke along a row, m, at full strength, and of the wait; both in control periods."""
+    """Return the orders of a stroke along a row, m, at full strength, and of a wait (control periods)."""
     orders = np.zeros((periods + settle, 4))
     orders[:periods, 0] = np.linspace(start, end, periods)
     orders[periods:, 0] = end

@@ -74,7 +74,7 @@ def relief(session: Running) -> Floats:
 
 
 def measure_spikes(formed: Floats) -> float:
-    """Return how far the worst pin (mm) is above or below all 8 pins, or the 16 around those, about it, mm."""
+    """Return how far the worst pin is above or below all 8 pins about it, or the 16 about those, mm."""
     worst = 0.0
     rows, columns = formed.shape
     for reach in (1, 2):

@@ -90,7 +90,7 @@ def _serve(listener: socket.socket, programs: list[socket.socket]) -> None:
 
 
 def push(*motions: tuple[int, int, int, int, int, int], pause: int = 16) -> None:
-    """Push the cap of the 3D mouse: translations and turns, -500 to 500, a pause before in ms; all 0: let go."""
+    """Push the cap of the 3D mouse: translations and turns, -500 to 500, 0: let go; a pause before, ms."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as hand:
         hand.connect(os.environ[VARIABLE])
         hand.sendall(HAND + b"".join(MOTION.pack(0, *motion, pause) for motion in motions))

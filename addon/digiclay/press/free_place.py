@@ -65,8 +65,7 @@ def _box(bed: Any) -> Floats:
     housing: Any = view.housing_of(bed)
     points = np.array([thing.co for mesh in (housing.data, bed.data) for thing in mesh.vertices])
     corners = np.array([points.min(axis=0), points.max(axis=0)]) * np.array(bed.scale)
-    corners[:, 2] -= corners[0, 2]
-    return corners
+    return np.asarray(corners - [0.0, 0.0, corners[0, 2]])
 
 
 def _bounds(thing: Any, matrix: Any) -> Floats:

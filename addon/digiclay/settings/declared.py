@@ -46,11 +46,12 @@ def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Updat
     """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
     known: Quantity = field.metadata["quantity"]
     known = dataclasses.replace(known, doc=known.whole, symbol=f"2 {known.symbol}")
-    unit, power = unit_of(known.unit, field.default)
+    default: Any = field.default
+    unit, power = unit_of(known.unit, default)
     return bpy.props.FloatProperty(
-        **_numbers(known, 2.0 * field.default, power),
+        **_numbers(known, 2.0 * default, power),
         name=f"{title(field.name)} ({unit})",
-        description=_tooltip(known, 2.0 * field.default, unit, power),
+        description=_tooltip(known, 2.0 * default, unit, power),
         get=get,
         set=put,
         options=set(),
