@@ -76,6 +76,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from quarters(blender)
     blender.call(bpy.ops.screen.region_quadview)
     yield 0.5
+    blender.SEEN["reported"] = read_reports(blender)
     yield from add_from_elsewhere(blender)
 
 
@@ -121,6 +122,16 @@ def quarters(blender: Any) -> Iterator[float | None]:
                 hit = aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
                 found.setdefault(f"{kind} {what}", []).append(hit)
     blender.SEEN["quarters"] = found | {"count": len(regions)}
+
+
+def read_reports(blender: Any) -> str:
+    """Return all that Blender has reported."""
+    area = next(area for area in blender.window().screen.areas if area.type == "PROPERTIES")
+    area.type = "INFO"
+    with bpy.context.temp_override(window=blender.window(), area=area, region=area.regions[-1]):
+        bpy.ops.info.select_all(action="SELECT")
+        bpy.ops.info.report_copy()
+    return str(bpy.context.window_manager.clipboard)
 
 
 def add_from_elsewhere(blender: Any) -> Iterator[float | None]:
