@@ -25,14 +25,7 @@ def make_spike_and_ridge(grid: Grid) -> Floats:
 
 
 def heighten(system: System, relief: Floats) -> State:
-    """Return the state of a bed whose pins stand still at a relief.
-
-    Parameters
-    ----------
-    system : System
-    relief : ndarray (n,)
-        Above the heights at rest, m.
-    """
+    """Return the state of a bed whose pins stand still at a relief (n,), m above rest."""
     state = begin(system)
     height = system.cell.actuator.rest_height + relief
     state.rows[0] = state.rows[system.rows.target] = height
@@ -41,17 +34,7 @@ def heighten(system: System, relief: Floats) -> State:
 
 
 def make_orders(periods: int, start: float, end: float, y: float, radius: float, settle: int = 60) -> Floats:
-    """Return the orders of a stroke along a row at full strength, and of the wait for its pins.
-
-    Parameters
-    ----------
-    periods : int
-        Control periods of the stroke.
-    start, end, y, radius : float
-        m.
-    settle : int, optional
-        Control periods of the wait.
-    """
+    """Return the orders of a stroke along a row, m, at full strength, and of a wait (control periods)."""
     orders = np.zeros((periods + settle, 4))
     orders[:periods, 0] = np.linspace(start, end, periods)
     orders[periods:, 0] = end
@@ -65,14 +48,7 @@ def stay_away(periods: int) -> Floats:
 
 
 def measure_roughness(grid: Grid, height: Floats) -> float:
-    """Return the rms of how far the pins are off the mean of their neighbors, m; exact but for a factor.
-
-    Parameters
-    ----------
-    grid : Grid
-    height : ndarray (n,)
-        m.
-    """
+    """Return the rms of how far the pins are off the mean of their neighbors, m; exact but for a factor."""
     cells = np.arange(grid.count)
     # Ten times what the exchange of so short a time moves.
     off = make_exchange(grid, 1e-6, 1e-3).even_out(cells, height) - height

@@ -26,14 +26,7 @@ DURATION = 0.5
 
 
 def begin_bed(name: str, rows: int, columns: int) -> Running:
-    """Return a session on a part of a bed that Add offers.
-
-    Parameters
-    ----------
-    name : str
-        Of `BEDS`.
-    rows, columns : int
-    """
+    """Return a session on a part of a bed that Add offers."""
     scene = make_scene("paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share)
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
     session, _ = sculpting.begin_session(7, "Bed", scene, above)
@@ -81,14 +74,7 @@ def relief(session: Running) -> Floats:
 
 
 def measure_spikes(formed: Floats) -> float:
-    """Return how far the worst pin is above or below all pins around it, mm.
-
-    Parameters
-    ----------
-    formed : ndarray (rows, columns)
-        Heights, mm. Around a pin are its eight neighbors, and likewise the sixteen around these: spikes of
-        two or three pins side by side count, too.
-    """
+    """Return how far the worst pin is above or below all 8 pins about it, or the 16 about those, mm."""
     worst = 0.0
     rows, columns = formed.shape
     for reach in (1, 2):

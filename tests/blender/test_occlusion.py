@@ -11,6 +11,7 @@ import pytest
 from digiclay.bridge import SCALE
 from digiclay.device import view
 from digiclay.device.roles import ROLE
+from digiclay.live import running
 from digiclay.press import aim
 from mathutils import Vector
 
@@ -21,18 +22,24 @@ COVERED, BARE = np.array([[0.0, 0.0, 0.04]]), np.array([[0.03, 0.03, 0.04]])
 
 
 @pytest.fixture
-def context(extension: None) -> Iterator[Any]:
-    """The context of the factory file's view, in perspective and Solid mode, with nothing but a bed."""
-    bpy.ops.object.select_all(action="SELECT")
-    bpy.ops.object.delete()
-    bpy.ops.mesh.digital_clay_add(rows=25, columns=25)
-    bpy.context.object.scale = (LARGER,) * 3
-    bpy.context.view_layer.update()
+def factory_view(extension: None) -> Iterator[Any]:
+    """The context of the factory file's view, in perspective and Solid mode."""
     (window,) = bpy.context.window_manager.windows
     area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):
         yield bpy.context
+
+
+@pytest.fixture
+def context(factory_view: Any) -> Any:
+    """The context of that view, with nothing but a bed."""
+    bpy.ops.object.select_all(action="SELECT")
+    bpy.ops.object.delete()
+    bpy.ops.mesh.digital_clay_add(rows=25, columns=25)
+    bpy.context.object.scale = (LARGER,) * 3
+    bpy.context.view_layer.update()
+    return factory_view
 
 
 def bed() -> Any:
@@ -209,3 +216,50 @@ def test_an_object_the_user_has_parented_to_the_bed_hides(context: Any) -> None:
     cube = cover(context)
     cube.parent, cube.matrix_parent_inverse = bed(), bed().matrix_world.inverted()
     assert not points_at(context, COVERED)
+
+
+ON_TOP, BESIDE, CURSOR = "on top of it", "beside it", ""
+#: The factory file's cube, changed, or what is added in place of it; where and how high a bed stands then.
+PLACES: dict[str, tuple[dict[str, Any], str, float]] = {
+    "the cube swallows it": ({}, ON_TOP, 1.0),
+    "the cube is mirrored and scaled": ({"scale": (-1.0, 1.5, 1.2)}, ON_TOP, 1.2),
+    "the cube is turned on its edge": ({"rotation_euler": (np.pi / 4, 0.0, 0.3)}, ON_TOP, 2.0**0.5),
+    "the eye is inside the cube": ({"scale": (30.0, 30.0, 30.0)}, CURSOR, 0.0),
+    "the cube is away from the cursor": ({"location": (3.0, 0.0, 0.0)}, CURSOR, 0.0),
+    "the cube is hidden": ({"hide_viewport": True}, CURSOR, 0.0),
+    "the cube is as small as a pin": ({"scale": (0.05, 0.05, 2.0)}, CURSOR, 0.0),
+    "the cube is the ground": ({"scale": (9.0, 9.0, 0.02)}, CURSOR, 0.0),
+    "the cube is a column": ({"scale": (0.4, 0.4, 9.0)}, BESIDE, 0.0),
+    "a monkey": ({"add": bpy.ops.mesh.primitive_monkey_add, "size": 3.0}, ON_TOP, 1.477),
+    "a text that lies flat": ({"add": bpy.ops.object.text_add, "radius": 3.0}, CURSOR, 0.0),
+    "another bed": ({"add": bpy.ops.mesh.digital_clay_add, "location": (0.1, 0.1, 0.0)}, BESIDE, 0.0),
+}
+
+
+@pytest.mark.parametrize("case", PLACES)
+def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_view: Any, case: str) -> None:
+    values, where, height = PLACES[case]
+    cube, add = bpy.data.objects["Cube"], values.get("add")
+    if add is not None:
+        bpy.data.objects.remove(cube)
+        add(**{name: value for name, value in values.items() if name != "add"})
+    for name, value in values.items() if add is None else ():
+        setattr(cube, name, value)
+    bpy.context.view_layer.update()
+    bpy.ops.mesh.digital_clay_add()
+    new = bpy.context.object
+    words = running.last_message(new)
+    assert words.endswith(where) if where else not words, words
+    assert new.location.z + view.underside(new) == pytest.approx(height, abs=1e-3)
+    assert (new.location.xy.length > 0.4) is (where == BESIDE)
+    # No outline about every pin; panels and keys go by the active object.
+    assert bpy.context.selected_objects == []
+
+
+def test_a_bed_with_a_location_is_put_there_and_a_sample_where_it_is_seen(factory_view: Any) -> None:
+    bpy.ops.mesh.digital_clay_add(location=(0.0, 0.2, 0.1))
+    new = bpy.context.object
+    assert [*new.location.xy, new.location.z + view.underside(new)] == pytest.approx([0.0, 0.2, 0.1])
+    bpy.data.objects.remove(new)
+    bpy.ops.digiclay.add_sample(sample="session:tap", take=False)
+    assert bpy.context.object.location.z > 1.0

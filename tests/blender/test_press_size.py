@@ -10,6 +10,7 @@ import pytest
 from digiclay import bridge
 from digiclay.core.scene.assembly import assemble
 from digiclay.device import view
+from digiclay.operators.press_adjust import AdjustStrength
 from digiclay.press.fingers import FINGERS, find_kind
 from digiclay.settings import finger_size, properties
 
@@ -43,6 +44,29 @@ def test_blister_and_drawn_ellipsoid_follow_the_size_in_proportion(bed: Any) -> 
     assert lengths(bed) == (8.0, 7.5, 9.25, 3.0)
     finger = bridge.finger_of(view.fingertip_of(bed))
     assert (finger.length, finger.width, finger.height) == pytest.approx((5e-3, 4e-3, 4e-3), rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
+def test_the_panel_shows_whole_widths_and_what_is_stored_are_semi_axes(
+    bed: Any, name: str, usual: float
+) -> None:
+    group, lowest = bed.digiclay.fingertip, bridge.pose(view.fingertip_of(bed))
+    assert getattr(group, f"whole_{name}") == usual
+    setattr(group, f"whole_{name}", 12.6)
+    bpy.context.view_layer.update()
+    (finger,) = properties.scene_of(bed).fingers
+    assert getattr(finger.fingertip, name) == 6.3e-3
+    assert bed.digiclay.size == pytest.approx(12.6 if name == "width" else 16.0)
+    np.testing.assert_allclose(bridge.pose(view.fingertip_of(bed)), lowest, rtol=0, atol=1e-7)
+    assert group.bl_rna.properties[f"whole_{name}"].description.endswith(f"by default {usual:g} mm")
+
+
+@pytest.mark.parametrize(
+    ("typed", "share"),
+    [("0.5", 0.5), (".25", 0.25), ("1", 1.0), ("50", 0.5), ("50 %", 0.5), ("0.5%", 5e-3), ("2*0.3", 0.6)],
+)
+def test_a_strength_is_typed_as_a_share_or_in_per_cent(typed: str, share: float) -> None:
+    assert AdjustStrength.parse(None, typed) == pytest.approx(share, rel=1e-9)
 
 
 def test_a_blister_set_by_itself_keeps_its_size(bed: Any) -> None:

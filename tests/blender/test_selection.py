@@ -32,10 +32,12 @@ def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
     assert bed.name in bpy.data.objects
 
 
-def test_after_the_session_the_active_bed_is_selected_again(bed: Any) -> None:
+@pytest.mark.parametrize("before", [True, False])
+def test_after_the_session_the_active_bed_is_selected_again_if_it_was_before(bed: Any, before: bool) -> None:
+    bed.select_set(before)
     selection.deselect(bed)
     selection.select_active(frozenset({bed.session_uid}))
-    assert bed.select_get()
+    assert bed.select_get() is before
 
 
 def test_what_was_selected_meanwhile_stays_the_selection(bed: Any) -> None:

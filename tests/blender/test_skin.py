@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.core.base.errors import DigiclayError
-from digiclay.device import form, view
+from digiclay.device import detail, form, view
 from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, choose_parts, interpolate, make_lattice
 from digiclay.settings import properties
@@ -131,14 +131,38 @@ def test_a_render_shows_the_choice_and_pins_for_automatic(bed: Any, tmp_path: Pa
     assert (np.abs(pictures["skin"] - pictures["pins"]) > 0.02).sum() > 100
 
 
+@pytest.mark.parametrize("scale", [1.0, 50.0])  # small and large in the factory file's view
+@pytest.mark.parametrize("chosen", form.FORMS)
+def test_the_key_always_changes_what_is_seen_and_every_other_time_comes_back_to_what_was_chosen(
+    bed: Any, chosen: str, scale: float
+) -> None:
+    bed.scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    bed.digiclay_display.form = chosen
+    detail.follow()
+    seen = [form.is_skin_shown(bed)]
+    for _ in range(4):
+        bpy.ops.digiclay.skin_toggle()
+        seen.append(form.is_skin_shown(bed))
+    assert seen == [seen[0], not seen[0]] * 2 + [seen[0]]
+    assert bed.digiclay_display.form == chosen
+    # Where the view has come to show the same by the form that was chosen, the key goes on to the other.
+    bpy.ops.digiclay.skin_toggle()
+    bed.scale /= scale
+    bpy.context.view_layer.update()
+    bpy.ops.digiclay.skin_toggle()
+    assert form.is_skin_shown(bed) is seen[0]
+
+
 def test_the_key_shows_the_skin_and_the_pins_again_as_undo_steps(bed: Any) -> None:
+    bed.scale = (50.0,) * 3
     done("Bed")
     shown = []
     for _ in range(2):
         bpy.ops.digiclay.skin_toggle()
         done("Toggle Skin")
         shown.append(bpy.context.object.digiclay_display.form)
-    assert shown == ["skin", "pins"]
+    assert shown == ["skin", "automatic"]
     bpy.ops.ed.undo()
     assert bpy.context.object.digiclay_display.form == "skin"
     assert_skin(bpy.context.object, expected(bpy.context.object, "smooth"))

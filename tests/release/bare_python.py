@@ -67,18 +67,7 @@ def _carry_out(*command: str | Path) -> str:
 
 
 def make_bare(folder: Path, version: str, wheel: Path, pins: str) -> BarePython:
-    """Make an environment of a Python and install the wheel there.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the environment.
-    version : str
-        Of Python, ``3.12``; one that is not to be had fails with the line of tools/find-python.
-    wheel : Path
-    pins : str
-        File in requirements/ that pins the libraries; empty for what pip chooses.
-    """
+    """Make an environment of a Python (``3.12``); install the wheel, pinned by a file of requirements/."""
     variable = f"PYTHON{version.replace('.', '')}"
     python = _carry_out(ROOT / "tools" / "find-python", version, variable, os.environ.get(variable, ""))
     _carry_out(python.strip(), "-m", "venv", folder)

@@ -23,25 +23,10 @@ LIMIT = 1200
 def played(
     script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False, display: str = ""
 ) -> dict[str, Any]:
-    """Play a script of this folder in a Blender with a copy of the extension installed.
+    """Play a script of this folder in a Blender with the extension; return what it saw, and its "output".
 
-    Parameters
-    ----------
-    script : str
-        Its file's name.
-    out : Path
-        An empty folder for what is installed, seen and shot.
-    size : (int, int)
-        The window's, pixels: software GL draws a small one much quicker.
-    by_hand : bool
-        Events come from outside Blender, as a hand's do: Blender takes those or simulated ones, not both.
-    display : str
-        Of a screen that is there already.
-
-    Returns
-    -------
-    dict
-        What the script saw; and as "output" all that Blender said, which holds no traceback.
+    Events come from the script, or `by_hand` from outside: Blender takes one of the two. The folder is empty
+    at first. Software GL draws a window of a small size, pixels, much quicker; `display` is that of a screen.
     """
     installed = out / "extensions" / "user_default" / "digiclay"
     shutil.copytree(ADDON, installed, ignore=shutil.ignore_patterns("__pycache__", ".*"))

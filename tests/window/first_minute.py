@@ -44,11 +44,12 @@ def done(blender: Any, *words: str) -> Iterator[float | None]:
 
 
 def add(blender: Any) -> Iterator[float | None]:
-    """Add a bed from the menu, by typing its name."""
-    letters = ("space" if letter == " " else letter for letter in "digital clay")
-    typed = " ".join(f"key {letter} sleep 0.05" for letter in letters)
+    """Add a bed from the menu, by typing the beginning of its name."""
+    typed = " ".join(f"key {letter} sleep 0.05" for letter in "dig")
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
     blender.SEEN["added"] = len(blender.beds())
+    blender.SEEN["things"] = [thing.name for thing in blender.window().scene.objects]
+    blender.SEEN["selected"] = [thing.name for thing in bpy.context.selected_objects]
     blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
 
 
@@ -86,7 +87,7 @@ def stop(blender: Any) -> Iterator[float | None]:
 
 #: Steps of the guide's first page: the first sentence of each, and what a hand does.
 STEPS = (
-    ("Press **Shift A** over the 3D view, type `digital clay` and press Enter.", add),
+    ("Press **Shift A** over the 3D view, type `dig` and press Enter.", add),
     ("Press **N** and select the tab *Digital Clay*.", open_tab),
     ("Press **Start Sculpting** in the panel *Session*.", start),
     ("Hold **Ctrl** and drag across the pins.", draw),
@@ -109,9 +110,7 @@ def along(blender: Any) -> float:
 
 
 def script(blender: Any) -> Iterator[float | None]:
-    """Do what the page says; then take hold of the ball."""
-    blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.call(bpy.ops.object.delete)
+    """Do what the page says, in the file that Blender starts with; then take hold of the ball."""
     catch_up(blender)
     yield from focus_window()
     began, waited = time.perf_counter(), waiting()

@@ -74,6 +74,10 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.call(bpy.ops.screen.region_quadview)
     yield 0.5
     yield from quarters(blender)
+    blender.call(bpy.ops.screen.region_quadview)
+    yield 0.5
+    blender.SEEN["reported"] = read_reports(blender)
+    yield from add_from_elsewhere(blender)
 
 
 def prepare(blender: Any) -> Iterator[float | None]:
@@ -118,3 +122,27 @@ def quarters(blender: Any) -> Iterator[float | None]:
                 hit = aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
                 found.setdefault(f"{kind} {what}", []).append(hit)
     blender.SEEN["quarters"] = found | {"count": len(regions)}
+
+
+def read_reports(blender: Any) -> str:
+    """Return all that Blender has reported."""
+    area = next(area for area in blender.window().screen.areas if area.type == "PROPERTIES")
+    area.type = "INFO"
+    with bpy.context.temp_override(window=blender.window(), area=area, region=area.regions[-1]):
+        bpy.ops.info.select_all(action="SELECT")
+        bpy.ops.info.report_copy()
+    return str(bpy.context.window_manager.clipboard)
+
+
+def add_from_elsewhere(blender: Any) -> Iterator[float | None]:
+    """Add a small bed into a cube that is seen along each axis; write down where the bed is."""
+    blender.call(bpy.ops.object.select_all, action="SELECT")
+    blender.call(bpy.ops.object.delete)
+    blender.call(bpy.ops.mesh.primitive_cube_add)
+    for axis in ("TOP", "FRONT", "BOTTOM"):
+        blender.call(bpy.ops.view3d.view_axis, type=axis)
+        yield 0.5
+        blender.call(bpy.ops.mesh.digital_clay_add, rows=6, columns=6)
+        (bed,) = blender.beds()
+        blender.SEEN[axis] = [float(bed.location.xy.length), bed.location.z]
+        bpy.data.batch_remove([bed, *bed.children_recursive])

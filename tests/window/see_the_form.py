@@ -70,6 +70,8 @@ def script(blender: Any) -> Iterator[float | None]:
     add_bed(blender)
     watch_overlay(blender)
     yield from focus_window()
+    note(blender, "added")
+    blender.select(blender.beds()[0])
     note(blender, "selected")
     middle = on_the_screen(blender, 0.0, 0.0)
     yield from levels_of_detail(blender)

@@ -29,15 +29,7 @@ MOTION, HAND = struct.Struct("8i"), struct.pack("i", 1)
 
 @contextmanager
 def driver(folder: Path, blender: str) -> Iterator[str]:
-    """Run the stand-in; yield the path of its socket.
-
-    Parameters
-    ----------
-    folder : Path
-        For the socket.
-    blender : str
-        Blender's command: a launcher may give it a file system of its own.
-    """
+    """Run the stand-in; yield the path of its socket."""
     path, mark = str(folder / "space_mouse"), folder / "made"
     # Where a true driver runs, the file is there already, and stays.
     _run(
@@ -98,15 +90,7 @@ def _serve(listener: socket.socket, programs: list[socket.socket]) -> None:
 
 
 def push(*motions: tuple[int, int, int, int, int, int], pause: int = 16) -> None:
-    """Push the cap of the 3D mouse of the environment.
-
-    Parameters
-    ----------
-    motions : tuple of int
-        Translations and turns, each -500 to 500; all 0: it is let go.
-    pause : int, optional
-        Time since the motion before, ms.
-    """
+    """Push the cap of the 3D mouse: translations and turns, -500 to 500, 0: let go; a pause before, ms."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as hand:
         hand.connect(os.environ[VARIABLE])
         hand.sendall(HAND + b"".join(MOTION.pack(0, *motion, pause) for motion in motions))

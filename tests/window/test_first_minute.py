@@ -34,6 +34,11 @@ def test_add_frames_the_bed(seen: dict[str, Any]) -> None:
     assert 1.0 < seen["distance"] < 6.0
 
 
+def test_all_the_factory_file_has_is_kept_and_no_pin_has_an_outline(seen: dict[str, Any]) -> None:
+    assert {"Cube", "Camera", "Light"} <= set(seen["things"])
+    assert seen["selected"] == []
+
+
 def test_add_makes_a_bed_to_design_on(seen: dict[str, Any]) -> None:
     assert np.array(seen["drawn"]["bed"]).shape == (BEDS[FIRST].rows, BEDS[FIRST].columns) == (100, 100)
 

@@ -38,3 +38,15 @@ def test_in_a_quad_view_each_quarter_sees_for_itself(seen: dict[str, Any]) -> No
     assert found["count"] == 4
     assert found["top covered"] == [False]
     assert found["top bare"] == [True]
+
+
+def test_a_click_on_an_object_in_front_says_what_hides_the_bed(seen: dict[str, Any]) -> None:
+    assert seen["reported"].count("Cube hides the bed here") == 3  # in three views
+
+
+def test_a_bed_that_is_added_in_a_cube_goes_on_top_of_it_or_beside_it_where_that_is_seen(
+    seen: dict[str, Any],
+) -> None:
+    # Its origin is the floor of the bed, a little above its underside; the cube is 2 units large.
+    where = {axis: tuple(one > 1.0 for one in seen[axis]) for axis in ("TOP", "FRONT", "BOTTOM")}
+    assert where == {"TOP": (False, True), "FRONT": (False, True), "BOTTOM": (True, False)}

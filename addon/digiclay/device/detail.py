@@ -66,7 +66,7 @@ def follow() -> None:
 def _sizes() -> Iterator[tuple[Any, float]]:
     """Give the beds shown as "automatic", with the pitch in the view that shows them largest, pixels."""
     sizes: dict[Any, float] = {}
-    scale = bpy.context.preferences.system.ui_scale
+    scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     for window in bpy.context.window_manager.windows:
         beds = [thing for thing in window.scene.objects if view.is_bed(thing) and _is_automatic(thing)]
         for region, looking in _regions(window) if beds else ():

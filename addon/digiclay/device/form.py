@@ -11,12 +11,14 @@ from .node_tree import FAR, FORM, MEMBRANE
 from .skin_lattice import KINDS
 
 __all__ = [
-    "FORMS", "KINDS", "can_show_skin", "is_far", "is_skin_shown", "read_form", "read_kind", "set_far",
-    "set_form", "set_kind",
+    "BEFORE", "FORMS", "KINDS", "can_show_skin", "is_far", "is_skin_shown", "read_form", "read_kind",
+    "set_far", "set_form", "set_kind",
 ]  # fmt: skip
 
 #: Forms, in the order of the numbers in the settings of the geometry nodes.
 FORMS = ("automatic", "pins", "skin", "both")
+#: Where a bed keeps the form that it had before its skin was toggled, until a form is chosen.
+BEFORE = "digiclay_form_before"
 
 
 def can_show_skin(bed: Any) -> bool:
@@ -36,17 +38,13 @@ def read_form(bed: Any) -> str:
 def set_form(bed: Any, form: str) -> None:
     """Show a bed as one of `FORMS`.
 
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    form : str
-
     Raises
     ------
     DigiclayError
         On another word, or for a bed without a skin.
     """
     set_node_setting(_require_skin(bed), FORM, _index(form, FORMS, "form"))
+    bed.pop(BEFORE, None)
 
 
 def read_kind(bed: Any) -> str:
@@ -56,11 +54,6 @@ def read_kind(bed: Any) -> str:
 
 def set_kind(bed: Any, kind: str) -> None:
     """Give a bed one of the skins `skin_lattice.KINDS`.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    kind : str
 
     Raises
     ------
@@ -76,13 +69,7 @@ def is_far(bed: Any) -> bool:
 
 
 def set_far(bed: Any, far: bool) -> None:
-    """Note whether the pins of a bed are too small in the views to be drawn one by one.
-
-    Parameters
-    ----------
-    bed : bpy.types.Object
-    far : bool
-    """
+    """Note whether the pins of a bed are too small in the views to be drawn one by one."""
     set_node_setting(_require_skin(bed), FAR, bool(far))
 
 

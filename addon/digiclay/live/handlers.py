@@ -102,7 +102,8 @@ def end(how: str, *sessions: Running) -> None:
     finally:  # whatever cannot be kept, none of them stays listed without a loop
         for session in sessions:
             running.drop(session.uid)
-            running.set_message(". ".join(words))
+        if sessions:
+            running.set_message(". ".join(words), *(session.uid for session in sessions))
         if not running.list_sessions():
             loop.end()
             unwatch()

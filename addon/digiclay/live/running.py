@@ -149,15 +149,17 @@ def drop(uid: int) -> Running | None:
     return _SESSIONS.pop(uid, None)
 
 
-#: What was told last: some of it cannot be reported where it happens, such as while a file is loaded.
-_SAID = [""]
+#: What was told last, and the uids of the beds it is about; none: of a closed file's. Some of it cannot be
+#: reported where it happens, such as while a file is loaded.
+_SAID: list[tuple[str, tuple[int, ...]]] = [("", ())]
 
 
-def set_message(words: str) -> None:
-    """Keep the last message, for the Session panel."""
-    _SAID[0] = words
+def set_message(words: str, *uids: int) -> None:
+    """Keep the last message, for the Session panels of the beds that it is about, or of all."""
+    _SAID[0] = words, uids
 
 
-def last_message() -> str:
-    """Return the last message."""
-    return _SAID[0]
+def last_message(bed: Any = None) -> str:
+    """Return the last message; for a bed's panel, unless it is about others."""
+    words, uids = _SAID[0]
+    return words if bed is None or not uids or bed.session_uid in uids else ""

@@ -27,10 +27,11 @@ __all__ = ["Note", "place_finger", "show", "start", "stop", "tick", "withdraw_st
 
 
 class Note(NamedTuple):
-    """Message to the user: level of Blender's operator reports, and text."""
+    """Message to the user: level of Blender's operator reports, text, and uid of the bed it is about."""
 
     level: str
     message: str
+    uid: int = 0
 
 
 def start(context: Any, bed: Any) -> list[Note]:
@@ -147,11 +148,11 @@ def tick(context: Any, now: float) -> list[Note]:
         if bed is None:
             running.drop(session.uid)
             follow.end(session.uid)
-            notes.append(
-                Note("WARNING", localize("The session of {} ended: its bed was deleted", session.name))
-            )
+            words = localize("The session of {} ended: its bed was deleted", session.name)
+            notes.append(Note("WARNING", words, session.uid))
             continue
-        notes += _advance_session(context, bed, session, now, most)
+        advanced = _advance_session(context, bed, session, now, most)
+        notes += [note._replace(uid=session.uid) for note in advanced]
     return notes
 
 

@@ -12,6 +12,8 @@ from ..device import palettes, rebuild, view
 from ..device.instant import Instant, find_ellipsoid
 from ..device.roles import BALL
 from ..device.view import bed_of
+from ..live import running
+from ..press.free_place import find_free_place
 from ..settings import own_presets, properties
 from ..settings.beds import BEDS, FIRST, UNNAMED
 from ..settings.declared import title
@@ -22,7 +24,7 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import baked, edited, no_bed, session_runs
 
-__all__ = ["AddBed", "Rebuild", "add", "add_shown", "entry", "frame", "place_at_cursor", "select_only"]
+__all__ = ["AddBed", "Placed", "Rebuild", "add", "add_shown", "entry", "frame", "select_only"]
 
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
@@ -32,32 +34,51 @@ OFFERED: list[tuple[str, str, str]] = []
 
 
 def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
-    """Return the core's presets and the user's own.
-
-    Parameters
-    ----------
-    operator : bpy.types.Operator
-    context : bpy.types.Context
-    """
+    """Return the core's presets and the user's own."""
     OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
     OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
     return OFFERED
 
 
 def take_bed(operator: Any, context: Any) -> None:
-    """Set the plan of the chosen bed.
-
-    Parameters
-    ----------
-    operator : bpy.types.Operator
-    context : bpy.types.Context
-    """
+    """Set the plan of the chosen bed."""
     bed = BEDS[operator.bed]
     operator.rows, operator.columns = bed.rows, bed.columns
     operator.pitch = bed.pitch * 1e3
 
 
-class AddBed(Action, bpy.types.Operator):
+class Placed:
+    """Mixin of an operator that adds a bed: at the 3D cursor, or where it is seen."""
+
+    report: Any
+    properties: Any
+
+    location: bpy.props.FloatVectorProperty(
+        name="Location",
+        description="Middle of the underside of the housing; by default the 3D cursor, unless what is there "
+        "hides the bed",
+        subtype="TRANSLATION",
+        options={"SKIP_SAVE", "SKIP_PRESET"},
+    )
+
+    def place(self, context: Any, bed: Any) -> None:
+        """Put the bed there, active; in a window it is not selected, since each pin would have an outline."""
+        shown, words = find_view(context), ""
+        if not self.properties.is_property_set("location"):
+            self.location = context.scene.cursor.location
+            if shown is not None:
+                with context.temp_override(window=context.window, area=shown[0], region=shown[1]):
+                    self.location, words = find_free_place(bpy.context, bed)
+        bed.location = self.location
+        bed.location.z -= view.underside(bed) * bed.scale.z
+        select_only(context, bed)
+        bed.select_set(shown is None)
+        if words:
+            self.report({"INFO"}, words)
+        running.set_message(words, bed.session_uid)
+
+
+class AddBed(Placed, Action, bpy.types.Operator):
     """Add a Digital Clay device: a bed of pins that a fingertip forms"""
 
     bl_idname = "mesh.digital_clay_add"
@@ -133,7 +154,7 @@ class AddBed(Action, bpy.types.Operator):
         return done
 
     def perform(self, context: Any) -> None:
-        """Build the device at the 3D cursor."""
+        """Build the device."""
         for name in ("rows", "columns", "pitch"):
             if not self.properties.is_property_set(name):  # called by a script
                 setattr(self, name, getattr(BEDS[self.bed], name) * (1e3 if name == "pitch" else 1))
@@ -145,7 +166,7 @@ class AddBed(Action, bpy.types.Operator):
         )
         bed = add(context, make_scene(self.preset, layout, self.method, BEDS[self.bed].share))
         bed.scale = (self.scale,) * 3
-        place_at_cursor(context, bed)
+        self.place(context, bed)
 
 
 class Rebuild(Action, bpy.types.Operator):
@@ -174,26 +195,13 @@ class Rebuild(Action, bpy.types.Operator):
 
 
 def add(context: Any, scene: Scene) -> Any:
-    """Add the device of a scene, at rest, in the context's collection; return its bed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    scene : Scene
-    """
+    """Add the device of a scene, at rest, in the context's collection; return its bed."""
     finger = find_ellipsoid(scene)
     return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, finger))
 
 
 def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
-    """Add the device of a scene as it is at an instant, in the context's collection; return its bed.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    scene : Scene
-    instant : Instant
-    """
+    """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
     colored = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
     if not colored:
@@ -202,63 +210,37 @@ def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
     return bed
 
 
-def place_at_cursor(context: Any, bed: Any) -> None:
-    """Put the housing's underside on the 3D cursor, and leave the bed selected and active.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    """
-    bed.location = context.scene.cursor.location
-    bed.location.z -= view.underside(bed) * bed.scale.z
-    select_only(context, bed)
-
-
 def select_only(context: Any, bed: Any) -> None:
-    """Leave a new object selected and active, as Blender's own Add operators do.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    """
+    """Leave a new object selected and active, as Blender's own Add operators do."""
     for other in context.selected_objects:
         other.select_set(False)
     bed.select_set(True)
     context.view_layer.objects.active = bed
 
 
-def frame(context: Any, bed: Any) -> None:
-    """Turn to a bed and its fingertip with the 3D view, which shows all of them then.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    """
-    window = context.window
+def find_view(context: Any) -> tuple[Any, Any] | None:
+    """Return the 3D view somebody looks at, area and region: the context's, or the first of its window."""
+    window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
     area = next((one for one in areas if one is not None and one.type == "VIEW_3D"), None)
-    if area is None:
+    return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
+
+
+def frame(context: Any, bed: Any) -> None:
+    """Turn to a bed and its fingertip with the 3D view, which shows all of them then."""
+    shown = find_view(context)
+    if shown is None:
         return
     tip = view.fingertip_of(bed)
-    parts = [part for part in (tip, tip and tip[BALL]) if part is not None]
+    parts = [part for part in (bed, tip, tip and tip[BALL]) if part is not None]
     for part in parts:
         part.select_set(True)
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(window=window, area=area, region=region):
+    with context.temp_override(window=context.window, area=shown[0], region=shown[1]):
         bpy.ops.view3d.view_selected()
     for part in parts:
         part.select_set(False)
 
 
 def entry(menu: Any, context: Any) -> None:
-    """Draw the entry in Add > Mesh.
-
-    Parameters
-    ----------
-    menu : bpy.types.Menu
-    context : bpy.types.Context
-    """
+    """Draw the entry in Add > Mesh."""
     menu.layout.operator(AddBed.bl_idname, icon="MESH_GRID")

@@ -7,12 +7,12 @@ from ..compat import bpy
 from ..core.scene.scene_source import load
 from ..device.instant import read
 from .action import FileAction
-from .add_bed import add_shown, place_at_cursor
+from .add_bed import Placed, add_shown
 
 __all__ = ["ImportRun", "entry"]
 
 
-class ImportRun(FileAction, bpy.types.Operator):
+class ImportRun(Placed, FileAction, bpy.types.Operator):
     """Show one instant of a Digital Clay run as a bed of pins"""
 
     bl_idname = "import_scene.digital_clay_run"
@@ -32,7 +32,7 @@ class ImportRun(FileAction, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         instant, scene = read(path, self.row), load(path.with_name("scene.toml"))
         bed = add_shown(context, scene, instant)
-        place_at_cursor(context, bed)
+        self.place(context, bed)
 
 
 def entry(menu: Any, context: Any) -> None:

@@ -19,13 +19,13 @@ from ..recorded import takes
 from ..settings.declared import title
 from ..ui_text import localize
 from .action import Action, FileAction
-from .add_bed import add, place_at_cursor
+from .add_bed import Placed, add
 from .poll_messages import edited
 
 __all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]
 
 
-class AddSceneAction(Action):
+class AddSceneAction(Placed, Action):
     """Mixin of operators that add a bed, as Add > Mesh > Digital Clay does."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -55,8 +55,6 @@ class AddSceneAction(Action):
         bed.name = scene.name
         start = pick_pose(sample_poses(scene.trajectories(), takes.START)[0])
         bridge.place_fingertip(view.fingertip_of(bed), start, find_ellipsoid(scene))
-        place_at_cursor(context, bed)
-        context.view_layer.update()
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
             takes.add(bed, taken, scene.name)
@@ -64,6 +62,7 @@ class AddSceneAction(Action):
         elif self.take:
             words += localize(" Its session is too long to be simulated here: use 'digiclay run'.")
         self.report({"INFO"}, words)
+        self.place(context, bed)
 
 
 class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
@@ -112,10 +111,10 @@ class AddSample(AddSceneAction, bpy.types.Operator):
         """Add a bed that displays a shape."""
         bed = add(context, resolve({}, name))
         bed.name = title(name)
-        place_at_cursor(context, bed)
         context.view_layer.update()
         laid, _ = shape_show.show_file(bed, replace(Shape(), file=name))
         self.report({"INFO"}, laid.told())
+        self.place(context, bed)
 
 
 class Entries:

@@ -86,7 +86,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
 
 
 class AdjustStrength(AdjustMixin, bpy.types.Operator):
-    """Set the share of the depth that a stroke reaches: move the mouse sideways, or type per cent"""
+    """Set the share of the depth that a stroke reaches: move the mouse sideways, or type it: 0.5, or 50 %"""
 
     bl_idname = "digiclay.press_strength"
     bl_label = "Press Strength"
@@ -102,8 +102,9 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
         settings.strength = value
 
     def parse(self, text: str) -> float:
-        """Return the share of a number of per cent."""
-        return float(bpy.utils.units.to_value("NONE", "NONE", text.rstrip("% "))) / 100.0
+        """Return the share typed: a number of per cent has their sign, or is above 1."""
+        value = float(bpy.utils.units.to_value("NONE", "NONE", text.rstrip("% ")))
+        return value / 100.0 if "%" in text or value > 1.0 else value
 
     def rate(self, context: Any, bed: Any) -> float:
         """Return the share a pixel."""

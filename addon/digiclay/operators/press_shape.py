@@ -15,7 +15,7 @@ from ..press import aim, brush, marks
 from ..ui_text import localize
 from . import status
 from .action import Polled
-from .press_stroke import open_session
+from .press_stroke import NOT_PRESSED, find_pressed, open_session
 
 __all__ = ["PressLine", "PressShape"]
 
@@ -43,9 +43,9 @@ class PressShape(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Begin where the mouse points."""
-        found = aim.find_target(context, brush.find_press(context, event))
+        found = find_pressed(self, context, brush.find_press(context, event))
         if found is None:
-            return {"PASS_THROUGH"}
+            return NOT_PRESSED
         settings: Any = brush.tool_settings(context)
         self.uid, self.grid, self.height = found.bed.session_uid, found.grid, found.height.copy()
         self.region, self.shape = context.region, settings.path
@@ -138,9 +138,9 @@ class PressLine(Polled, bpy.types.Operator):
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Queue the line; without a stroke before it, the place alone."""
-        found = aim.find_target(context, (event.mouse_region_x, event.mouse_region_y))
+        found = find_pressed(self, context, (event.mouse_region_x, event.mouse_region_y))
         if found is None:
-            return {"PASS_THROUGH"}
+            return NOT_PRESSED
         end = float(found.point[0]), float(found.point[1])
         session = running.find(found.bed)
         start = last_place(session) if session is not None else None

@@ -22,7 +22,7 @@ from . import status
 from .action import Polled
 from .press_settings import PressSettings
 
-__all__ = ["Press", "open_session"]
+__all__ = ["NOT_PRESSED", "Press", "find_pressed", "open_session"]
 
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
@@ -32,7 +32,10 @@ KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the 
 KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
 #: What is told where a brush cannot work.
 NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
+HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
 RECOVERS = "Smoothed pins will not stay so: the method {} brings all pins back"
+#: Result of a press on something else: Blender shows no reports of an operator that only passes.
+NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
 
 
 class Press(PressSettings, Polled, bpy.types.Operator):
@@ -55,9 +58,9 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         """Begin where the mouse points; beside the bed there is nothing to press."""
         if self.path != "FREE":
             return {"PASS_THROUGH"}  # to the operator of lines and rings
-        found = aim.find_target(context, brush.find_press(context, event))
+        found = find_pressed(self, context, brush.find_press(context, event))
         if found is None:
-            return {"PASS_THROUGH"}
+            return NOT_PRESSED
         # Shift and Ctrl change the brush for as long as this stroke lasts.
         self.kind = brush.choose_brush(self.brush, event)
         session = open_session(self, context, found.bed, self.kind)
@@ -191,17 +194,16 @@ class Press(PressSettings, Polled, bpy.types.Operator):
         return result
 
 
-def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.Running | None:
-    """Return the session of a bed, for a stroke of a brush; one is started if there is none.
+def find_pressed(operator: Any, context: Any, xy: tuple[float, float]) -> aim.Target | None:
+    """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
+    found, hider = aim.look_at(context, xy)
+    if hider is not None:
+        operator.report({"WARNING"}, localize(HIDDEN, hider.name))
+    return found if hider is None else None
 
-    Parameters
-    ----------
-    operator : bpy.types.Operator
-        Reports why there is none to be returned.
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    kind : Brush
-    """
+
+def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.Running | None:
+    """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
         session = _ensure_session(context, bed)
     except (DigiclayError, RuntimeError) as error:

@@ -79,7 +79,7 @@ class LoopMixin(Polled):
         """Report the messages, and keep them for the panel."""
         for note in notes:
             self.report({note.level}, note.message)
-            running.set_message(note.message)
+            running.set_message(note.message, note.uid)
 
 
 class GoOn(LoopMixin, bpy.types.Operator):

@@ -81,7 +81,8 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         bed = bed_of(context)
         leave_mode(context)
         notes = tick.start(context, bed)
-        self.tell(notes or [tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))])
+        notes = notes or [tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))]
+        self.tell([note._replace(uid=bed.session_uid) for note in notes])
         handlers.watch()
         views.follow()
         if preferences.get(context).take_press_tool:

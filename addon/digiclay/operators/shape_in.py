@@ -97,7 +97,7 @@ class Shaped(Action):
         laid, off = self.displayed(context, bed)
         lost = laid.too_low + laid.too_high + laid.overhanging
         words = localize("{}; displayed to within {:.2g} µm", laid.told(), off * 1e6)
-        running.set_message(words)
+        running.set_message(words, bed.session_uid)
         self.report({"WARNING" if lost else "INFO"}, words)
 
     def displayed(self, context: Any, bed: Any) -> Any:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ..compat import bpy
-from ..device import form
+from ..device import detail, form
 from ..device.view import bed_of
 from .action import Action
 from .poll_messages import linked, no_bed, no_skin
@@ -24,6 +24,13 @@ class ToggleSkin(Action, bpy.types.Operator):
         return no_bed(context) or linked(context) or no_skin(context)
 
     def perform(self, context: Any) -> None:
-        """Show pins where a skin is seen, else the skin."""
+        """Show pins where a skin is seen, else the skin; by the form there was before, if that does it."""
         bed = bed_of(context)
-        form.set_form(bed, "pins" if form.is_skin_shown(bed) else "skin")
+        seen, before = form.is_skin_shown(bed), bed.get(form.BEFORE)
+        if before in form.FORMS:
+            form.set_form(bed, before)
+            detail.follow()
+        if before not in form.FORMS or form.is_skin_shown(bed) == seen:
+            before = before or form.read_form(bed)
+            form.set_form(bed, "pins" if seen else "skin")
+            bed[form.BEFORE] = before

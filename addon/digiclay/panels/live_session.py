@@ -44,7 +44,7 @@ class Session(Panel, bpy.types.Panel):
         said = (
             session.blocking_reason and localize("Waits: {}", session.blocking_reason)
             if session
-            else running.last_message()
+            else running.last_message(bed)
         )
         if said:
             draw_lines(self.layout, said, "ERROR" if session else "INFO")

@@ -12,7 +12,7 @@ from ..core.scene.toml_table import PRESETS
 from ..live import running
 from ..settings import own_presets, properties
 from ..settings.chosen_method import method_of, method_property
-from ..settings.declared import title
+from ..settings.declared import WHOLE, title
 from ..settings.properties import part_group
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines, is_edited
@@ -162,7 +162,8 @@ def section_panel(section: str, parent: str, order: int, words: str = "", closed
             column = self.layout.column(align=True)
             column.active, column.enabled = in_use(settings, section), not is_edited(context)
             group = part_group(settings, section)
-            for name in list_quantities(import_parameters(section, method_of(settings))):
+            known = list_quantities(import_parameters(section, method_of(settings)))
+            for name in (WHOLE + name if quantity.whole else name for name, quantity in known.items()):
                 place = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.
                 place.use_property_split = group.bl_rna.properties[name].type in BESIDE

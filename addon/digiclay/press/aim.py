@@ -16,9 +16,9 @@ from ..core.surface.pointing import find_ray, intersect_surface
 from ..device import view
 from ..live import running
 from ..settings import properties
-from .occlusion import is_hidden, shown_stretch
+from .occlusion import find_hider, shown_stretch
 
-__all__ = ["Target", "find_target", "find_view", "hit_point", "project", "read_surface"]
+__all__ = ["Target", "find_target", "find_view", "hit_point", "look_at", "project", "read_surface"]
 
 Floats = NDArray[np.float64]
 
@@ -50,17 +50,16 @@ class Target:
 
 
 def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
-    """Return the nearest place on a visible bed under a pixel of the context's region.
+    """Return the nearest place on a bed that is seen under a pixel of the context's region."""
+    found, hider = look_at(context, xy)
+    return found if hider is None else None
+
+
+def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any | None]:
+    """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any.
 
     A bed that cannot be simulated as it stands, say because it is unevenly scaled, is looked
-    through; pressing on it says why. Where another object hides the pins there is no place: a click
-    there is for that object.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    xy : (float, float)
-        Pixels in the region.
+    through; pressing on it says why. A click on what hides the pins is for that object.
     """
     found, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
@@ -77,9 +76,9 @@ def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
         distance = bridge.uniform(bed) * float((point - origin) @ direction)
         if distance < nearest:
             found, nearest, eye = Target(bed, cells, height, point), distance, origin
-    if found is None or is_hidden(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point)):
-        return None
-    return found
+    if found is None:
+        return None, None
+    return found, find_hider(context, found.bed, _place(found.bed, eye), _place(found.bed, found.point))
 
 
 def read_surface(bed: Any) -> tuple[Grid, Floats]:
@@ -97,17 +96,7 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
 
 
 def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
-    """Return where the ray through a pixel meets a bed's pins (3,), m; None when it passes by.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    cells : Grid
-    height : ndarray (n,)
-        Pin tops, m.
-    xy : (float, float)
-        Pixels in the region.
+    """Return where the ray through a region's pixel meets pins of a height (n,), m, or None.
 
     Raises
     ------
@@ -123,15 +112,7 @@ def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[flo
 
 
 def project(context: Any, bed: Any, points: Floats) -> Floats:
-    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    points : ndarray (k, 3)
-        m.
-    """
+    """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
     to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
     clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
@@ -140,13 +121,7 @@ def project(context: Any, bed: Any, points: Floats) -> Floats:
 
 
 def find_view(context: Any, bed: Any) -> Floats:
-    """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    bed : bpy.types.Object
-    """
+    """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each."""
     seen = np.array(context.region_data.view_matrix @ bed.matrix_world, np.float64)[:3, :3].T
     return np.asarray(seen / np.linalg.norm(seen, axis=0))
 

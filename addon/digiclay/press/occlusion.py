@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..device import view
 
-__all__ = ["is_hidden", "shown_stretch"]
+__all__ = ["find_hider", "list_surfaces", "shown_stretch"]
 
 Floats = NDArray[np.float64]
 
@@ -54,32 +54,27 @@ def shown_stretch(context: Any, start: Floats, end: Floats) -> tuple[float, floa
     return first, last
 
 
-def is_hidden(context: Any, bed: Any, start: Floats, end: Floats) -> bool:
-    """Return whether a view shows another object in front of a place on a bed.
+def find_hider(
+    context: Any, bed: Any, start: Floats, end: Floats, surfaces: Iterable[tuple[Any, Any]] | None = None
+) -> Any | None:
+    """Return the object that the context's 3D view shows in front of the end of a ray, (3,) in the world.
 
-    What the view shows through does not hide: X-ray, and objects displayed as wires or bounds.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Of a 3D view's region.
-    bed : bpy.types.Object
-    start, end : ndarray (3,)
-        A ray, from its eye to that place, in the world.
+    What the view shows through does not hide: X-ray, and objects displayed as wires or bounds. `surfaces` are
+    the ones looked at, by default all that do not belong to the bed.
     """
     if _shows_through(context.space_data.shading):
-        return False
+        return None
     first, _ = shown_stretch(context, start, end)
     start = start + first * (end - start)
     way = end - start
-    for thing, matrix in _list_surfaces(context, bed):
+    for thing, matrix in list_surfaces(context, bed) if surfaces is None else surfaces:
         # An object in front of others hides what is nearer too; one behind such a bed hides nothing.
         if bed.show_in_front and not thing.show_in_front:
             continue
         reach = np.inf if thing.show_in_front and not bed.show_in_front else 1.0 - NEAR
         if _meets(thing, matrix, start, way, reach):
-            return True
-    return False
+            return thing
+    return None
 
 
 def _shows_through(shading: Any) -> bool:
@@ -89,7 +84,7 @@ def _shows_through(shading: Any) -> bool:
     return bool(shading.type == "SOLID" and shading.show_xray)
 
 
-def _list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
+def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
     """Yield the objects that may hide a bed, and their places in the world."""
     graph, instancers = context.evaluated_depsgraph_get(), set()
     for thing in context.visible_objects:

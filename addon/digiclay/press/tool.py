@@ -17,6 +17,7 @@ from ..device.instant import find_ellipsoid
 from ..live import running
 from ..live.stroke import SYMMETRIES, Brush
 from ..live.sweep import find_radius
+from ..ui_text import localize
 from . import aim, header, marks
 from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, describe_brush
 from .drape import drape
@@ -79,7 +80,11 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         return
     if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
-    found = aim.find_target(context, (xy[0] - region.x, xy[1] - region.y))
+    found, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
+    if hider is not None:
+        words = localize("{} hides the bed", hider.name)
+        cursor([], marks.make_label(words, xy, context.preferences.system.ui_scale))
+        return
     if found is None or view.fingertip_of(found.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)

@@ -15,7 +15,7 @@ from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.named_shapes import SHAPES
 from .shown_units import to_shown, unit_of
 
-__all__ = ["INT_MAX", "Update", "format_list", "group", "title"]
+__all__ = ["INT_MAX", "WHOLE", "Update", "format_list", "group", "title", "whole"]
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
@@ -27,6 +27,8 @@ REACH = 10.0
 #: Fields that take a shape's name or file.
 SHAPED = ("shape", "field", "file")
 
+#: What the names of properties of twice a parameter begin with.
+WHOLE = "whole_"
 #: Labels of parameters whose names, stored in files, are spelled otherwise.
 LABELS = {"centring_time": "Centering Time"}
 
@@ -34,20 +36,26 @@ Update = Callable[[Any, Any], None]
 
 
 def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
-    """Make the property group of a part.
-
-    Parameters
-    ----------
-    name : str
-        The part's own, unique among groups.
-    kind : type
-        The part's parameters.
-    updates : dict
-        For some fields, what happens after a change: a function of the group and the context.
-    """
+    """Make the property group of a part; `updates` of its fields are called with group and context."""
     properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}
     content = {"__annotations__": properties, "__module__": __name__, "__doc__": kind.__doc__}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
+
+
+def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Update) -> Any:
+    """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
+    known: Quantity = field.metadata["quantity"]
+    known = dataclasses.replace(known, doc=known.whole, symbol=f"2 {known.symbol}")
+    default: Any = field.default
+    unit, power = unit_of(known.unit, default)
+    return bpy.props.FloatProperty(
+        **_numbers(known, 2.0 * default, power),
+        name=f"{title(field.name)} ({unit})",
+        description=_tooltip(known, 2.0 * default, unit, power),
+        get=get,
+        set=put,
+        options=set(),
+    )
 
 
 def title(name: str) -> str:
@@ -60,8 +68,9 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
     known: Quantity = field.metadata["quantity"]
     default = field.default
     unit, power = unit_of(known.unit, default)
+    label = f"Half {title(field.name)}" if known.whole else title(field.name)
     said: dict[str, Any] = {
-        "name": f"{title(field.name)} ({unit})" if unit else title(field.name),
+        "name": f"{label} ({unit})" if unit else label,
         "description": _tooltip(known, default, unit, power),
         "update": update,
     }
@@ -83,15 +92,7 @@ def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
 
 
 def format_list(values: tuple[float, ...], power: int) -> str:
-    """Write a list of SI values in the unit they are shown in: ``4, 70, 1400``.
-
-    Parameters
-    ----------
-    values : tuple of float
-        SI.
-    power : int
-        Of ten, shown units per SI unit.
-    """
+    """Write a list of SI values in the unit they are shown in, 10**power to an SI unit: ``4, 70, 1400``."""
     return ", ".join(repr(to_shown(value, power)).removesuffix(".0") for value in values)
 
 

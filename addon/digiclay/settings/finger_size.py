@@ -12,9 +12,10 @@ from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..device import view
 from .devices import fit_blister
+from .shown_units import SHOWN, to_si
 from .table import assign, read
 
-__all__ = ["LARGEST", "SMALLEST", "read_finger", "read_size", "resize", "set_size"]
+__all__ = ["LARGEST", "SMALLEST", "read_finger", "read_size", "resize", "set_axis", "set_size"]
 
 #: Least and largest size, m: narrower than that a finger falls between pins, wider than that no hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
@@ -32,30 +33,21 @@ def read_size(settings: Any) -> float:
     return 2.0 * read_finger(settings).width
 
 
-def set_size(settings: Any, size: float) -> None:
-    """Make a bed's fingertip as wide as a size, in the same proportions.
+def set_axis(settings: Any, name: str, size: float) -> None:
+    """Give a bed's fingertip another length, width or height, mm; the other two stay."""
+    half = 0.5 * to_si(size, SHOWN["m"][1])
+    resize(settings, replace(read_finger(settings), **{name: half}))
 
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-        Of the bed.
-    size : float
-        m; kept within what a finger can have.
-    """
+
+def set_size(settings: Any, size: float) -> None:
+    """Make a bed's fingertip as wide as a size, m, in the same proportions; within what a finger can have."""
     finger = read_finger(settings)
     share = min(max(size, SMALLEST), LARGEST) / (2.0 * finger.width)
     resize(settings, Fingertip(finger.length * share, finger.width * share, finger.height * share))
 
 
 def resize(settings: Any, finger: Fingertip) -> None:
-    """Give a bed's fingertip another size; its lowest point, and so what it touches, stays where it is.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-        Of the bed. Its blister follows in proportion to the width, unless `blister_follows` is off.
-    finger : Fingertip
-    """
+    """Give a bed's fingertip another size; its lowest point stays, its blister follows, if that is on."""
     before, tip = read_finger(settings), view.fingertip_of(settings.id_data)
     lowest = _pose(tip)
     for name in ("length", "width", "height"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..core.scene.toml_table import PRESETS
 from ..device import view
 from . import finger_size
 from .chosen_method import choose, list_offered, method_of, place_of
-from .declared import Update, group, title
+from .declared import WHOLE, Update, group, title, whole
 from .table import assign, read, reset
 
 __all__ = ["CLASSES", "PRESET_WORDS", "SETTINGS", "method_items"]
@@ -32,13 +33,7 @@ PRESET_WORDS = {
 
 
 def take_preset(settings: Any, context: Any) -> None:
-    """Set what the chosen preset, or another one, changes of the defaults.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set what the chosen preset, or another one, changes of the defaults."""
     changed = {
         (section, name) for preset in PRESETS.values() for section in preset for name in preset[section]
     }
@@ -52,26 +47,14 @@ def take_preset(settings: Any, context: Any) -> None:
 
 
 def take_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen built-in method is made for; it takes the place of one of one's own.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the blister the chosen built-in method is made for; it takes the place of one of one's own."""
     if settings.own_method:
         settings.own_method = ""
     _take_blister(settings)
 
 
 def take_own_method(settings: Any, context: Any) -> None:
-    """Set the blister the chosen method of one's own is made for.
-
-    Parameters
-    ----------
-    settings : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the blister the chosen method of one's own is made for."""
     _take_blister(settings)
 
 
@@ -90,13 +73,7 @@ def _take_blister(settings: Any) -> None:
 
 
 def take_arrangement(layout: Any, context: Any) -> None:
-    """Set the share of the contact law a cell carries, which depends on how close the cells stand.
-
-    Parameters
-    ----------
-    layout : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Set the share of the contact law a cell carries, which depends on how close the cells stand."""
     settings = layout.id_data.digiclay
     kind = import_parameters("contact", "")
     share = ARRANGEMENTS[layout.arrangement].share
@@ -107,13 +84,7 @@ def take_arrangement(layout: Any, context: Any) -> None:
 
 
 def take_size(fingertip: Any, context: Any) -> None:
-    """Show the fingertip in its new size.
-
-    Parameters
-    ----------
-    fingertip : bpy.types.PropertyGroup
-    context : bpy.types.Context
-    """
+    """Show the fingertip in its new size."""
     bed = fingertip.id_data
     tip = view.fingertip_of(bed)
     if tip is not None:
@@ -151,15 +122,7 @@ def use_properties() -> dict[str, Any]:
 
 
 def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
-    """Make a property group of properties.
-
-    Parameters
-    ----------
-    name, words : str
-        Of the class, and its docstring.
-    properties : dict
-        By name.
-    """
+    """Make a property group of properties."""
     content = {"__annotations__": properties, "__module__": __name__, "__doc__": words}
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
@@ -169,12 +132,23 @@ def pointers(groups: dict[str, type]) -> dict[str, Any]:
     return {name: bpy.props.PointerProperty(type=kind, name=title(name)) for name, kind in groups.items()}
 
 
+def whole_axis(field: dataclasses.Field[Any]) -> Any:
+    """Return the property of a fingertip's whole length, width or height, by the stored semi-axis."""
+    return whole(
+        field,
+        lambda group: 2.0 * getattr(group, field.name),
+        lambda group, size: finger_size.set_axis(group.id_data.digiclay, field.name, size),
+    )
+
+
 METHOD_GROUPS = {name: group(name, import_parameters("control", name), {}) for name in METHODS}
 CONTROL = make_group("control", "Gains and thresholds, method by method.", pointers(METHOD_GROUPS))
 GROUPS = {
     section: group(section, import_parameters(section, "virtual_master"), UPDATES.get(section, {}))
     for section in PLAIN
 }
+for axis in dataclasses.fields(Fingertip):
+    GROUPS["fingertip"].__annotations__[WHOLE + axis.name] = whole_axis(axis)
 SETTINGS = make_group(
     "settings",
     "Every parameter of a bed's scene.",

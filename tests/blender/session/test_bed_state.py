@@ -86,6 +86,17 @@ def reloaded(tmp_path: Path) -> Any:
     return only_bed()
 
 
+def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed: Any) -> None:
+    started(bed)
+    copy = bed.copy()
+    copy.data = bed.data.copy()
+    handlers.end(handlers.STOPPED)
+    assert [bool(running.last_message(one)) for one in (bed, copy, None)] == [True, False, True]
+    running.set_message("The session ended: its file was closed")
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    assert running.last_message(bpy.context.object) == ""
+
+
 def test_a_file_saved_in_mid_session_goes_on_bit_for_bit(bed: Any, clock: Clock, tmp_path: Path) -> None:
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 10)

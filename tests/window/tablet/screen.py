@@ -36,13 +36,7 @@ def find_missing() -> str:
 
 @contextmanager
 def pen_screen(folder: Path) -> Iterator[str]:
-    """Start an X server whose only pointer is a pen; yield its display.
-
-    Parameters
-    ----------
-    folder : Path
-        For the driver that is built, and the server's log.
-    """
+    """Start an X server whose only pointer is a pen; yield its display."""
     missing = find_missing()
     assert not missing, f"a screen with a pen needs {missing}"
     inputs = folder / "modules" / "input"

@@ -51,6 +51,7 @@ class Quantity:
     ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
     the key of a reference in docs/nomenclature.md; several are set apart by commas. A `later` one is
     unknown to older versions: it is written only where it is not the default, so that these read the rest.
+    `whole` is the meaning of twice the value, which a person reads in place of a semi-axis.
     """
 
     doc: str
@@ -63,6 +64,7 @@ class Quantity:
     at_most: float | None = None
     choices: tuple[str, ...] = ()
     later: bool = False
+    whole: str = ""
 
     def show(self, value: object) -> str:
         """Write `value` the way messages do, with the unit."""

@@ -73,14 +73,17 @@ class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
 
     length: float = quantity(
-        10e-3, "semi-axis along the fingertip", unit="m", symbol="a_x", source="C, Microsoft", above=0.0
-    )
+        10e-3, "semi-axis along the fingertip: half its length", unit="m", symbol="a_x",
+        source="C, Microsoft", above=0.0, whole="length of the fingertip",
+    )  # fmt: skip
     width: float = quantity(
-        8e-3, "semi-axis across the fingertip", unit="m", symbol="a_y", source="C, Microsoft", above=0.0
-    )
+        8e-3, "semi-axis across the fingertip: half its width", unit="m", symbol="a_y",
+        source="C, Microsoft", above=0.0, whole="width of the fingertip",
+    )  # fmt: skip
     height: float = quantity(
-        8e-3, "semi-axis upwards", unit="m", symbol="a_z", source="C, Microsoft", above=0.0
-    )
+        8e-3, "semi-axis upwards: half the height of the fingertip", unit="m", symbol="a_z",
+        source="C, Microsoft", above=0.0, whole="height of the fingertip",
+    )  # fmt: skip
 
     @property
     def flattest(self) -> float:
