@@ -85,7 +85,7 @@ class Lattice:
 def measure_distance(
     lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
 ) -> Floats:
-    """Return how far it is, m, (k,), from places (k, 2) along unit vectors to where values (n,) fall to a level.
+    """Return how far it is, m, from places (k, 2) along unit vectors to where values (n,) fall to levels.
 
     Infinite where they stay above their level (k,), as far as the bed or `most`, m, reaches.
     """
