@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.layout import find_neighbors
 from .formed import Formed
 
 __all__ = ["Lattice", "measure_distance"]
@@ -15,6 +14,11 @@ __all__ = ["Lattice", "measure_distance"]
 Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
+#: Steps to the neighbors, (rows, columns), counter-clockwise; a shifted bed has one list for rows
+#: that stand back and one for rows that are shifted forward along x.
+SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
+FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 #: Steps a pitch with which a distance is looked for.
 STEPS = 2
 #: Pairs of a place and a step that are looked at at once.
@@ -38,8 +42,13 @@ class Lattice:
     @classmethod
     def of(cls, formed: Formed) -> Lattice:
         """Return the neighbors of all pins of a bed: 8 in an aligned one, else 6."""
-        shift = formed.shift / formed.pitch
-        return cls(formed, find_neighbors(formed.rows, formed.columns, shift, corners=True))
+        row, column = np.divmod(np.arange(formed.rows * formed.columns), formed.columns)
+        lists = (SQUARE, SQUARE) if not formed.shift else (BACK, FORWARD)
+        lists = lists[::-1] if formed.shift < 0.0 else lists
+        steps = np.array(lists)[row % 2]
+        rows, columns = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
+        on_bed = (rows >= 0) & (rows < formed.rows) & (columns >= 0) & (columns < formed.columns)
+        return cls(formed, np.where(on_bed, rows * formed.columns + columns, -1))
 
     @property
     def pitch(self) -> float:
@@ -76,7 +85,7 @@ class Lattice:
 def measure_distance(
     lattice: Lattice, values: Floats, position: Floats, direction: Floats, level: Floats, most: float
 ) -> Floats:
-    """Return the way, m, (k,), from places (k, 2) along unit vectors to where values (n,) fall to a level.
+    """Return how far it is, m, from places (k, 2) along unit vectors to where values (n,) fall to levels.
 
     Infinite where they stay above their level (k,), as far as the bed or `most`, m, reaches.
     """
