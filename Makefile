@@ -92,10 +92,10 @@ test-release: ## release a copy, and run its wheel in bare Pythons 3.11, 3.12, 3
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
 	@rm -f .reports/release.txt; PYTHON311="$(PYTHON)" PYTHON313="$(PYTHON313)" $(PART) .reports/release.txt "release, and its wheel in bare Pythons" 1200 -- -n 2 --dist loadfile tests/release
 
-# The version in the files and in the changelog: make release VERSION=0.1.0
+# The version in the files and in the changelog: make release VERSION=0.2.0
 VERSION ?=
 release: ## check, build twice, tag: zip, wheel, source archive and checksums in dist/digiclay-VERSION
-	@[ -n "$(VERSION)" ] || { echo "VERSION must be named: make release VERSION=0.1.0" >&2; exit 1; }
+	@[ -n "$(VERSION)" ] || { echo "VERSION must be named: make release VERSION=0.2.0" >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/release.txt $(IN_311)
 	@.venv/bin/python tools/make_release.py "$(VERSION)"
 

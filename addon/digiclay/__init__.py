@@ -8,7 +8,7 @@ from __future__ import annotations
 
 __all__ = ["__version__", "register", "unregister"]
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def register() -> None:
