@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -117,7 +118,7 @@ def test_another_suite_does_not_go_into_the_folder(
     monkeypatch.chdir(league.parent)
     assert main([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"]) == 2
     assert capfd.readouterr().err == (
-        "league holds another suite (4 trials, digiclay 0.1.0): choose another folder with --out.\n"
+        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
     )
 
 
