@@ -93,7 +93,7 @@ def _drag(
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn)
     end = poses[-1][0] + abs(2.0 * x) / speed
-    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]  # type: ignore[misc]
+    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]
 
 
 def drag_row(turn: float, pitch: float) -> list[Pose]:
