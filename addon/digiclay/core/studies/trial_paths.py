@@ -88,7 +88,7 @@ def _drag(
     height: float,
     speed: float,
     hold: float = 0.5,
-    turn: Sequence[float] = (0.0, 0.0, 0.0),
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> list[Pose]:
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn)
