@@ -97,7 +97,7 @@ def _drag(
 
 
 def drag_row(turn: float, pitch: float) -> list[Pose]:
-    """Return a drag at 15 mm/s along a row of pins, 1.5 mm below the surface, with a turn and pitch, rad."""
+    """Return a drag between two rows of pins, 15 mm/s, 1.5 mm below the surface, with turn and pitch, rad."""
     return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
 
 
