@@ -157,7 +157,7 @@ def _run_models(bar: Callable[[str], None]) -> Iterator[Row]:
 
 
 def _run_turns(turns: Sequence[int], bar: Callable[[str], None]) -> Iterator[Row]:
-    """Run drags along a row of pins with a turned and tilted fingertip, degrees, by both methods."""
+    """Run drags between two rows of pins with a turned and tilted fingertip, degrees, by both methods."""
     for tilt, turn, method in itertools.product(TILTS, turns, SHOWN):
         poses, name = (
             drag_row(math.radians(turn), math.radians(tilt)),
@@ -202,7 +202,7 @@ def _text(
         ("Method III at speeds that Method I does not follow", fast),
         ("Method III made for another device, or with sensors", wrong),
         ("Method III with a part left out: ridge drag at 40 mm/s", parts),
-        ("Turned and tilted fingertip: drag along a row of pins at 15 mm/s", turned),
+        ("Turned and tilted fingertip: drag between two rows of pins at 15 mm/s", turned),
     ):
         yield f"\n{title}\n"
         yield from table(("", *columns), [[name, *_numbers(found)] for name, _, found in some])

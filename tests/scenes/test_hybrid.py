@@ -19,7 +19,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_result import Result
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.speed_limits import Drag, Follows, Lift, track
-from digiclay.core.studies.trial_paths import with_path
+from digiclay.core.studies.trial_paths import drag_row, with_path
 
 from benchmarks.wrong_models import list_models, run_mismatched
 from tests.assemble import path, record, sample
@@ -82,21 +82,13 @@ def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn: floa
     assert three < 0.55 * one
 
 
-@cache
-def drag(method: str, turn: float, pitch: float) -> Result:
-    """Return the run of a drag along a row of pins, 1.5 mm below the surface, with a turn and pitch, rad."""
-    ways = ((0.0, -10, 1.5), (0.4, -10, -3), (0.6, -10, -1.5), (1.0, -10, -1.5), (2.3, 10, -1.5))
-    poses = [(t, x, 1.5, z, turn, pitch, 0.0) for t, x, z in ways]
-    return run(with_path(device(method, layout={"columns": 21, "rows": 16}), poses, "linear"))
-
-
-@pytest.mark.parametrize(
-    ("turn", "pitch"), [(90.0, 0.0), (75.0, 30.0)], ids=["across the row", "across it, tilted"]
-)
-def test_a_finger_across_the_row_it_follows_is_held_as_well(turn: float, pitch: float) -> None:
-    one, three = (drag(method, np.radians(turn), np.radians(pitch)).metrics for method in BOTH)
+@pytest.mark.parametrize(("turn", "pitch"), [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"])
+def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn: float, pitch: float) -> None:
+    poses = drag_row(np.radians(turn), np.radians(pitch))
+    bed = {"columns": 25, "rows": 15}
+    one, three = (run(with_path(device(method, layout=bed), poses, "linear")).metrics for method in BOTH)
     assert three["contact_loss_share"] == 0.0
-    # By a filter that begins with a turn of 0, which is flat where it is 90 degrees off, 2.4 times as much.
+    # Measured 0.39 and 0.38; 2.8 and 0.9 by a filter of the angle, flat 90 degrees off where it begins.
     assert three["rfd"] < 0.6 * one["rfd"]
 
 

@@ -88,17 +88,16 @@ def _drag(
     height: float,
     speed: float,
     hold: float = 0.5,
-    turn: Sequence[float] = (0.0, 0.0, 0.0),
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> list[Pose]:
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn)
     end = poses[-1][0] + abs(2.0 * x) / speed
-    yaw, pitch, roll = turn
-    return [*poses, *((t, -x, y, height, yaw, pitch, roll) for t in (end, end + hold))]
+    return [*poses, *((t, -x, y, height, *turn) for t in (end, end + hold))]
 
 
 def drag_row(turn: float, pitch: float) -> list[Pose]:
-    """Return a drag at 15 mm/s along a row of pins, 1.5 mm below the surface, with a turn and pitch, rad."""
+    """Return a drag between two rows of pins, 15 mm/s, 1.5 mm below the surface, with turn and pitch, rad."""
     return _drag(-20.0, 1.5, -1.5, 15.0, turn=(turn, pitch, 0.0))
 
 
