@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from digiclay.cli import carry_out, run_as_program
 
-__all__ = ["main"]
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a benchmark; return its exit code, as `digiclay.cli.main` does.

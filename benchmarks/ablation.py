@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.commands.tables import table
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.finger_estimate import Estimate, FingerFilter
 from digiclay.core.control.flow_servo import FlowServo
@@ -20,14 +21,9 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.studies.method_trials import PHASES, Trial, place_trial
 from digiclay.core.studies.speed_limits import place_way
-from numpy.typing import NDArray
 
 from .report import add_kind, kept, made_with, progress
 from .wrong_models import run_controller
-
-__all__ = ["add"]
-
-Floats = NDArray[np.float64]
 
 #: Trajectories, and the noise of the force sensors on them.
 TRIALS = (("session", "0"), ("session", "2 mN"), ("twisted", "0"), ("dead-stop", "0"), ("ridge-40", "0"))

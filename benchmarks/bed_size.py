@@ -24,8 +24,6 @@ from digiclay.plots.figure import empty
 from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress
 
-__all__ = ["SIDES", "Size", "add", "bytes_of", "gathered_cells", "measured", "scene"]
-
 #: Pins along a side of the beds.
 SIDES = (25, 101, 317, 1001)
 #: The finger presses in the middle, rises and is dragged, over one and the same pins of every bed.

@@ -21,8 +21,6 @@ from digiclay.core.studies.sweep_plan import hash_points
 
 from .report import add_kind, kept, made_with, progress, table
 
-__all__ = ["Cost", "add"]
-
 #: Empty tasks, and bundles of 32 points, as many as are measured; each of these in full, and with --quick.
 TASKS, BUNDLES = (2000, 200), (12, 2)
 #: Points of a sweep that is only set up: those of two axes.

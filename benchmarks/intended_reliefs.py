@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from numpy.typing import NDArray
 
-__all__ = ["RELIEFS", "find_relief"]
-
-Floats = NDArray[np.float64]
 Relief = Callable[[Floats, Floats], Floats]
 Corners = Sequence[tuple[float, float]]
 

@@ -24,8 +24,6 @@ from . import (
     viewport,
 )
 
-__all__ = ["parser"]
-
 EXAMPLES = """\
 examples:
   python -m benchmarks session        time of a control period, part by part

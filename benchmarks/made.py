@@ -17,8 +17,6 @@ from .report import add_kind, kept, made_with, progress
 if TYPE_CHECKING:  # Blender is imported when it is needed
     from .made_things import Made
 
-__all__ = ["add"]
-
 EXAMPLES = """\
   python -m benchmarks made
   python -m benchmarks made letter_a --bed paper

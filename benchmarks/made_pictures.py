@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from .made_things import Made
 
-__all__ = ["draw_made", "draw_relief"]
-
 #: Size of one of the two pictures, pixels, and samples a pixel.
 WIDTH, HEIGHT, SAMPLES = 640, 500, 6
 #: Turn of the bed, so that its lower edge is in front, rad; what is kept free around it, by sides.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.schema import Scene
@@ -15,13 +16,8 @@ from digiclay.live.recorded_strokes import PointerStroke, play_strokes, read_str
 from digiclay.live.sculpting import begin_session
 from digiclay.settings.beds import BEDS
 from digiclay.settings.devices import make_scene
-from numpy.typing import NDArray
 
 from .intended_reliefs import RELIEFS, find_relief
-
-__all__ = ["STROKES", "THINGS", "Made", "make", "rescale"]
-
-Floats = NDArray[np.float64]
 
 #: Folder of the recorded strokes; and the things, each with a file there and an intended relief.
 STROKES = Path(__file__).parent / "strokes"

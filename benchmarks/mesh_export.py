@@ -21,8 +21,6 @@ from digiclay.core.surface.formed import Formed
 
 from .report import add_kind, kept, made_with, progress
 
-__all__ = ["Export", "add", "formed", "measured"]
-
 #: Pins along a side of the beds.
 SIDES = (25, 100, 316, 1000)
 #: Every format of the solid, and the other kinds in one.

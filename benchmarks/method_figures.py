@@ -26,8 +26,6 @@ from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress
 from .wrong_models import list_models, run_mismatched
 
-__all__ = ["add"]
-
 SESSION = "ridge_mound_valley"
 #: Methods with a set point of the total force, and their colors and marks: Okabe and Ito's.
 SHOWN = {"virtual_master": ("Method I", "#0072B2", "o"), "hybrid": ("Method III", "#D55E00", "D")}

@@ -26,8 +26,6 @@ from digiclay.core.scene.schema import Scene
 
 from .report import table
 
-__all__ = ["Counted", "Ledger", "floor", "methods_noted", "period_calls", "report"]
-
 #: Methods of arrays that make an array or bytes; reductions reach `__array_ufunc__` by themselves.
 METHODS = ("take", "copy", "astype", "dot", "reshape", "tobytes", "__getitem__", "__setitem__")
 #: Methods that reach `__array_ufunc__` by themselves, or make no array.

@@ -15,28 +15,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.fingertip import JOIN
 from digiclay.core.model.trajectory import Trajectory
-from numpy.typing import NDArray
 
 from .problems import Measured, Problem, replaying, solved
 from .work_precision import Work
 
-__all__ = [
-    "CHECK",
-    "ROOT",
-    "SOLVERS",
-    "Line",
-    "missing",
-    "peer",
-    "points",
-    "reference",
-    "reference_and_check",
-]
-
-Floats = NDArray[np.float64]
 #: Moves the flat state from one time to another; returns it and the number of evaluations.
 Solver = Callable[[Any, float, Floats, float, float, Floats, int], tuple[Floats, int]]
 #: Step of the check of the reference, s.

@@ -13,8 +13,6 @@ from digiclay.plots.figure import empty, save
 
 from .work_precision import Work
 
-__all__ = ["STYLE", "draw_precision", "write"]
-
 #: Color, marker and line style of each method: ours are filled and drawn through, peers are open and dashed.
 LOOKS: dict[str, tuple[str, str, str]] = {
     "bernoulli": ("#0072B2", "o", "-"), "richardson": ("#009E73", "s", "-"),

@@ -20,8 +20,6 @@ from .python_loop import looped
 from .report import add_kind, kept, made_with, progress
 from .work_precision import COLUMNS, RATIOS, Work, ratios, runs
 
-__all__ = ["OURS", "PEERS", "add"]
-
 #: Steppers and their steps, s.
 OURS = {
     "bernoulli": (5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5),

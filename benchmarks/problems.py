@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
@@ -17,20 +18,6 @@ from digiclay.core.scene.toml_table import resolve
 from numpy.typing import NDArray
 
 from .work_precision import Work
-
-__all__ = [
-    "PERIOD",
-    "PROBLEMS",
-    "Measured",
-    "Problem",
-    "live",
-    "ours",
-    "problem",
-    "replaying",
-    "timed",
-]
-
-Floats = NDArray[np.float64]
 
 #: Control period of all problems, s.
 PERIOD = 5e-3

@@ -16,8 +16,6 @@ from .peers import ROOT, Line
 from .problems import PERIOD, Measured, Problem
 from .work_precision import LOOP, Work
 
-__all__ = ["Scalar", "loop", "looped"]
-
 #: Gauss points of a whole step.
 WHOLE = POINTS[-1][1]
 

@@ -20,8 +20,6 @@ from digiclay.plots.figure import empty
 from .plots import STYLE, write
 from .report import add_kind, kept, made_with, progress, table
 
-__all__ = ["COUNTS", "STUDIES", "Size", "add", "measured", "study"]
-
 #: Runs in one call; a sweep puts 32 to 63 together.
 COUNTS = (1, 4, 16, 32, 64, 128)
 #: Simulated time of a run, s.

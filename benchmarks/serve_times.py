@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 from .plots import STYLE, write
 from .report import add_kind, kept, made_with
 
-__all__ = ["add", "draw_deadlines", "sum_bins"]
-
 #: The session of the paper, its control periods a second, and when its fingertip comes down, s.
 SCENE, RATE, DOWN = "ridge_mound_valley", 1000, 5.0
 #: Seconds that are served, with --quiet and without.

@@ -24,8 +24,6 @@ from digiclay.core.session.memory_limit import check_memory
 
 from .report import made_with
 
-__all__ = ["FILES", "PARTS", "Took", "add", "measured", "shares"]
-
 #: Parts of a control period and what is in them.
 PARTS = {
     "contact": "the finger's poses, its underside over the cells",

@@ -13,8 +13,6 @@ from digiclay.core.model.layout import Layout
 from digiclay.device import form, view
 from digiclay.device.instant import Instant
 
-__all__ = ["SHOWN", "SkinCost", "measure_skin"]
-
 #: What is drawn, by turns: form, and kind of skin.
 SHOWN = (("pins", "smooth"), ("skin", "smooth"), ("skin", "membrane"), ("both", "smooth"))
 #: Evaluations in a row before another form has its turn; the first of them is not counted.

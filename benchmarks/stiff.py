@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from digiclay.commands.tables import table
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.scene.schema import STEPPERS
 
@@ -19,7 +20,6 @@ from .stiff_runs import (
     PERIOD,
     ROUGH,
     STEPS,
-    Floats,
     Outcome,
     calls_of,
     commands_of,
@@ -29,9 +29,7 @@ from .stiff_runs import (
     reference,
     replayed,
     strict,
-)  # fmt: skip
-
-__all__ = ["add"]
+)
 
 
 def add(kinds: Any) -> None:

@@ -10,8 +10,6 @@ from typing import Any
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 
-__all__ = ["ALL", "CASES", "EASY", "HOLD", "Case", "scene"]
-
 Table = Mapping[str, Any]
 
 #: Commands are recorded at this control period and held through it, s: all steps divide it, so that

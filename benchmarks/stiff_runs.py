@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
@@ -19,17 +20,10 @@ from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session.accuracy import SHARE, reference_settings
-from numpy.typing import NDArray
 
 from .numpy_calls import period_calls
 from .stiff_cases import CASES, EASY, HOLD, Case, scene
 
-__all__ = [
-    "STEPS", "Outcome", "allowed_range", "calls_of", "commands_of", "live", "outcome", "reference",
-    "replayed", "strict",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 Integrate = Callable[[str, float, float], Floats]
 
 STEPS = (1e-3, 5e-3, 20e-3, 50e-3)

@@ -11,18 +11,15 @@ from typing import Any
 import numpy as np
 from digiclay.commands.arguments import add_scene, scene_of
 from digiclay.commands.tables import table
+from digiclay.core.base.arrays import Floats
 from digiclay.core.control.replay import Replay
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
-from numpy.typing import NDArray
 
 from .numpy_calls import period_calls
 from .report import add_kind, kept, made_with, progress
 
-__all__ = ["TERMS", "Effect", "add", "effect", "without"]
-
-Floats = NDArray[np.float64]
 #: What can be left out, and its section of the scene.
 TERMS = {
     "conduit": "conduit",

@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 
 from .viewport_cost import settings
 
-__all__ = ["PARTS", "RATE", "Ticks", "measure"]
-
 #: Ticks a second.
 RATE = 60
 #: What a tick does. The rest of it is in none of these; garbage is collected within any of them.

@@ -19,8 +19,6 @@ from .report import add_kind, kept, made_with, progress
 if TYPE_CHECKING:  # Blender is imported when it is needed
     from .tick_times import Ticks
 
-__all__ = ["BEDS", "add", "draw_histogram"]
-
 #: Rows and columns of the beds, their pitch and the bore of their pins, m, and the time that 99 of 100 ticks
 #: are to keep to, s.
 BEDS = ((25, 25, 3e-3, 2e-3, 8e-3), (100, 100, 3e-3, 2e-3, 16e-3), (100, 100, 1.5e-3, 1e-3, 16e-3))

@@ -15,8 +15,6 @@ if TYPE_CHECKING:  # Blender is imported when it is needed
     from .skin_cost import SkinCost
     from .viewport_cost import Cost
 
-__all__ = ["BEDS", "add"]
-
 #: Rows and columns of the beds, and the time a tick of them may take, s.
 BEDS = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
 #: Ticks that are timed, with --quick and without.

@@ -23,8 +23,6 @@ from digiclay.operators.add_bed import add, select_only
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
 
-__all__ = ["PARTS", "TICK", "Cost", "measured", "settings"]
-
 #: Time of the wall between two ticks, s.
 TICK = 33e-3
 #: What a tick does, in this order.

@@ -19,8 +19,6 @@ from .python_loop import looped
 from .report import kept, made_with, progress
 from .work_precision import COLUMNS, RATIOS, Work, ratios, runs
 
-__all__ = ["ONCE", "OURS", "PEERS", "SIDE", "Beside", "beside", "carry_out", "everywhere", "report"]
-
 Settings = dict[str, tuple[float, ...]]
 
 #: Rows and columns of the paper's bed.

@@ -7,8 +7,6 @@ from dataclasses import dataclass, fields
 
 from digiclay.commands.tables import table
 
-__all__ = ["COLUMNS", "LEVELS", "LOOP", "RATIOS", "Work", "best_ratio", "cheapest", "ratios", "runs"]
-
 #: Errors of height at which the fastest are compared, m.
 LEVELS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 #: The method that is no solver: one cell after another.

@@ -13,8 +13,6 @@ from digiclay.core.model.set_point import find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 
-__all__ = ["change_finger", "list_models", "run_controller", "run_mismatched"]
-
 
 def change_finger(scene: Scene, part: str, **factors: float) -> Scene:
     """Return a scene with some numbers of a part of its finger times a factor.

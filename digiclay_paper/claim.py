@@ -7,8 +7,6 @@ from typing import NamedTuple
 from .results import FULL, QUICK, Results
 from .scenes import METHODS, NAMES
 
-__all__ = ["MM", "ONE", "SHORT", "TWO", "Claim", "speed", "times", "verdict"]
-
 MM = 1e3
 ONE, TWO = METHODS
 SHORT = {name: NAMES[name].split(",")[0] for name in METHODS}

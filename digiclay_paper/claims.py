@@ -12,8 +12,6 @@ from .relief_sections import LIMITS, blister_section
 from .results import PAPER_SPEED, Results
 from .scenes import METHODS
 
-__all__ = ["carried_out", "claims"]
-
 
 def claims(results: Results) -> list[Claim]:
     """Return all claims, in the order of the paper."""

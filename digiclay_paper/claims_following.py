@@ -9,8 +9,6 @@ from .claim import MM, ONE, SHORT, TWO, Claim, speed, verdict
 from .results import PAPER_SPEED, WAYS, Results
 from .scenes import METHODS
 
-__all__ = ["largest_speed", "tracking"]
-
 
 def tracking(results: Results) -> Claim:
     """Both methods on the simple trajectories."""

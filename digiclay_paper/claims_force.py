@@ -11,8 +11,6 @@ from .results import PAPER_SPEED, RIDGE, WAYS, Results, Swing, onset_among
 from .scenes import METHODS, PRESSED
 from .windows import WINDOWS
 
-__all__ = ["deviations", "onset", "reference_force", "trade"]
-
 #: What counts as much greater, as a ratio.
 MUCH = 1.5
 #: A response is quicker that takes less than this share of the time.

@@ -7,8 +7,6 @@ from .relief_sections import LIMITS, Section, sections
 from .results import Results
 from .scenes import METHODS
 
-__all__ = ["relief"]
-
 
 def relief(results: Results) -> Claim:
     """Whether ridge, mound and valley have the sections asked for."""

@@ -8,8 +8,6 @@ from .results import AHEAD, AS_IT_IS, DRAGS, PAPER_SPEED, Dragged, Results, onse
 from .scenes import PRESSED
 from .variants import GAUSSIAN, NO_RISE, STAGGERED
 
-__all__ = ["ahead", "escape", "gaussian", "radius", "rise", "staggered"]
-
 #: Cells ahead count as lowered by this share of how far the finger is in the surface.
 LOWERED = 0.1
 #: A search radius rejects noise that leaves at most this share of the scatter there is without it.

@@ -12,8 +12,6 @@ from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 from .results import Results
 from .scenes import COMPARED, NAMES
 
-__all__ = ["blisters", "freezing"]
-
 #: Color, marker and its size of each profile.
 PROFILES = {"cone": (LINES[0], "o", 8.0), "gaussian": (LINES[1], "s", 5.0)}
 #: Instants of a drag that are drawn.

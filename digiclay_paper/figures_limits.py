@@ -9,8 +9,6 @@ from digiclay.plots.figure import INK, LINES, MM, canvas, legend_above
 from .results import PAPER_SPEED, SUSTAINED, Results
 from .scenes import COMPARED, NAMES, PRESSED, THIRD
 
-__all__ = ["oscillation", "tracking"]
-
 #: Told apart with any color vision; markers say the same once more.
 METHOD_COLORS = {"virtual_master": LINES[0], "cell_states": LINES[1], THIRD: LINES[2]}
 MARKERS = "os^D"

@@ -15,8 +15,6 @@ from .relief_sections import sections
 from .results import Results, Session
 from .scenes import COMPARED, METHODS, NAMES, THIRD
 
-__all__ = ["details", "heights_and_force", "profiles", "surface_rows", "surfaces"]
-
 #: What is looked at closely: the first press and its end, and a part of the even lift, s.
 PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 

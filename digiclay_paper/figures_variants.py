@@ -12,8 +12,6 @@ from .results import AHEAD, AS_IT_IS, PAPER_SPEED, SUSTAINED, Results
 from .scenes import METHODS
 from .variants import NO_RISE
 
-__all__ = ["variants"]
-
 DASHED = (0, (5, 3))
 
 

@@ -8,8 +8,6 @@ from .relief_sections import sections
 from .results import PAPER_SPEED, WAYS, Results, Session
 from .scenes import COMPARED, NAMES
 
-__all__ = ["compare_methods"]
-
 #: Metrics of the session: key, name, factor and unit.
 METRICS = (
     ("rfd", "RFD in the session", 1.0, "N"),

@@ -11,8 +11,6 @@ from .claim import Claim
 from .method_three import compare_methods
 from .results import Results
 
-__all__ = ["page"]
-
 #: The chain of Fig. 3, from the finger to the pins.
 CHAIN = (
     ("VM Locate", "centroid of the forces within r_VM of the master's last place (equation 13)"),

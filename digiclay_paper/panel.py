@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["COLUMNS", "NAMED", "curves", "letter", "table"]
-
 #: Columns of the tables: which panel and curve, and a point of it, with what the axes are called.
 COLUMNS = ("panel", "curve", "x", "x_axis", "y", "y_axis")
 #: Label of axes that only hold a scale of colors.

@@ -9,18 +9,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.metrics.summary import find_contact_rows
 from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.nominal_relief import evaluate_share, find_nominal, measure_reach
-from numpy.typing import NDArray
 
 from .results import Session
-
-__all__ = ["LIMITS", "Limits", "Section", "asked_for", "blister_section", "sections"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 #: The session's lines: y of ridge and valley, x at which both end and the mound is, m.
 RIDGE, VALLEY, END = -21e-3, 21e-3, 21e-3

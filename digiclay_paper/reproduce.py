@@ -14,8 +14,6 @@ from digiclay.commands.refusals import refuse_without
 from digiclay.commands.stop import Stop
 from digiclay.core.base.run_folder import check_folder, write_folder
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay paper                           into ./paper, in one to three minutes

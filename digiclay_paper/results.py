@@ -12,11 +12,6 @@ from numpy.typing import NDArray
 
 from .scenes import SINK, TALL
 
-__all__ = [
-    "AHEAD", "AS_IT_IS", "BEYOND", "DRAGS", "FULL", "PAPER_SPEED", "QUICK", "RIDGE", "SESSION", "WAYS",
-    "Dragged", "Extent", "Located", "Results", "Session", "Swing", "onset_among",
-]  # fmt: skip
-
 #: The speed up to which the paper says both methods track, m/s, and its session.
 PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
 #: The simple trajectories: straight and level drags over the finger's height, m; and one more, less deep.

@@ -13,23 +13,6 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.method_trials import find_free_speed
 
-__all__ = [
-    "COMPARED",
-    "METHODS",
-    "NAMES",
-    "PRESSED",
-    "QUICKER",
-    "SINK",
-    "TALL",
-    "THIRD",
-    "Device",
-    "at_rest",
-    "blister",
-    "fastest_lift",
-    "held",
-    "slowed",
-]  # fmt: skip
-
 METHODS = ("virtual_master", "cell_states")
 #: The method that the paper asks for in its conclusion, and all that figures compare.
 THIRD = "hybrid"

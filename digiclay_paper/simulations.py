@@ -36,8 +36,6 @@ from .scenes import METHODS, QUICKER, SINK, TALL, THIRD, Device
 from .variants import dragged, vary
 from .windows import measure_windows
 
-__all__ = ["sessions", "simulate"]
-
 #: The last part of a hold, in which an oscillation is looked for, s.
 WATCHED = 1.0
 #: Rows of a session of which one is kept; up to when all are kept besides, s.

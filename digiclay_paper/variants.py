@@ -19,8 +19,6 @@ from . import scenes
 from .results import AHEAD, PAPER_SPEED, SESSION, WAYS, Dragged, Extent, Located, Results
 from .scenes import METHODS
 
-__all__ = ["GAUSSIAN", "NO_RISE", "STAGGERED", "dragged", "located", "vary"]
-
 NO_RISE, STAGGERED, GAUSSIAN = "without the rise", "staggered", "gaussian"
 #: What each variant sets, and for which methods.
 VARIANTS: dict[str, tuple[Setting, tuple[str, ...]]] = {

@@ -9,8 +9,6 @@ from digiclay.core.metrics.signal import compute_deviation, compute_weights
 from digiclay.core.model.set_point import find_set_point
 from digiclay.core.session.run_result import Result
 
-__all__ = ["WINDOWS", "measure_windows"]
-
 #: Along the ridge and along the valley, s.
 RIDGE, VALLEY = (5.0, 10.0), (18.0, 25.0)
 WINDOWS = {"both": (RIDGE, VALLEY), "ridge alone": (RIDGE,), "valley alone": (VALLEY,)}

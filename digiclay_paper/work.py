@@ -22,8 +22,6 @@ from .results import Extent, Results
 from .scenes import COMPARED
 from .simulations import Told, simulate
 
-__all__ = ["produce"]
-
 #: The figure whose data are heights of pins, and no curves.
 SURFACES = "fig10_surfaces"
 

@@ -9,8 +9,6 @@ import secrets
 
 from digiclay.core.base.errors import OutputError
 
-__all__ = ["VARIABLE", "choose_token", "is_token"]
-
 #: Environment variable with the token.
 VARIABLE = "DIGICLAY_SERVE_TOKEN"
 #: What stands in an address and in a header without quotes.

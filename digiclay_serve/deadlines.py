@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Due", "Schedule", "TimeCounts", "plan_periods"]
-
 #: Rounding errors of times count as whole periods when they are below this share of one.
 SLACK = 1e-6
 #: Shares of the periods whose times are given.

@@ -13,8 +13,6 @@ from digiclay.core.base.errors import OutputError
 from .door_link import DoorLink
 from .pin_frames import Ledger, acknowledge, expire, pack_heights, send, split_frames
 
-__all__ = ["Display", "open_display"]
-
 #: Bytes that a display may send without the end of a frame, before they are thrown away.
 MOST_UNREAD = 4096
 

@@ -9,8 +9,6 @@ from digiclay.core.scene.schema import Scene
 
 from .protocol import LIMITS, Limits
 
-__all__ = ["Bed", "describe_bed"]
-
 #: Most pins whose positions are told: libraries refuse messages of a megabyte.
 MOST_POSITIONS = 10_000
 

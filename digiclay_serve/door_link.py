@@ -13,8 +13,6 @@ from .latest_slot import LatestSlot
 from .order_slot import Order, pack_order
 from .protocol import Frame, Pose, Reset, Status, unpack_frame
 
-__all__ = ["DoorLink"]
-
 
 class DoorLink:
     """Link of all doors of a process to the session.

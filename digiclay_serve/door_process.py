@@ -25,8 +25,6 @@ from .latest_slot import open_slot
 from .osc_door import open_osc
 from .websocket_door import open_websocket
 
-__all__ = ["main"]
-
 #: How much more readily the system is to give the processor to the session.
 NICE = 5
 

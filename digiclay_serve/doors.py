@@ -19,8 +19,6 @@ from .door_bed import Bed
 from .latest_slot import make_slot
 from .order_slot import ORDER_SIZE, Order, unpack_order
 
-__all__ = ["LENGTH", "DoorSettings", "Doors"]
-
 #: Bytes of the length in front of the settings.
 LENGTH = 8
 #: Time for the process to open the doors; to tell its counts, and then to end; to heed a signal, s.

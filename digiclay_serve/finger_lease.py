@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from digiclay.core.base.errors import DigiclayError
 
-__all__ = ["LEASE", "HeldError", "Lease", "claim", "release"]
-
 #: Time after the last pose of a client when another one may move the fingertip, s.
 LEASE = 2.0
 

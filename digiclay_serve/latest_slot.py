@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["LatestSlot", "make_slot", "open_slot"]
-
 #: Bytes before the value: number of the value, twice that and one more while it is written; its checksum.
 HEAD = 16
 #: Times that a value overwritten during reading is read again; later ones are read at the next look.

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ORDER_SIZE", "Order", "pack_order", "unpack_order"]
-
 #: Pose, its number, whether there is one, resets.
 LAYOUT = struct.Struct("<7dQQQ")
 ORDER_SIZE = LAYOUT.size

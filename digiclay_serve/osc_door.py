@@ -13,8 +13,6 @@ from .access_token import is_token
 from .door_link import DoorLink
 from .osc_messages import Subscription, format_osc_error, format_osc_frame, read_osc
 
-__all__ = ["open_osc"]
-
 #: Most subscribers, and how long a subscription lasts unless it is repeated, s.
 MOST_SUBSCRIBERS, LASTS = 16, 5.0
 #: Shortest time between two errors that are sent, s.

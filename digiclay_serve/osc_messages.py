@@ -14,8 +14,6 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from .protocol import Frame, Pose, Reset, check_pose
 
-__all__ = ["Subscription", "format_osc_error", "format_osc_frame", "read_osc"]
-
 #: What can be subscribed to: the pose and the total force, or every pin's height and force besides.
 PARTS = ("state", "pins")
 #: Most pins whose heights fit into a datagram.

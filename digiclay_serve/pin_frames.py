@@ -16,11 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "Ledger", "acknowledge", "expire", "pack_acknowledgement", "pack_heights", "read_acknowledgement",
-    "read_heights", "send", "split_frames",
-]  # fmt: skip
-
 VERSION = 1
 HEIGHTS, ACKNOWLEDGEMENT = 1, 2
 END, ESCAPE = b"\xc0", b"\xdb"

@@ -14,18 +14,11 @@ from enum import IntFlag
 from typing import Any
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.finger_range import MOST_FORCE
 from digiclay.core.model.fingertip import LEVEL
 from numpy.typing import NDArray
-
-__all__ = [
-    "LARGEST_REQUEST", "LIMITS", "VERSION", "Flag", "Frame", "Limits", "Pose", "Reset", "Status",
-    "check_pose", "format_error", "format_frame", "name_flags", "pack_frame", "pack_pose", "read_binary",
-    "read_json", "unpack_frame",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 VERSION = 1
 MARK = b"DC"

@@ -10,20 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.session import snapshot
 from digiclay.core.session.recorded_path import make_take
-from numpy.typing import NDArray
 
 from .deadlines import Schedule, TimeCounts, plan_periods
 from .doors import Doors
 from .protocol import name_flags, pack_frame
 from .served_session import Session, follow, make_frame, record, reset
 from .take_parts import PartWriter
-
-__all__ = ["LoopTimes", "run_session"]
-
-Floats = NDArray[np.float64]
 
 #: Periods are made up for if they are this late at most, s; those before are left out.
 CATCH_UP = 0.05

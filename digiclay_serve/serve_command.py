@@ -27,8 +27,6 @@ from .real_time_loop import run_session
 from .served_session import begin_session, make_frame
 from .take_parts import PartWriter
 
-__all__ = ["add"]
-
 EXAMPLES = f"""\
 examples:
   digiclay serve                                    the device of the paper, 200 control periods a second

@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.state import State
@@ -19,13 +20,8 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.live_periods import clamp_pose, interpolate_path, simulate_path
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.recorded_path import Recording
-from numpy.typing import NDArray
 
 from .protocol import LIMITS, Flag, Frame, Limits
-
-__all__ = ["Kept", "Session", "begin_session", "follow", "make_frame", "record", "reset"]
-
-Floats = NDArray[np.float64]
 
 #: Time between two states that are kept for a session that diverges, s.
 KEEP = 0.5

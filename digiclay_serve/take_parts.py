@@ -18,8 +18,6 @@ from digiclay.core.base.run_folder import Content, claim_folder
 from digiclay.core.base.whole_files import write_whole
 from digiclay.core.session.take import Take, from_bytes, to_bytes
 
-__all__ = ["PartWriter", "join_parts"]
-
 #: Most parts that wait for the disk.
 WAITING = 4
 #: Names of takes, and of the parts that a killed process leaves.

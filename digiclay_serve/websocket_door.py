@@ -28,8 +28,6 @@ from .protocol import (
     read_json,
 )
 
-__all__ = ["FLOOD", "Pace", "Wishes", "count_message", "open_websocket", "read_wishes"]
-
 #: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
 MOST_CLIENTS, MOST_SILENT = 64, 512
 #: Time for a client to say who it is, s; and to answer a ping.

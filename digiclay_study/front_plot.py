@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.studies.evaluation import FIGURES
 from digiclay.plots.figure import INK, LINES, canvas
 from digiclay.plots.sweep import read_unit
@@ -13,10 +14,6 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.figure import Figure
-
-__all__ = ["draw_front"]
-
-Floats = NDArray[np.float64]
 
 #: The largest value shown over the least one from which on an axis is logarithmic.
 WIDE = 20.0

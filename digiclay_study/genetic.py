@@ -7,11 +7,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
-__all__ = ["Outcome", "propose_generations"]
-
-Floats = NDArray[np.float64]
+from digiclay.core.base.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,6 @@ from .indices import CONFIDENCE, Indices
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.figure import Figure
 
-__all__ = ["draw_indices"]
-
 #: Inches: a panel, and what stands around it.
 ACROSS, A_PARAMETER, BESIDE, GAP, ABOVE, BELOW = 3.1, 0.52, 0.35, 0.35, 0.95, 0.65
 #: Inches a letter of a parameter's name takes at most.

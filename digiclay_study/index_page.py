@@ -15,8 +15,6 @@ from .indices import CONFIDENCE, Indices
 from .ranges import Range
 from .responses import ALLOWED, LOSS, Response
 
-__all__ = ["Findings", "format_index_table", "format_page"]
-
 #: Of the table of the outputs.
 HEAD = (
     "output", "unit", "unchanged scene", "mean", "standard deviation", "least", "largest", "without a value",

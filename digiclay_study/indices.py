@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from digiclay.core.base.arrays import Floats
 
 from .sampling import describe_problem
-
-__all__ = ["CONFIDENCE", "Indices", "compute_indices"]
-
-Floats = NDArray[np.float64]
 
 #: Level of the confidence intervals, and resamples of the bootstrap they come from.
 CONFIDENCE, RESAMPLES = 0.95, 1000

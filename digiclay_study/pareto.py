@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from numpy.typing import NDArray
-
-__all__ = ["find_front", "find_knee"]
-
-Floats = NDArray[np.float64]
 
 
 def find_front(values: Floats) -> NDArray[np.intp]:

@@ -30,8 +30,6 @@ from digiclay.core.studies.sweep_plan import (
 from .ranges import Range
 from .subject import Subject
 
-__all__ = ["UNCHANGED", "Evaluation", "describe_stop", "open_evaluation", "open_folder", "write_points"]
-
 #: Index of the unchanged scene among the points.
 UNCHANGED = 0
 

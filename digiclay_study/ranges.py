@@ -12,8 +12,6 @@ from digiclay.core.base.quantity import UNITS, Parameters, list_quantities
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.schema import Scene
 
-__all__ = ["Range", "fit_ranges", "read_range"]
-
 SYNTAX = "must be KEY=LOW:HIGH, KEY=LOW:HIGH:log or KEY=A,B,C"
 #: Digits of a value: 0.3, and not 0.30000000000000004.
 DIGITS = 12

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.studies.evaluation import FIGURES, Record
-from numpy.typing import NDArray
-
-__all__ = ["ALLOWED", "LOSS", "Response", "find_excess_losses", "get_figure", "make_response"]
-
-Floats = NDArray[np.float64]
 
 #: The metric by which a run loses the fingertip, and how far it may exceed that of the unchanged scene, which
 #: may lift the fingertip on purpose.

@@ -5,11 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-__all__ = ["count_points", "describe_problem", "sample_shares"]
-
-Floats = NDArray[np.float64]
+from digiclay.core.base.arrays import Floats
 
 
 def describe_problem(parameters: int) -> dict[str, Any]:

@@ -28,8 +28,6 @@ from .responses import LOSS, Response, find_excess_losses, make_response
 from .sampling import count_points, sample_shares
 from .subject import Subject, add_subject, make_points, read_subject, refuse_too_many
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay study slow_press --vary control.force_gain=0.5:8:log --vary control.dead_band=1e-5:1e-4 --out which

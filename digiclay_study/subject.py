@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from .ranges import Range, fit_ranges, read_range
 
-__all__ = ["Subject", "add_subject", "make_points", "read_count", "read_subject", "refuse_too_many"]
-
 
 @dataclass(frozen=True)
 class Subject:

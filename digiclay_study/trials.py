@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.studies.evaluation import Record
 from numpy.typing import NDArray
@@ -13,10 +14,6 @@ from numpy.typing import NDArray
 from .genetic import Outcome
 from .pareto import find_front
 from .responses import find_excess_losses, get_figure
-
-__all__ = ["Trials", "judge_trials"]
-
-Floats = NDArray[np.float64]
 
 #: Violation of a run without outputs: more than any loss of contact, which is a share.
 WITHOUT = 2.0

@@ -29,8 +29,6 @@ from .point_series import UNCHANGED, describe_stop, open_evaluation, open_folder
 from .subject import Subject, add_subject, make_points, read_count, read_subject, refuse_too_many
 from .trials import judge_trials
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay tune slow_press --vary control.force_gain=0.5:8:log --vary control.travel=1e-3:4e-3 --out tuned

@@ -7,8 +7,6 @@ import sys
 
 from tests.timeouts import TIMEOUT
 
-__all__ = ["dead"]
-
 
 def dead() -> int:
     """Return the number of a process that has ended."""

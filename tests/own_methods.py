@@ -10,8 +10,6 @@ from digiclay.core.control.methods import list_added, remove_method
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 
-__all__ = ["HEAD", "PAD", "forgotten", "small", "write_method"]
-
 HEAD = '''
 """Method of a test."""
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Grid
 from numpy.typing import NDArray
 
-__all__ = ["heighten", "make_orders", "make_spike_and_ridge", "measure_roughness", "stay_away"]
-
 Floats = NDArray[np.float64]
 
 

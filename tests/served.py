@@ -18,8 +18,6 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.timeouts import TIMEOUT
 
-__all__ = ["TOKEN", "Server", "frame_message", "serve"]
-
 ROOT = Path(__file__).parents[1]
 TOKEN = "a-token-of-tests"
 #: A bed of a few pins, and a blister that fits it.

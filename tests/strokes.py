@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from tests.hand import TICK, heights
 
-__all__ = ["Places", "begin_bed", "finish", "form", "measure_spikes", "queue", "relief"]
-
 Floats = NDArray[np.float64]
 Places = list[tuple[float, float]]
 #: Within how long a stroke is drawn, s: the finger is late, and goes as fast as it may.

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-__all__ = ["TIMEOUT", "wait_until"]
-
 #: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it hangs, s.
 TIMEOUT = 240.0
 

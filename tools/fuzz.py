@@ -51,8 +51,6 @@ from digiclay.core.surface.formed import make_formed
 from digiclay.core.surface.skin_grid import fit_skin
 from numpy.typing import NDArray
 
-__all__ = ["CASES", "failure", "main"]
-
 #: Numbers at the ends of what there is, and beyond.
 NUMBERS: tuple[Any, ...] = (
     0, 0.0, -0.0, 1, -1, 5e-324, 1e-310, 2.3e-308, 1e-200, 1e-30, 1e-12, 1e-9, 1e-6, 1e-3, 0.5, 1e3, 1e6, 1e9,

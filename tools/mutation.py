@@ -12,8 +12,6 @@ from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
-__all__ = ["CORE", "ROOT", "Mutant", "mutants", "sample"]
-
 ROOT = Path(__file__).parents[1]
 CORE = ROOT / "addon" / "digiclay" / "core"
 #: Operators of cosmic-ray whose mutants mean something in numerical code.

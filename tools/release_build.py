@@ -21,8 +21,6 @@ sys.path[:0] = [str(ROOT / "tools")]
 import extension  # noqa: E402
 from repacking import repack_tar, repack_zip  # noqa: E402
 
-__all__ = ["SIGNALED", "ReleaseError", "build_twice", "check_files", "refuse_stopped"]
-
 LIMIT = 300
 #: Time between two looks whether a signal has come, s.
 LOOK = 0.05

@@ -11,8 +11,6 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-__all__ = ["find_obstacles", "git", "read_notes", "read_versions", "tag_of"]
-
 INIT = "addon/digiclay/__init__.py"
 MANIFEST = "addon/digiclay/blender_manifest.toml"
 CHANGELOG = "CHANGELOG.md"

@@ -9,8 +9,6 @@ import time
 import zipfile
 from pathlib import Path
 
-__all__ = ["EARLIEST", "LATEST", "repack_tar", "repack_zip"]
-
 #: The times that a zip can state, from 1980 to 2107, s since 1970.
 EARLIEST, LATEST = 315532800, 4354819200
 FILE, PROGRAM, FOLDER = 0o644, 0o755, 0o755

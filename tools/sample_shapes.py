@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 ROOT = Path(__file__).parents[1]
 SHAPES = ROOT / "addon" / "digiclay" / "sample_shapes" / "shapes"
@@ -21,8 +20,7 @@ sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "addon")]
 
 import shape_maps  # noqa: E402
 import shape_solids  # noqa: E402
-
-Floats = NDArray[np.float64]
+from digiclay.core.base.arrays import Floats  # noqa: E402
 
 #: Pictures: name, bits a pixel, pixels a side.
 PICTURES = (

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from digiclay.core.base.arrays import Floats
 
-Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from digiclay.core.base.arrays import Floats
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
 Solid = tuple[Floats, NDArray[np.int64]]
 
 

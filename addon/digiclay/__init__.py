@@ -6,8 +6,6 @@ extension it registers what shows in Blender. Importing it does no work and need
 
 from __future__ import annotations
 
-__all__ = ["__version__", "register", "unregister"]
-
 __version__ = "0.2.0"
 
 

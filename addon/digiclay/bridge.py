@@ -10,18 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compat import bpy
+from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import Fingertip
 from .device.primitives import Shape
 from .device.roles import ELLIPSOID, ROLE
 from .ui_text import localize
-
-__all__ = [
-    "SCALE", "find_fault", "find_scale_fault", "finger_of", "linear", "mesh", "move_fingertip",
-    "place_fingertip", "points", "pose", "read_cells", "resize_fingertip", "srgb", "uniform", "write_cells",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: Blender units per meter of the device: a millimeter is drawn as a hundredth of a unit,
 #: which suits Blender's default clipping, snapping and lights.

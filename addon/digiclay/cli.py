@@ -14,8 +14,6 @@ from .commands.exit_codes import STOPPED, WRONG
 from .commands.stop import defer_interrupt
 from .core.base.errors import DigiclayError, one_line
 
-__all__ = ["carry_out", "console", "main", "run_as_program"]
-
 #: What tells the libraries behind numpy's products on how many cores to work.
 CORES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from .compat import bpy
 
-__all__ = ["register", "run", "unregister"]
-
 NAME = "digiclay"
 
 #: What Blender gave for the registered command, and wants back.

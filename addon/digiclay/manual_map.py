@@ -6,8 +6,6 @@ from pathlib import Path, PurePath
 
 from .compat import bpy
 
-__all__ = ["ENTRIES", "PAGE", "locate_manual", "manual_map", "register", "unregister"]
-
 #: `tools/manual.py` makes it from docs/guide.md.
 PAGE = Path(__file__).absolute().with_name("manual") / "guide.html"
 

@@ -10,8 +10,6 @@ from .overlay.placement import CORNERS
 from .settings import own_folder
 from .settings.declared import title
 
-__all__ = ["Choices", "Preferences", "get", "register", "take_methods", "unregister"]
-
 
 @dataclass(frozen=True)
 class Choices:

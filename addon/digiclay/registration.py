@@ -11,8 +11,6 @@ from .live import handlers
 from .press import brush_presets, tool
 from .settings import properties
 
-__all__ = ["register", "unregister"]
-
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
 MODULES: tuple[ModuleType, ...] = (
     properties,

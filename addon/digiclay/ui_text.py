@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["localize", "set_translator"]
-
 
 def _keep(text: str) -> str:
     """Return a text as it is."""

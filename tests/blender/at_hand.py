@@ -8,8 +8,6 @@ import bpy
 from digiclay.device import unit_watch, view
 from digiclay.device.roles import BALL, FINGER, HOUSING, OWNED, ROLE
 
-__all__ = ["added", "beds", "done", "housings", "looked", "older", "redone", "select", "undone", "whole"]
-
 
 def done(step: str) -> None:
     """End a user's action as Blender does: an undo step, an evaluation, and what waits for those."""

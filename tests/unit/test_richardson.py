@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from digiclay.core.batch.broadcasting import Floats
+from digiclay.core.base.arrays import Floats
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load

@@ -16,8 +16,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["VARIABLE", "driver", "push"]
-
 #: Blender asks libspnav only where this file is there, whatever it is.
 USUAL = "/var/run/spnav.sock"
 

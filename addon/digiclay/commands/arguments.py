@@ -15,11 +15,6 @@ from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..plugins.method_loader import load_method
 
-__all__ = [
-    "METHOD", "Help", "add_command", "add_run", "add_scene", "length", "load_by_option", "millimeters",
-    "name_methods", "scene_of", "seconds", "settings_of", "size", "told_as_options",
-]  # fmt: skip
-
 #: The key of the control method in scene files.
 METHOD = "control.method"
 

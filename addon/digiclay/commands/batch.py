@@ -24,8 +24,6 @@ from .stop import Stop
 from .submit import add_options, refuse_alone, write_farm_files
 from .worker import Process, Processes, count_cores
 
-__all__ = ["JobProcess", "add"]
-
 EXAMPLES = """\
 examples:
   digiclay batch first                    the sample batch, into ./first

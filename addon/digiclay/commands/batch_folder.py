@@ -26,8 +26,6 @@ from .progress import format_duration
 from .run_state import RUNS, TIMING, is_done
 from .thumbnail import NAMES
 
-__all__ = ["JOBS", "MARK", "Folder", "note_failure", "open_batch", "read_batch", "refresh_page"]
-
 #: The file by which a folder is known as a batch's, its other folders, and its page.
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
 #: What a thumbnail leads to: the first of these there is.

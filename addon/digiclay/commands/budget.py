@@ -13,8 +13,6 @@ from .arguments import told_as_options
 from .progress import Line
 from .tables import table
 
-__all__ = ["noted", "report", "within"]
-
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
     """Leave out of a scene what a budget of height error, m, allows; print what that is.

@@ -25,8 +25,6 @@ from ..core.base.errors import DigiclayError, one_line
 from .cluster_task import UnfitWorkerError, Versions, call_on_worker, describe_versions
 from .stop import allow_interrupt
 
-__all__ = ["Cluster", "open_cluster"]
-
 #: Seconds to reach the scheduler, and between two looks whether somebody asked to stop.
 PATIENCE, PAUSE = 10.0, 0.1
 #: Seconds within which a result must arrive that a worker has.

@@ -16,8 +16,6 @@ from .. import __version__
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Record, evaluate_bundle
 
-__all__ = ["UnfitWorkerError", "Versions", "call_on_worker", "describe_versions", "evaluate_on_worker"]
-
 
 class Versions(NamedTuple):
     """Versions that results depend on."""

@@ -31,8 +31,6 @@ from .stop import allow_interrupt
 from .suite import add_suite, list_suite_methods, run_suite
 from .tables import table as aligned
 
-__all__ = ["READ", "add", "table"]
-
 EXAMPLES = """\
 examples:
   digiclay compare ridge_mound_valley

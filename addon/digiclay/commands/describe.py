@@ -17,8 +17,6 @@ from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, me
 from ..core.shapes.source_file import fit_shape
 from .arguments import add_command, add_scene, scene_of
 
-__all__ = ["add", "description"]
-
 EXAMPLES = """\
 examples:
   digiclay describe ridge_mound_valley

@@ -17,8 +17,6 @@ from .progress import Counted
 from .refusals import refuse_without
 from .worker import count_cores, in_blender
 
-__all__ = ["add_pool", "finish_points", "open_pool", "read_count"]
-
 #: The most processes of a command.
 MOST = 61
 

@@ -22,8 +22,6 @@ from ..core.studies.evaluation import Pool, Record, evaluate_bundle
 from .executors import finish
 from .worker import Process, Processes
 
-__all__ = ["Evaluator", "evaluate_elsewhere", "open_evaluators", "serve"]
-
 #: How often a bundle is begun whose process dies.
 TRIES = 2
 

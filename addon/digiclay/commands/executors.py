@@ -14,8 +14,6 @@ from typing import TypeVar
 from ..core.base.errors import OutputError, one_line
 from ..core.studies.series import describe_error
 
-__all__ = ["finish"]
-
 #: Seconds between two looks at whether somebody asked to stop.
 PAUSE = 0.1
 

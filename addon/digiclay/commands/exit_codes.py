@@ -2,7 +2,5 @@
 
 from __future__ import annotations
 
-__all__ = ["FAILED", "STOPPED", "WRONG"]
-
 #: Some jobs of a batch failed; what the user asked for cannot be done; stopped by Ctrl-C or SIGTERM.
 FAILED, WRONG, STOPPED = 1, 2, 130

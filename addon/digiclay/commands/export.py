@@ -23,8 +23,6 @@ from .arguments import add_run, millimeters, seconds, told_as_options
 from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 
-__all__ = ["add", "exported", "file_names", "formats"]
-
 EXAMPLES = """\
 examples:
   digiclay export ridge_mound_valley --format stl,3mf

@@ -20,17 +20,6 @@ from .export import exported, file_names
 from .plot import PLOTS, plotted
 from .render import PICTURE, picture
 
-__all__ = [
-    "Extra",
-    "format_command",
-    "make_extras",
-    "plan_meshes",
-    "plan_picture",
-    "plan_plots",
-    "tell_left_out",
-    "tell_stopped_before",
-]
-
 History = Mapping[str, NDArray[Any]]
 
 

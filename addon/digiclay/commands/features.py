@@ -15,8 +15,6 @@ from .refusals import refuse_what_has_no_surface
 from .surface_options import add_surface, finding_of, former_of, model_of, row_of
 from .tables import table as aligned
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay features ridge_mound_valley

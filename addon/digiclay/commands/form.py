@@ -33,8 +33,6 @@ from .progress import Bar
 from .refusals import refuse_what_has_no_surface
 from .stop import Stop, allow_interrupt, defer_interrupt
 
-__all__ = ["add"]
-
 EXAMPLES = f"""\
 examples:
   digiclay form crater                                   displayed, a peak drawn out of it: surface.stl

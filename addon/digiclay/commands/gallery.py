@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
-__all__ = ["Card", "page", "wrap"]
-
 STYLE = """\
 :root { color-scheme: light dark; --ink: #1a1f26; --faded: #5a626d; --paper: #f4f5f6; --card: #fff;
   --edge: #d5d9de; --bad: #b3261e; }

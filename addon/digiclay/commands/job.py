@@ -32,8 +32,6 @@ from .progress import Counted
 from .run_state import FILES, RUNS, TIMING, RunState, judge_run, list_lacking
 from .stop import Stop
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay batch first --prepare            write the files of the jobs, run none

@@ -26,8 +26,6 @@ from .refusals import refuse_without_blender
 from .render import ARRAYS, stage_moving
 from .run_state import PATIENCE, RunState, judge_run, list_lacking, note_film
 
-__all__ = ["find_frames", "make_film", "make_frames"]
-
 
 def find_frames(run: Path, kind: str) -> Path:
     """Return the folder of a film's frames: another one for each definition, and each version of digiclay.

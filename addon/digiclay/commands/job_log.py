@@ -6,8 +6,6 @@ from pathlib import Path
 
 from ..core.base.errors import one_line
 
-__all__ = ["ERROR", "PROGRESS", "find_error", "read_fraction", "read_tail"]
-
 #: What the lines begin with that are meant for the series.
 PROGRESS, ERROR = "@ ", "! "
 #: Bytes at a log's end that are looked at for its last line.

@@ -21,8 +21,6 @@ from .refusals import refuse_what_has_no_surface, refuse_without_blender
 from .render import draw_film, draw_still, draw_turntable
 from .thumbnail import of_heights, of_picture
 
-__all__ = ["Tell", "check_outputs", "make_outputs"]
-
 #: Seconds between two lines of progress.
 PAUSE = 0.2
 

@@ -11,8 +11,6 @@ import numpy as np
 
 from .. import __version__
 
-__all__ = ["describe_machine"]
-
 
 def describe_machine(*packages: str) -> str:
     """Return one line: versions, those of more packages too, and the kind of machine."""

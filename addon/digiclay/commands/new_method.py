@@ -16,8 +16,6 @@ from ..plugins.method_loader import name_method
 from .arguments import add_command
 from .refusals import refuse_unwritable
 
-__all__ = ["TEMPLATE", "add", "name_class"]
-
 EXAMPLES = """\
 examples:
   digiclay new-method mine                            mine.py with the class Mine, in the working folder

@@ -14,8 +14,6 @@ from typing import Any, NoReturn
 
 from ..core.base.errors import DigiclayError
 
-__all__ = ["add"]
-
 #: Where packages stand beside this one: above both.
 BESIDE = __name__.removesuffix("digiclay.commands.outside")
 #: Commands of packages beside this one: package, module, extra, and what the list of commands says.

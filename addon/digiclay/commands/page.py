@@ -9,8 +9,6 @@ from typing import Any
 from .arguments import add_command
 from .batch_folder import read_batch
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay batch first --submit openjd      files for a render farm; its last task is this command

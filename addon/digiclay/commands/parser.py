@@ -30,8 +30,6 @@ from . import (
 from .arguments import Help
 from .exit_codes import WRONG
 
-__all__ = ["Parser", "parser"]
-
 EXAMPLES = """\
 examples:
   digiclay run ridge_mound_valley                   the paper's session, into ./ridge_mound_valley

@@ -15,8 +15,6 @@ from ..core.session.finished_run import SHAPES, read_run
 from .arguments import add_run
 from .refusals import refuse_unwritable, refuse_what_has_no_surface, refuse_without
 
-__all__ = ["PLOTS", "add", "plotted"]
-
 EXAMPLES = """\
 examples:
   digiclay plot ridge_mound_valley

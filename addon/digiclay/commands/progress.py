@@ -6,8 +6,6 @@ import shutil
 import time
 from typing import Self, TextIO
 
-__all__ = ["PAUSE", "WIDTH", "Bar", "Counted", "Line", "draw_share", "format_duration"]
-
 #: Cells of a bar, and seconds between two drawings of it.
 WIDTH, PAUSE = 28, 0.1
 

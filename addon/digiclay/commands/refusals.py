@@ -11,11 +11,6 @@ from ..core.base.errors import OutputError
 from ..core.scene.schema import Scene
 from .stop import defer_interrupt
 
-__all__ = [
-    "refuse_file", "refuse_unwritable", "refuse_what_has_no_surface", "refuse_without",
-    "refuse_without_blender",
-]  # fmt: skip
-
 
 def refuse_what_has_no_surface(scene: Scene, option: str) -> None:
     """Refuse to make a surface of a bed that has none.

@@ -26,10 +26,6 @@ from .stop import Stop
 if TYPE_CHECKING:
     from ..pictures.film import Shots
 
-__all__ = [
-    "ARRAYS", "PICTURE", "add", "draw_film", "draw_still", "draw_turntable", "picture", "stage_moving",
-]  # fmt: skip
-
 EXAMPLES = """\
 examples:
   digiclay render ridge_mound_valley

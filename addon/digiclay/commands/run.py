@@ -33,8 +33,6 @@ from .progress import Bar
 from .refusals import refuse_what_has_no_surface, refuse_without, refuse_without_blender
 from .stop import Stop
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay run ridge_mound_valley

@@ -16,10 +16,6 @@ from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import JOB, SCENE, read_outputs
 from ..plugins.method_copy import CODE
 
-__all__ = [
-    "FILES", "PATIENCE", "RUNS", "TIMING", "RunState", "is_done", "judge_run", "list_lacking", "note_film",
-]  # fmt: skip
-
 #: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"
 #: Seconds to wait for another process that makes or notes another film of the same run.

@@ -21,8 +21,6 @@ from .batch_folder import Folder
 from .evaluation_pool import read_count
 from .worker import find_program, start_blender
 
-__all__ = ["add_options", "refuse_alone", "write_farm_files"]
-
 #: Frames of a film that a task draws unless told otherwise.
 CHUNK = 50
 

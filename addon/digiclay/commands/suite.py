@@ -46,8 +46,6 @@ from .suite_page import (
     print_league,
 )
 
-__all__ = ["SCENE", "add_suite", "list_suite_methods", "run_suite"]
-
 #: Scene of a suite where none is given: the paper's session.
 SCENE = "ridge_mound_valley"
 #: Columns of a point.

@@ -17,10 +17,6 @@ from ..core.studies.method_trials import LIMITS, LOW, OUTCOMES
 from .gallery import wrap
 from .tables import table as aligned
 
-__all__ = [
-    "Provenance", "format_league", "format_page", "format_results", "format_trajectories", "print_league",
-]  # fmt: skip
-
 #: Columns of the league: measure, heading, factor to the unit shown, that unit, and the one of the CSV.
 COLUMNS: tuple[tuple[str, str, float, str, str], ...] = (
     ("rfd", "RFD", 1e3, "mN", "N"),

@@ -13,8 +13,6 @@ from ..core.surface.features import Finding
 from ..core.surface.skins import SKINS
 from .arguments import millimeters, seconds, told_as_options
 
-__all__ = ["add_surface", "finding_of", "former_of", "model_of", "row_of"]
-
 
 def add_surface(parser: argparse.ArgumentParser) -> None:
     """Add the options."""

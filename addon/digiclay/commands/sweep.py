@@ -28,8 +28,6 @@ from .exit_codes import STOPPED
 from .progress import Counted
 from .stop import Stop
 
-__all__ = ["add"]
-
 EXAMPLES = """\
 examples:
   digiclay sweep slow_press --vary control.force_gain=1:10:10 --metric rfd,lag --out gains

@@ -12,8 +12,6 @@ from ..core.base.png import encode_png
 from ..core.base.whole_files import write_whole
 from ..device.heat import COLORS
 
-__all__ = ["NAMES", "WIDTH", "height_map", "of_heights", "of_picture"]
-
 #: Files that can be one; and its width, pixels.
 NAMES = ("thumbnail.jpg", "thumbnail.png")
 WIDTH = 320

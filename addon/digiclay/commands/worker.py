@@ -22,8 +22,6 @@ from typing import Any, TypeVar
 from ..core.base.errors import DigiclayError
 from ..core.studies.series import describe_error
 
-__all__ = ["Process", "Processes", "count_cores", "find_program", "in_blender", "start_blender"]
-
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
 #: Seconds between two looks at whether one has ended.

@@ -7,8 +7,6 @@ from typing import Any
 from ..core.base.errors import DigiclayError
 from .node_tree import ARROWS
 
-__all__ = ["find_modifier", "require_modifier"]
-
 
 def find_modifier(bed: Any) -> Any | None:
     """Return the modifier that draws the pins, or None when the user has removed or changed it."""

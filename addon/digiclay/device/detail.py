@@ -10,14 +10,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..compat import bpy
+from ..core.base.arrays import Floats
 from . import form, view
-
-__all__ = ["LARGE", "SMALL", "choose_far", "follow", "measure_pitch", "register", "unregister"]
-
-Floats = NDArray[np.float64]
 
 #: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
 SMALL, LARGE = 3.0, 4.0

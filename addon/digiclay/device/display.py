@@ -19,8 +19,6 @@ from ..settings import properties
 from . import form, heat, view
 from .node_tree import LENGTH
 
-__all__ = ["Display", "pick_pins", "picked_pins", "register", "unregister"]
-
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
     ("force", "Force", "Color the pins by the force on them"),

@@ -9,8 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COLORS", "NO_FORCE", "TOP", "level"]
-
 #: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of it.
 TOP = 0.2
 #: sRGB of a pin that nothing presses.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
@@ -18,9 +19,6 @@ from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import Scene
 from ..core.session import finished_run
 
-__all__ = ["CLEARANCE", "Instant", "find_ellipsoid", "pick_pose", "read"]
-
-Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
 
 #: What an instant needs of a history.

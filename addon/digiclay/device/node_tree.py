@@ -12,11 +12,6 @@ from .parts import Sources
 from .skin_lattice import KINDS
 from .skin_nodes import skin_nodes
 
-__all__ = [
-    "ARROWS", "ARROW_LENGTH", "CASE", "COLOR_BY_FORCE", "FAR", "FORM", "LEAST", "LENGTH", "MEMBRANE",
-    "SOURCES", "TOP_FORCE", "bed_nodes",
-]  # fmt: skip
-
 #: Names of the nodes that have the housing and the collection of all that is drawn.
 CASE, SOURCES = "Housing", "Sources"
 

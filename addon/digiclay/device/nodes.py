@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["attribute", "node", "number", "socket", "switch"]
-
 
 def node(tree: Any, kind: str, column: float, row: float) -> Any:
     """Add a node at a place of a coarse grid, so that whoever opens the tree can read it.

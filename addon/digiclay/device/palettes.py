@@ -7,8 +7,6 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import COLORS, Mode
 from .roles import ROLE
 
-__all__ = ["DEFAULT", "PALETTES", "WORDS", "color_of", "has_palette", "set_palette"]
-
 Color = tuple[float, float, float]
 
 

@@ -16,11 +16,6 @@ from .roles import BALL, ELLIPSOID, FINGER, FINGERTIP, OWNED, PIN, ROLE
 from .skin_lattice import choose_parts, make_lattice
 from .skin_nodes import SkinMeshes, make_meshes
 
-__all__ = [
-    "Sources", "ellipsoid", "finger_material", "is_linked", "lock_in_place", "make_fingertip",
-    "make_sources", "marked", "material",
-]  # fmt: skip
-
 #: sRGB of what is no pin.
 SKIN = (0.91, 0.60, 0.47)
 CASE = (0.13, 0.14, 0.16)

@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["Shape", "arrow", "ball", "housing", "loft", "rod"]
+from ..core.base.arrays import Floats
 
-Floats = NDArray[np.float64]
 #: Vertices (k, 3) and faces (tuples of vertex indices, counter-clockwise from outside).
 Shape = tuple[Floats, list[tuple[int, ...]]]
 

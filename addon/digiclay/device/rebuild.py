@@ -14,8 +14,6 @@ from . import view
 from .instant import Instant, find_ellipsoid
 from .roles import FINGER
 
-__all__ = ["rebuild"]
-
 
 def rebuild(bed: Any) -> Scene:
     """Make a bed anew, at rest; its place, its fingertip and what else hangs on the object stay.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["BAKE", "BALL", "BED", "ELLIPSOID", "FINGER", "FINGERTIP", "HOUSING", "OWNED", "PIN", "ROLE"]
-
 #: Property that holds an object's role.
 ROLE = "digiclay_role"
 #: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw, and a bake

@@ -17,11 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from .instant import Instant
 
-__all__ = ["KINDS", "MOST_POINTS", "SkinLattice", "Weights", "choose_parts", "interpolate", "make_lattice"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 #: Skins by name.

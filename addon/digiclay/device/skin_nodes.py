@@ -14,8 +14,6 @@ from ..compat import bpy
 from .nodes import attribute, node, number
 from .skin_lattice import Pass, SkinLattice
 
-__all__ = ["SkinMeshes", "make_meshes", "skin_nodes"]
-
 #: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
 PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
 #: Attributes of the weights: their first half; the other is the name of the skin.

@@ -19,16 +19,6 @@ from . import parts, view
 from .instant import Instant, find_ellipsoid
 from .roles import BAKE, BALL, BED, ELLIPSOID, FINGER, FINGERTIP, HOUSING, OWNED, PIN, ROLE
 
-__all__ = [
-    "Faults",
-    "find_faults",
-    "follow_selection",
-    "follow_visibility",
-    "give_fingertip",
-    "mark_parts",
-    "repair",
-]
-
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
 #: Its bits: by the eye in the outliner (H), and by the switches of the object itself.

@@ -12,8 +12,6 @@ from typing import Any
 from ..compat import bpy
 from . import unit
 
-__all__ = ["register", "settle", "unregister", "watch"]
-
 #: Time until it is looked again whether whoever is at work has done, s.
 AGAIN = 0.1
 #: Operators with one of these push an undo step when they are done; until then nothing is to be changed.

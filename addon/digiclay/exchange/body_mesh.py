@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..bridge import SCALE
 from ..compat import bpy
+from ..core.base.arrays import Flags
 from ..core.surface.body import Body
-
-__all__ = ["make_object"]
-
-Flags = NDArray[np.bool_]
 
 #: Edges of walls and base sharper than this stay sharp when a user shades them smooth, too, rad.
 SHARP = 0.7

@@ -19,8 +19,6 @@ from ..core.surface.formed import Formed
 from ..live import bed_state, running
 from ..settings import properties
 
-__all__ = ["clear_reference", "has_reference", "model", "read_formed", "set_reference"]
-
 #: Attribute of the bed's mesh: height of each pin, m, that features are measured from.
 FORMER = "former"
 #: A drawn pin is this near to where the session has it, m: float32 at a bed's size.

@@ -13,8 +13,6 @@ from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.shapes.picture_heights import READERS, refuse_too_many
 
-__all__ = ["pixels", "register", "unregister"]
-
 #: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled down by it.
 MOST = 4_000_000
 #: How bright red, green and blue are, as Pillow and the television standard BT.601 have it.

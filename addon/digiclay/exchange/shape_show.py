@@ -29,8 +29,6 @@ from ..device.instant import CLEARANCE, find_ellipsoid
 from ..live import bed_state, sculpting
 from ..settings import properties
 
-__all__ = ["embed_heights", "has_surface", "read_relief", "show_file", "show_relief"]
-
 #: Kinds of objects that have a surface.
 SURFACED = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 #: Simulated time after which a shape that does not stand is shown as far as it has come, s.

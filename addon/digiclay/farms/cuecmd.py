@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from ..core.base.errors import OutputError
 from .series_plan import Task, split_frames
 
-__all__ = ["format_lists", "join_words"]
-
 
 def format_lists(tasks: Sequence[Task], program: Sequence[str], series: str) -> dict[str, str]:
     """Return the lists by their names, in the order in which they are to be submitted.

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from .series_plan import Task, split_frames
 
-__all__ = ["SCRIPT", "format_job"]
-
 #: The job type's script; its name without ending, with - for _, is the type's.
 SCRIPT = Path(__file__).with_name("digiclay_series.js")
 #: Flamenco's names of systems.

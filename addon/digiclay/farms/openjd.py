@@ -12,8 +12,6 @@ from typing import Any
 
 from .series_plan import FRAME_OPTION, Task
 
-__all__ = ["format_template", "name_program", "name_steps"]
-
 #: Characters of a step's name, and seconds a task gets to stop by itself.
 LONGEST, GRACE = 64, 30
 #: Names of the parameter that is the program, by the first of its arguments: the others fit that kind alone.

@@ -13,8 +13,6 @@ from ..core.studies.job_outputs import MOVING, Outputs
 from ..core.studies.job_table import Job, JobSeries
 from ..plugins.method_copy import find_word
 
-__all__ = ["FRAME_OPTION", "Frames", "Task", "plan_series", "split_frames"]
-
 #: The option that takes a range of frames.
 FRAME_OPTION = "--frames"
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .running import Floats, Running
-
-__all__ = ["POSE", "STATE", "TICK", "clear", "read_pose", "read_snapshot", "read_tick", "write"]
+from ..core.base.arrays import Floats
+from .running import Running
 
 #: The state by `core.session.snapshot`, the finger's pose at it, and the tick it is of.
 STATE, POSE, TICK = "digiclay_state", "digiclay_pose", "digiclay_moment"

@@ -10,15 +10,9 @@ import math
 import socket
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..core.base.arrays import Floats
 from ..ui_text import localize
 from .follow_messages import pack_subscription, parse_address, read_pose
-
-__all__ = ["Following", "begin", "end", "find", "follow"]
-
-Floats = NDArray[np.float64]
 
 #: Poses a second asked for: some between two ticks.
 RATE = 120.0

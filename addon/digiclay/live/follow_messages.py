@@ -9,15 +9,11 @@ import ipaddress
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.base.addresses import is_loopback
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..ui_text import localize
-
-__all__ = ["pack_subscription", "parse_address", "read_pose"]
-
-Floats = NDArray[np.float64]
 
 SUBSCRIBE, STATE = "/digiclay/subscribe", "/digiclay/state"
 #: Period, number, time, total force, pose.

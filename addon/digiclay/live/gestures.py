@@ -9,8 +9,6 @@ from .running import Gesture, Running
 from .sculpting import REST, restore
 from .stroke_queue import drop_strokes
 
-__all__ = ["reset", "restore_gesture", "rewind", "withdraw_stroke"]
-
 
 def rewind(running: Running) -> Running:
     """Take back the last gesture: state and finger are where it began; nothing changes if there is none."""

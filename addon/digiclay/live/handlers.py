@@ -15,8 +15,6 @@ from . import loop, recovery, running, selection, tick
 from .running import Running
 from .stroke_queue import drop_strokes
 
-__all__ = ["KEYS", "STOPPED", "end", "end_all", "end_with_file", "register", "unregister", "watch"]
-
 #: Ticks until the state undo has put into a bed is taken up, that one included.
 STALE = 2
 #: What is told of a session the user has ended.

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from .stroke import Mirror, Stroke
-
-__all__ = ["TURN", "advance_turn", "lean_finger", "mirror_turn", "turn_toward"]
-
-Floats = NDArray[np.float64]
 
 #: How fast the finger turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
 #: coarse steps does not jerk it.

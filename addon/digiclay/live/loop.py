@@ -9,11 +9,6 @@ from .. import preferences
 from ..compat import bpy
 from . import running
 
-__all__ = [
-    "begin", "end", "is_aside", "is_due", "is_running", "redraw_numbers", "step_aside", "take_over",
-    "time_window", "token",
-]  # fmt: skip
-
 #: A loop that has not ticked for so long is gone, s: its window was closed in a way nobody told.
 GONE = 5.0
 #: Ticks may come this much early, as a share of the time between two: timers are not exact.

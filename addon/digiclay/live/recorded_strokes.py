@@ -31,8 +31,6 @@ from .stroke_path import lay_line, lay_path, lay_ring, pull
 from .stroke_queue import change_stroke, find_stroke, queue_stroke
 from .tracking import find_tracking
 
-__all__ = ["PointerStroke", "Recorded", "play_strokes", "read_strokes"]
-
 #: Ticks a second of the replay.
 RATE = 60.0
 #: How long the hand rests when the fingertip has finished a stroke, s: the pins come to rest meanwhile.

@@ -17,8 +17,6 @@ from ..ui_text import localize
 from . import running
 from .waiting import find_bed
 
-__all__ = ["clear_recovery", "file_path", "has_unsaved", "save_copy", "write_recovery"]
-
 #: Takes that stand in beds for the moment of saving: uid and name of the bed, number of the take.
 _WRITTEN: list[tuple[int, str, str]] = []
 

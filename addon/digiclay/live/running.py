@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..core.base.arrays import Floats
 from ..core.engine.state import State
 from ..core.engine.system import System
 from ..core.scene.schema import Scene
@@ -21,8 +19,6 @@ __all__ = [
     "Gesture", "Recording", "Running", "drop", "find", "last_message", "list_sessions", "put",
     "set_message",
 ]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.base.errors import StateError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
@@ -28,12 +28,6 @@ from ..core.session.live_periods import (
 from ..ui_text import localize
 from .running import Gesture, Recording, Running
 from .stroke_queue import take_path
-
-__all__ = [
-    "advance", "begin_session", "change_scene", "request_step", "restore", "set_recording",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000

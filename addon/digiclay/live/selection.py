@@ -10,9 +10,6 @@ from typing import Any
 
 from ..compat import bpy
 
-__all__ = ["deselect", "select_active"]
-
-
 #: Uids of the beds that were selected until their sessions.
 _SELECTED: set[int] = set()
 

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.control.blister import Blister
 from ..core.control.smoothing import ORDER
 from ..core.model.fingertip import Fingertip
@@ -22,10 +23,6 @@ from ..core.model.layout import Grid
 from .stroke import DONE, SETTLING, Brush, Stroke
 from .stroke_motion import SEARCH
 from .sweep import PATIENCE
-
-__all__ = ["begin_settling", "find_spike", "measure_excess_heights", "settle"]
-
-Floats = NDArray[np.float64]
 
 #: How far a pin may be above or below all those around it, in pitches: 0.54 mm on the paper's bed.
 LIMIT = 0.18

@@ -6,16 +6,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from .tracking import Tracking
 
-__all__ = [
-    "ABOVE", "DEEPEST", "DONE", "DRAGGING", "LEAVING", "PRESSING", "RISING", "SETTLING", "SHALLOWEST",
-    "SYMMETRIES", "WAITING", "Brush", "Mirror", "Sample", "Stroke", "deepen", "draw", "start",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 #: Factors of x and y of a path and of its mirror images about the middle of the bed.
 Mirror = tuple[float, float]
 

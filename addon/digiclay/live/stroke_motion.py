@@ -17,8 +17,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Grid
 from ..core.surface.pointing import find_ground_height
@@ -26,10 +26,6 @@ from .lean import advance_turn
 from .stroke import ABOVE, DRAGGING, LEAVING, PRESSING, RISING, Brush, Stroke
 from .stroke_travel import CLEARANCE, DRAG, LIFT, NEAR, SPAN, Place, cross, drag, finish_image, run_clock
 from .tracking import Tracking
-
-__all__ = ["APPROACH", "SEARCH", "SPEED", "follow"]
-
-Floats = NDArray[np.float64]
 
 #: How fast the finger comes down to the surface, and presses, m/s. Pressed faster, it runs into pins whose
 #: valves have not opened yet: 2 N at 20 mm/s on the paper's device, 24 N at 50 mm/s.

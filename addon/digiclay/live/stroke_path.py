@@ -7,13 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from .stroke import Stroke
 
-__all__ = ["lay_line", "lay_path", "lay_ring", "pull"]
-
-Floats = NDArray[np.float64]
 Place = tuple[float, float]
 
 #: How fast a path is gone along that no hand has drawn, m/s: half of the fastest drag.

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device.instant import find_ellipsoid
 from .running import Gesture, Running
@@ -16,10 +16,6 @@ from .stroke import LEAVING, SETTLING, SYMMETRIES, Brush, Mirror, Stroke, start
 from .stroke_motion import follow
 from .sweep import find_radius, sweep
 from .tracking import find_tracking
-
-__all__ = ["change_stroke", "drop_strokes", "find_stroke", "last_place", "queue_stroke", "take_path"]
-
-Floats = NDArray[np.float64]
 
 
 def queue_stroke(

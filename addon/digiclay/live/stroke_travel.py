@@ -7,8 +7,6 @@ from dataclasses import replace
 
 from .stroke import ABOVE, DONE, PRESSING, Stroke
 
-__all__ = ["CLEARANCE", "DRAG", "LIFT", "NEAR", "SPAN", "Place", "cross", "drag", "finish_image", "run_clock"]
-
 #: Lowest point of the finger, m.
 Place = tuple[float, float, float]
 

@@ -10,16 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from .stroke import ABOVE, DRAGGING, LEAVING, Stroke
 from .stroke_travel import CLEARANCE, DRAG, LIFT, cross, drag, finish_image, run_clock
-
-__all__ = ["PATIENCE", "find_radius", "sweep"]
-
-Floats = NDArray[np.float64]
 
 #: Least radius of the disc that is smoothed, in pitches: below one a pin has no neighbor in it.
 LEAST = 2.0

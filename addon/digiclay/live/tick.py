@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import bridge, preferences
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
 from ..device import display, unit, view
 from ..device.instant import find_ellipsoid
@@ -19,11 +20,9 @@ from ..recorded.bake import is_baked
 from ..settings import properties
 from ..ui_text import localize
 from . import bed_state, follow, gestures, running, sculpting
-from .running import Floats, Running
+from .running import Running
 from .stroke_queue import drop_strokes
 from .waiting import blocking_reason, find_bed
-
-__all__ = ["Note", "place_finger", "show", "start", "stop", "tick", "withdraw_strokes"]
 
 
 class Note(NamedTuple):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.control.blister import Blister
 from ..core.control.cell_states import CellStates
 from ..core.control.hybrid_parameters import Hybrid
@@ -23,10 +23,6 @@ from ..core.model.relaxation import Relaxation
 from ..core.model.touch import Touch
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
-
-__all__ = ["Tracking", "find_tracking"]
-
-Floats = NDArray[np.float64]
 
 #: How long a pin is under a finger that drags, s: some 4 mm at 14 mm/s. The pulp relaxes meanwhile.
 CONTACT_TIME = 0.3

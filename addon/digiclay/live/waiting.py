@@ -13,8 +13,6 @@ from ..ui_text import localize
 from . import running
 from .running import Running
 
-__all__ = ["active_session", "blocking_reason", "find_bed"]
-
 
 def find_bed(uid: int, name: str) -> Any | None:
     """Return the object of a `session_uid`, or None when it was deleted: it stands in no scene any more.

@@ -34,8 +34,6 @@ from . import (
     toggle_skin,
 )
 
-__all__ = ["register", "unregister"]
-
 CLASSES: tuple[type, ...] = (
     add_bed.AddBed,
     import_run.ImportRun,

@@ -10,8 +10,6 @@ from ..core.base.errors import DigiclayError, one_line
 from ..ui_text import localize
 from .poll_messages import edited
 
-__all__ = ["Action", "FileAction", "Polled"]
-
 
 def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
     """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator unsaid."""

@@ -24,8 +24,6 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import baked, edited, no_bed, session_runs
 
-__all__ = ["AddBed", "Placed", "Rebuild", "add", "add_shown", "entry", "frame", "select_only"]
-
 DEFAULT = Layout()
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400

@@ -20,8 +20,6 @@ from .long_work import LongWork
 from .poll_messages import no_bed, session_runs
 from .take_actions import ChosenTake
 
-__all__ = ["Bake", "FreeBake"]
-
 
 class Bake(ChosenTake, LongWork, bpy.types.Operator):
     """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""

@@ -12,8 +12,6 @@ from ..exchange import formed_bed
 from ..ui_text import localize
 from .mesh_options import SurfaceOptions, chosen_bed, sentence
 
-__all__ = ["ExportMenu", "ExportMesh", "entry"]
-
 #: Entries of the menu: words, icon, and the properties they stand for.
 ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("Solid for printing (.3mf)", "MESH_CUBE", {"kind": "solid", "file_format": "3mf"}),

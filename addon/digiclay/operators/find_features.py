@@ -10,8 +10,6 @@ from ..panels.shape_exchange import LISTED
 from .mesh_options import FindingOptions, SurfaceAction, chosen_bed
 from .poll_messages import no_surface
 
-__all__ = ["FindFeatures", "ForgetSurface", "KeepSurface"]
-
 
 class FindFeatures(FindingOptions, bpy.types.Operator):
     """Find the bosses and creases of the active bed and list them in the panel"""

@@ -10,8 +10,6 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_session
 
-__all__ = ["FollowServer", "LeaveServer"]
-
 
 class FollowServer(Action, bpy.types.Operator):
     """Move the fingertip with that of a server, digiclay serve, by OSC; the bed forms as under the hand"""

@@ -9,8 +9,6 @@ from ..device.instant import read
 from .action import FileAction
 from .add_bed import Placed, add_shown
 
-__all__ = ["ImportRun", "entry"]
-
 
 class ImportRun(Placed, FileAction, bpy.types.Operator):
     """Show one instant of a Digital Clay run as a bed of pins"""

@@ -10,8 +10,6 @@ from ..ui_text import localize
 from . import status
 from .action import Action
 
-__all__ = ["LongWork"]
-
 #: Time between two looks at the user's keys, s, and the share of it that is worked.
 TICK, SHARE = 0.05, 0.9
 

@@ -13,8 +13,6 @@ from ..ui_text import localize
 from .add_bed import select_only
 from .mesh_options import SurfaceOptions, chosen_bed
 
-__all__ = ["MakeMesh"]
-
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35
 #: Marks what was made here, so that what is made next is put elsewhere.

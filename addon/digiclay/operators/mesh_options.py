@@ -13,8 +13,6 @@ from ..exchange import formed_bed
 from .action import Action
 from .poll_messages import no_surface
 
-__all__ = ["FindingOptions", "SurfaceAction", "SurfaceOptions", "chosen_bed", "sentence"]
-
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 
 

@@ -22,8 +22,6 @@ from .action import Action, FileAction
 from .add_bed import Placed, add
 from .poll_messages import edited
 
-__all__ = ["MENUS", "AddSample", "OpenScene", "Samples", "SceneFiles", "SessionSamples", "ShapeSamples"]
-
 
 class AddSceneAction(Placed, Action):
     """Mixin of operators that add a bed, as Add > Mesh > Digital Clay does."""

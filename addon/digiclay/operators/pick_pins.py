@@ -12,8 +12,6 @@ from . import status
 from .action import Action, Polled
 from .poll_messages import no_bed
 
-__all__ = ["ClearPins", "PickPins"]
-
 NO_BED = "Select a bed of pins first"
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 

@@ -11,8 +11,6 @@ from ..ui_text import localize
 from .action import FileAction
 from .poll_messages import baked, linked, no_bed, session_runs
 
-__all__ = ["PlayStrokes"]
-
 
 class PlayStrokes(FileAction, bpy.types.Operator):
     """Form recorded strokes of the Press tool on the bed, from a file, as fast as they can be simulated"""

@@ -15,11 +15,6 @@ from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..ui_text import localize
 
-__all__ = [
-    "baked", "edited", "linked", "no_bed", "no_session", "no_skin", "no_surface", "no_take", "session_runs",
-    "session_waits",
-]  # fmt: skip
-
 
 def no_bed(context: Any, message: str = "Select a bed or its fingertip first") -> str:
     """No part of a bed is active; `linked`, `baked` and `no_take` are to be asked after this."""

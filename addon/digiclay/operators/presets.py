@@ -14,8 +14,6 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_bed
 
-__all__ = ["ApplyPreset", "RemovePreset", "SavePreset"]
-
 
 class ApplyPreset(Action, bpy.types.Operator):
     """Set the bed's parameters to those of a preset; its layout stays"""

@@ -14,8 +14,6 @@ from ..ui_text import localize
 from .action import Action
 from .radial import AdjustMixin, no_bed
 
-__all__ = ["AdjustDepth", "AdjustSize", "AdjustStrength", "ScaleSize"]
-
 #: Change of the depth, m, and of the strength, for a pixel at a UI scale of 1.
 DEPTH_PIXEL, STRENGTH_PIXEL = 0.05e-3, 0.005
 

@@ -10,8 +10,6 @@ from ..ui_text import localize
 from .action import Action
 from .radial import no_bed
 
-__all__ = ["FingerMenu", "TakeFinger"]
-
 
 class TakeFinger(Action, bpy.types.Operator):
     """Give the fingertip the form of a finger, a palm or a tool; its blister follows"""

@@ -10,8 +10,6 @@ from ..press import brush, brush_presets
 from .action import Action, Polled
 from .radial import no_tool
 
-__all__ = ["ApplyBrush", "BrushMenu", "SaveBrush"]
-
 
 class ApplyBrush(Action, bpy.types.Operator):
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""

@@ -4,8 +4,6 @@ from ..compat import bpy
 from ..live.stroke import DEEPEST
 from ..press import brush, pen
 
-__all__ = ["PressSettings"]
-
 
 class PressSettings:
     """Mixin of the operator with its properties."""

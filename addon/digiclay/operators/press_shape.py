@@ -17,8 +17,6 @@ from . import status
 from .action import Polled
 from .press_stroke import NOT_PRESSED, find_pressed, open_session
 
-__all__ = ["PressLine", "PressShape"]
-
 #: Path between two places of the bed, by the tool's setting.
 SHAPES: dict[str, Callable[[Any, Any], Any]] = {"LINE": lay_line, "RING": lay_ring}
 KEYS = {

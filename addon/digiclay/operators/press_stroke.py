@@ -22,8 +22,6 @@ from . import status
 from .action import Polled
 from .press_settings import PressSettings
 
-__all__ = ["NOT_PRESSED", "Press", "find_pressed", "open_session"]
-
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
 MOVES = frozenset({"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"})

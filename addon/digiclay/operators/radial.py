@@ -17,8 +17,6 @@ from ..ui_text import localize
 from . import status
 from .action import Polled
 
-__all__ = ["AdjustMixin", "no_bed", "no_tool"]
-
 #: Factor of the mouse's way with Shift held.
 PRECISE = 0.1
 #: Events that are Blender's: timers, on which sessions go on, and the ways to turn the view.

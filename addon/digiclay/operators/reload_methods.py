@@ -8,8 +8,6 @@ from ..settings import own_folder
 from ..ui_text import localize
 from .action import Action
 
-__all__ = ["ReloadMethods"]
-
 
 class ReloadMethods(Action, bpy.types.Operator):
     """Run the Python files of the folder of own control methods again; running sessions keep their method"""

@@ -19,8 +19,6 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_bed, no_session, session_waits
 
-__all__ = ["PauseSession", "ResetSession", "RewindSession", "StepSession", "StopSession"]
-
 
 class OfSession(Action):
     """Mixin of an action on the session that `active_session` finds."""

@@ -14,8 +14,6 @@ from ..live import handlers, loop, recovery, running, tick
 from ..ui_text import localize
 from .action import Action, Polled
 
-__all__ = ["Escape", "GoOn", "LoopMixin"]
-
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
 #: What is told of sessions whose window is gone.

@@ -13,8 +13,6 @@ from .action import Action
 from .poll_messages import baked, linked, no_bed, session_runs
 from .session_loop import LoopMixin
 
-__all__ = ["LeaveMode", "Session", "leave_entry"]
-
 
 def leave_mode(context: Any) -> None:
     """Leave the active object's mode, for instance that of the Sculpting workspace, for Object Mode."""

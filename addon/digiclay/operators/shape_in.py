@@ -15,8 +15,6 @@ from ..ui_text import localize
 from .action import Action, FileAction
 from .poll_messages import baked, linked, no_bed, session_runs
 
-__all__ = ["ShapeFromFile", "ShapeFromObject", "ShapeSample", "Shaped"]
-
 DEFAULT = Shape()
 FITS = (
     ("contain", "Whole", "As large as the bed allows, all of it on the bed"),

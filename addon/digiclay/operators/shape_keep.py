@@ -13,8 +13,6 @@ from ..ui_text import localize
 from .action import Action
 from .poll_messages import no_bed, session_runs
 
-__all__ = ["KeepShape", "RemoveShape"]
-
 
 class KeepShape(Action, bpy.types.Operator):
     """Make the formed surface the bed's shape: sessions begin with it, elastic and viscous beds keep to it"""

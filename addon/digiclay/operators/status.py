@@ -9,8 +9,6 @@ from typing import Any
 
 from ..compat import bpy
 
-__all__ = ["clear", "show"]
-
 #: What was written, by the name of the workspace.
 _TOLD: dict[str, str] = {}
 

@@ -15,8 +15,6 @@ from ..ui_text import localize
 from .action import Action, FileAction
 from .poll_messages import no_bed, no_take
 
-__all__ = ["ChosenTake", "ExportTake", "KeepTake", "RecordTake", "RemoveTake"]
-
 
 class ChosenTake:
     """Mixin of an operator on one take of the active bed."""

@@ -28,8 +28,6 @@ from .action import Action
 from .poll_messages import no_bed, no_take, session_runs
 from .take_actions import ChosenTake
 
-__all__ = ["ReplayTake"]
-
 
 class ReplayTake(ChosenTake, Action, bpy.types.Operator):
     """Replay a take at its recorded speed. Esc stops and restores the bed"""

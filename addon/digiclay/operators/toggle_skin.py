@@ -8,8 +8,6 @@ from ..device.view import bed_of
 from .action import Action
 from .poll_messages import linked, no_bed, no_skin
 
-__all__ = ["ToggleSkin"]
-
 
 class ToggleSkin(Action, bpy.types.Operator):
     """Show the surface of the pins as a skin, or the pins again"""

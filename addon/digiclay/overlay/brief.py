@@ -5,8 +5,6 @@ from __future__ import annotations
 from ..ui_text import localize
 from .sections import ROW, Pen, Readings, describe_state, force_message
 
-__all__ = ["BRIEF"]
-
 
 def _brief_height(told: Readings) -> float:
     """Return the height of the brief section, pixels at a UI scale of 1."""

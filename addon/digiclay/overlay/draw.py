@@ -11,10 +11,9 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ..core.base.arrays import Floats
 from .look import Color
-from .picture import Box, Dot, Floats, Line, Picture, Words
-
-__all__ = ["cursor", "draw"]
+from .picture import Box, Dot, Line, Picture, Words
 
 #: Corners of a dot.
 CORNERS = 20

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Color", "Look", "choose_colors", "contrast"]
-
 #: sRGB.
 Color = tuple[float, float, float]
 

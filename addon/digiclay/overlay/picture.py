@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from .look import Color
-
-__all__ = ["Box", "Dot", "Line", "Picture", "Words", "round_axis", "scale_curve"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,6 @@ from .look import Look
 from .picture import Box, Picture
 from .sections import SECTIONS, Pen, Readings
 
-__all__ = ["COMPACT", "CORNERS", "FULL", "Content", "find_room", "lay_out"]
-
 
 class Content(NamedTuple):
     """Sections of the overlay, and their width at a UI scale of 1, pixels."""

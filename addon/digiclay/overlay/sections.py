@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..core.model.finger_range import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
 from .look import Color, Look
-from .picture import Box, Dot, Floats, Line, Picture, Words, round_axis, scale_curve
-
-__all__ = ["ROW", "SECTIONS", "Pen", "Readings", "describe_state", "error_message", "force_message"]
+from .picture import Box, Dot, Line, Picture, Words, round_axis, scale_curve
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0

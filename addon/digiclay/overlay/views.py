@@ -24,8 +24,6 @@ from .picture import Dot, Picture
 from .placement import COMPACT, FULL, Room, find_room, lay_out
 from .sections import Readings
 
-__all__ = ["follow", "read_session", "redraw", "shown", "stop"]
-
 #: How often the views are drawn anew while nothing moves in them, s: the curves go on all the same.
 QUIET = 0.25
 #: The draw handler, while there is one.

@@ -5,8 +5,6 @@ from __future__ import annotations
 from ..compat import bpy
 from . import appearance, live_session, parameters, press_options, shape_exchange
 
-__all__ = ["register", "unregister"]
-
 #: In the order they are drawn, each with a `bl_order` of its own: session 10, finger 20, display 30,
 #: shapes 40, takes 50, export 60; then what is technical, device 70 and control 80.
 CLASSES: tuple[type, ...] = (

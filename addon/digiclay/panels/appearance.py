@@ -9,8 +9,6 @@ from ..device import display, form, view
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_number, is_edited
 
-__all__ = ["CLASSES", "Display"]
-
 
 class Display(Panel, bpy.types.Panel):
     """Display of the bed; a disabled item takes no time."""

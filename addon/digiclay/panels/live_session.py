@@ -12,8 +12,6 @@ from ..recorded import bake, takes
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines
 
-__all__ = ["CLASSES", "Session", "Takes", "error_line"]
-
 
 class Session(Panel, bpy.types.Panel):
     """Live sculpting."""

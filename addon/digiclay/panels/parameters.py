@@ -17,8 +17,6 @@ from ..settings.properties import part_group
 from ..ui_text import localize
 from .base import Panel, bed_of, draw_lines, is_edited
 
-__all__ = ["CLASSES", "Control", "Device", "Finger", "Presets", "Start", "section_panel"]
-
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}
 

@@ -8,8 +8,6 @@ from ..compat import bpy
 from ..press.brush import tool_settings
 from ..press.header import draw_presets
 
-__all__ = ["CLASSES", "PenOptions", "StrokeOptions"]
-
 
 class Popover:
     """Mixin of a panel that opens from the tool's header."""

@@ -8,8 +8,6 @@ from ..compat import bpy
 from ..exchange import formed_bed
 from .base import Panel, bed_of, is_edited
 
-__all__ = ["CLASSES", "LISTED", "Export", "Shapes"]
-
 #: Property of a bed that holds the list of its features; the operator that lists them writes it.
 LISTED = "digiclay_features"
 #: Lines shown of a long list.

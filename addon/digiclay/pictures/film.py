@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..bridge import SCALE
 from ..compat import bpy, scratch
+from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..core.base.unfinished import name_unfinished
 from ..core.session.frame_files import name_frame
@@ -30,9 +31,6 @@ from .film_file import encode_film, frame_folder
 from .force_plot import SHARE, draw_force_plot
 from .still import add_picture_scene, apply_style, render_picture, use_fast_settings
 
-__all__ = ["Shots", "draw_frames", "render_film", "render_turntable", "stage_film", "stage_turntable"]
-
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 #: Angles at which a turning bed's outline is looked at for the frame it needs.

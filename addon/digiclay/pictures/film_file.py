@@ -15,8 +15,6 @@ from ..core.base.unfinished import name_unfinished
 from ..core.session.render_settings import Moving
 from .still import failure_reason
 
-__all__ = ["encode_film", "frame_folder", "is_whole_film"]
-
 
 @contextmanager
 def frame_folder(out: Path) -> Iterator[Path]:

@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import bpy
+from ..core.base.arrays import Floats
 from .legend import FADED, INK, LEFT, Front
-
-__all__ = ["SHARE", "ForcePlot", "draw_force_plot", "reduce_columns"]
-
-Floats = NDArray[np.float64]
 
 #: Part of the picture's height the strip takes, and what of it is left to the letters above the curve.
 SHARE, LETTERS = 0.20, 0.30

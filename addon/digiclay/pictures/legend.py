@@ -16,8 +16,6 @@ from ..compat import bpy, shader_nodes
 from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
 
-__all__ = ["FADED", "INK", "LEFT", "Color", "Front", "flat", "write_force_legend", "write_mode_legend"]
-
 Color = tuple[float, float, float]
 
 #: sRGB of letters, and of what is less important.

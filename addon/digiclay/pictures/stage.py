@@ -7,18 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import bpy, shader_nodes
+from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device import view
 from ..device.instant import Instant
 from .legend import Front, write_force_legend, write_mode_legend
-
-__all__ = ["MARGINS", "half_frame", "outline", "set_up"]
-
-Floats = NDArray[np.float64]
 
 #: Where the camera stands, seen from the bed: angle from x and above the floor, rad.
 AZIMUTH, ELEVATION = math.radians(-62.0), math.radians(43.0)

@@ -15,11 +15,6 @@ from ..device import view
 from ..device.instant import Instant
 from . import stage
 
-__all__ = [
-    "ENGINES", "add_picture_scene", "apply_style", "failure_reason", "render_picture", "render_still",
-    "use_fast_settings",
-]  # fmt: skip
-
 #: Our names of the engines, and Blender's.
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
 #: With less than this on a disk, bytes, a picture does not fit.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.base.arrays import Floats
 from ..core.metrics.summary import find_contact_rows
 from ..core.surface.skin_mesh import find_grid_shape, make_skin, make_solid
 from .figure import INK, LINES, MM, legend_above
@@ -16,11 +17,7 @@ from .relief import ROOM, Room, fit_relief
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
 
-__all__ = ["History", "array", "draw_map", "draw_path", "draw_relief", "ends"]
-
 History = Mapping[str, ArrayLike]
-Floats = NDArray[np.float64]
-
 #: The side walls of the relief.
 CUT = "#CFCAC0"
 #: Where the light of the relief comes from, a unit vector.

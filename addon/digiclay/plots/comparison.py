@@ -9,8 +9,6 @@ import numpy as np
 
 from .figure import INK, LINES, MM, canvas, legend_above
 
-__all__ = ["comparison"]
-
 #: What is drawn: metric, title, factor.
 PANELS = (
     ("rfd_shaping", "RFD while shaping (N)", 1.0),

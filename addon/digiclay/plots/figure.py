@@ -20,8 +20,6 @@ if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["INK", "LINES", "MM", "SHADE", "STYLE", "canvas", "empty", "legend_above", "save"]
-
 MM = 1e3
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 INK, SHADE = "#222222", "#F1EEE6"

@@ -16,8 +16,6 @@ if TYPE_CHECKING:  # only named in annotations
 
     from ..core.studies.league import Row, Table
 
-__all__ = ["draw_measures", "draw_rfd"]
-
 #: Marks of the methods, which differ without their colors.
 MARKS = "osD^vP*X<>"
 #: Panels of the league: measure, title, factor.

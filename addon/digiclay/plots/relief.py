@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ROOM", "Room", "fit_relief", "hidden"]
-
 Room = tuple[float, float, float, float]
 
 #: Where the relief and all that is written on it has room, as parts of the figure: left, bottom, right, top.

@@ -17,8 +17,6 @@ if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["LETTERS", "session", "session_cells", "session_figure", "surface", "surface_figure"]
-
 #: Letter of each chosen cell, in the order in which the finger passes them.
 LETTERS = "ABCDEF"
 #: What the session's picture says in words: label, metric, factor, format.

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..core.studies.axes import Column
 from ..core.studies.evaluation import FIGURES
 from .figure import INK, LINES, canvas, save
@@ -16,10 +16,6 @@ from .figure import INK, LINES, canvas, save
 if TYPE_CHECKING:  # only named in annotations
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["picture", "read_unit", "sweep_figure"]
-
-Floats = NDArray[np.float64]
 
 #: Units people read: factor and name.
 READ: dict[str, tuple[float, str]] = {

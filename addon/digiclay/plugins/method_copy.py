@@ -10,8 +10,6 @@ from ..core.scene.schema import Scene
 from .method_loader import OwnRow
 from .method_source import MethodSource
 
-__all__ = ["CODE", "describe_origin", "find_code", "find_word", "resolve_word", "write_code"]
-
 #: The file of a method's code beside a scene file.
 CODE = "method.py"
 

@@ -11,8 +11,6 @@ from .method_loader import add_class, name_method, run_code
 from .method_rules import list_classes
 from .method_source import read_file
 
-__all__ = ["FolderMethods", "load_folder"]
-
 
 class FolderMethods(NamedTuple):
     """Methods and refused code of a folder.

@@ -23,10 +23,6 @@ from ..core.control.methods import METHODS, ControlParameters, Method, add_metho
 from .method_rules import check_class, list_classes
 from .method_source import MethodSource, read_source
 
-__all__ = [
-    "OwnRow", "add_class", "add_source", "load_method", "name_method", "restore_parameters", "run_code",
-]  # fmt: skip
-
 #: The package that this module is part of, in Blender another one than ``digiclay``.
 PACKAGE = __package__.rpartition(".")[0]
 

@@ -15,8 +15,6 @@ from ..core.control.methods import ControlParameters
 from ..core.control.own_method import OwnMethod
 from ..core.model.set_point import SetPoint
 
-__all__ = ["check_class", "list_classes"]
-
 #: Names that are no parameters: in the section [control] of a scene file, among a method's functions, and
 #: among those of Blender's properties.
 TAKEN = (

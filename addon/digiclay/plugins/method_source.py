@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 from ..core.base.errors import MethodError
 
-__all__ = ["GROUP", "MethodSource", "is_file_word", "read_source"]
-
 #: The group of entry points by which installed packages offer methods.
 GROUP = "digiclay.methods"
 #: Bytes of the largest file that is read as code.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
 from ..core.surface.pointing import find_ray, intersect_surface
@@ -17,10 +17,6 @@ from ..device import view
 from ..live import running
 from ..settings import properties
 from .occlusion import find_hider, shown_stretch
-
-__all__ = ["Target", "find_target", "find_view", "hit_point", "look_at", "project", "read_surface"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

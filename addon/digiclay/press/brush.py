@@ -10,12 +10,6 @@ from ..live import waiting
 from ..live.stroke import Brush
 from ..ui_text import localize
 
-__all__ = [
-    "ADJUSTING", "BRUSH_ITEMS", "LABELS", "OPERATOR", "PATH_ITEMS", "SYMMETRY_ITEMS", "TOOL", "amount_name",
-    "bed_in_use", "choose_brush", "describe_brush", "describe_stroke", "find_bed", "find_press",
-    "tool_settings",
-]  # fmt: skip
-
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.

@@ -10,8 +10,6 @@ from ..core.model.fingertip import Fingertip
 from ..settings import finger_size
 from . import brush
 
-__all__ = ["DEFINES", "SUBFOLDER", "preset_values", "register", "unregister"]
-
 #: Folder of the presets below ``presets``, here and in the user's own folder.
 SUBFOLDER = "digiclay_press"
 #: Names that the lines of a preset begin with.

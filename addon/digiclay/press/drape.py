@@ -6,8 +6,6 @@ import numpy as np
 
 from ..core.model.layout import Grid
 
-__all__ = ["drape"]
-
 Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 #: Standard deviation of the weights, and how far they reach, in pitches.

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 from ..core.model.fingertip import Fingertip
 
-__all__ = ["FINGERS", "FingerKind", "find_kind"]
-
 #: Semi-axes that differ by less are the same, m.
 SAME = 1e-6
 

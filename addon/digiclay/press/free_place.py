@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..device import view
 from ..ui_text import localize
 from .occlusion import find_hider, list_surfaces
-
-__all__ = ["find_free_place"]
-
-Floats = NDArray[np.float64]
 
 #: Share of the pins that may be hidden: what stands among the pins or leans over their edge is left alone.
 HIDDEN = 0.25

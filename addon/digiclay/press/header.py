@@ -10,8 +10,6 @@ from ..settings import finger_size
 from .brush import amount_name, bed_in_use
 from .fingers import find_kind
 
-__all__ = ["WIDE", "draw_header", "draw_presets"]
-
 #: Width from which on a header names brushes and popovers in full, in pixels at a resolution scale of 1.
 WIDE = 1000
 #: Widths of what it holds, in Blender's units of 20 pixels.

@@ -11,8 +11,6 @@ from ..core.base.modes import COLORS, Mode
 from ..overlay.look import Color
 from ..overlay.picture import Line, Words
 
-__all__ = ["LIGHT", "SMOOTHING", "make_label", "make_lines"]
-
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: A light line on a dark one is seen on everything.

@@ -6,13 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.base.arrays import Floats
 from ..device import view
-
-__all__ = ["find_hider", "list_surfaces", "shown_stretch"]
-
-Floats = NDArray[np.float64]
 
 #: Objects that may have a surface.
 SOLID = frozenset({"MESH", "CURVE", "SURFACE", "META", "FONT"})

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["CURVE_ITEMS", "FULL_TILT", "find_lean", "find_share"]
-
-Floats = NDArray[np.float64]
+from ..core.base.arrays import Floats
 
 #: Lean of a pen at full tilt, rad: tablets report up to some 60°.
 FULL_TILT = math.radians(60.0)

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-__all__ = ["Button", "begin_button", "read_event"]
-
 Named = tuple[str, str]
 
 PRESS, RELEASE = ("LEFTMOUSE", "PRESS"), ("LEFTMOUSE", "RELEASE")

@@ -22,8 +22,6 @@ from . import aim, header, marks
 from .brush import ADJUSTING, OPERATOR, TOOL, amount_name, describe_brush
 from .drape import drape
 
-__all__ = ["PressTool", "register", "take_up", "touch_outline", "unregister"]
-
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip, wrap_one
 from ..core.scene.assembly import assemble
@@ -23,9 +24,6 @@ from ..device.instant import pick_pose
 from ..device.roles import BAKE
 from .bake_tree import MOMENT, playback_nodes
 
-__all__ = ["BakedFrames", "apply", "frame_periods", "free", "is_baked", "sample_path", "simulate_frames"]
-
-Floats = NDArray[np.float64]
 #: Name of the modifier.
 MODIFIER = "Baked session"
 #: Frame ranges longer than this are a slip of the hand: an hour at 60 frames a second.

@@ -12,8 +12,6 @@ from ..bridge import ATTRIBUTES
 from ..compat import bpy
 from ..device.nodes import attribute, node, number, socket
 
-__all__ = ["MOMENT", "playback_nodes"]
-
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
 MOMENT = "Moment"
 

@@ -19,11 +19,6 @@ from ..core.session.take import Take, from_bytes, to_bytes
 from ..live.running import Running
 from ..ui_text import localize
 
-__all__ = [
-    "START", "Entry", "add", "find", "keep_recording", "list_takes", "read", "read_recording", "remove",
-    "simulate",
-]  # fmt: skip
-
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
 #: Most cells times control periods that are simulated while somebody waits: some seconds' worth.

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from ..core.model.layout import Layout
 
-__all__ = ["BEDS", "FIRST", "UNNAMED", "Bed"]
-
 
 @dataclass(frozen=True)
 class Bed:

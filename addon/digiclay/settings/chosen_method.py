@@ -8,8 +8,6 @@ from ..core.control.methods import METHODS, list_added
 from ..ui_text import localize
 from .declared import title
 
-__all__ = ["choose", "find_group", "list_offered", "method_of", "method_property", "name_pointer", "place_of"]
-
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
 

@@ -15,8 +15,6 @@ from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.named_shapes import SHAPES
 from .shown_units import to_shown, unit_of
 
-__all__ = ["INT_MAX", "WHOLE", "Update", "format_list", "group", "title", "whole"]
-
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
 #: How far inside a bound that is not allowed itself a property ends, as a share of the default; no nearer

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ..core.control.blister import Blister
     from ..core.control.methods import ControlParameters
 
-__all__ = ["change_finger", "change_layout", "fit_blister", "make_scene"]
-
 #: Bore of the cylinders, as a share of the pitch, where a preset's would overlap.
 BORE = 2 / 3
 

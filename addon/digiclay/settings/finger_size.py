@@ -15,8 +15,6 @@ from .devices import fit_blister
 from .shown_units import SHOWN, to_si
 from .table import assign, read
 
-__all__ = ["LARGEST", "SMALLEST", "read_finger", "read_size", "resize", "set_axis", "set_size"]
-
 #: Least and largest size, m: narrower than that a finger falls between pins, wider than that no hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
 #: Lengths of a blister.

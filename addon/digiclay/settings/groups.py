@@ -20,8 +20,6 @@ from .chosen_method import choose, list_offered, method_of, place_of
 from .declared import WHOLE, Update, group, title, whole
 from .table import assign, read, reset
 
-__all__ = ["CLASSES", "PRESET_WORDS", "SETTINGS", "method_items"]
-
 #: Sections whose parameters are the same whatever the method.
 PLAIN = tuple(section for section in SECTIONS if section != "control")
 

@@ -11,8 +11,6 @@ from ..core.scene.schema import SECTIONS, import_parameters
 from .declared import title
 from .shown_units import convert_units
 
-__all__ = ["relabel"]
-
 _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 
 

@@ -14,8 +14,6 @@ from .chosen_method import name_pointer
 from .declared import group, title
 from .groups import CONTROL
 
-__all__ = ["clear", "find_full_path", "is_full", "load", "read_present"]
-
 #: What is told of a folder whose place depends on the file that is open.
 RELATIVE = "Own Methods must be a full path (got {!r}): choose the folder again, after the .blend was saved."
 

@@ -10,8 +10,6 @@ from ..core.base.errors import OutputError
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, format_scene
 
-__all__ = ["folder", "names", "path", "remove", "save"]
-
 #: Longest name, so that the file's stays within what file systems take.
 LONGEST = 60
 #: What no file's name can have on one system or another.

@@ -22,11 +22,6 @@ from .groups import CLASSES, SETTINGS
 from .messages import relabel
 from .table import Notes, read, write
 
-__all__ = [
-    "StoredSettings", "find_layout_mismatch", "part_group", "read_scene", "read_stored_settings",
-    "rebuild_reason", "register", "scene_of", "table_of", "unregister", "write_scene",
-]  # fmt: skip
-
 #: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
 #: a bed of meters, less than any change of pitch worth making.
 AWAY = 1e-6

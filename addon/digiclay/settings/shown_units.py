@@ -6,8 +6,6 @@ import math
 import re
 from decimal import Decimal
 
-__all__ = ["SHOWN", "convert_units", "to_shown", "to_si", "unit_of"]
-
 #: The unit shown for an SI unit, and the power of ten between them: 1 m is 10³ mm.
 SHOWN: dict[str, tuple[str, int]] = {
     "m": ("mm", 3),

@@ -15,8 +15,6 @@ from ..core.base.quantity import Parameters
 from .declared import INT_MAX, format_list
 from .shown_units import to_shown, to_si, unit_of
 
-__all__ = ["Notes", "assign", "read", "reset", "write"]
-
 #: What a property was written as, and the value that stands for; by the parameter's name.
 Notes = dict[str, tuple[Any, Any]]
 

@@ -17,8 +17,6 @@ from ..press.tool import PressTool
 from ..settings import groups
 from ..settings.declared import title
 
-__all__ = ["collect_strings", "make_entries", "register", "translate", "unregister"]
-
 #: Beginning of the names of the extension's modules.
 EXTENSION = __package__.rpartition(".")[0]
 #: Languages that have a catalog.

@@ -9,8 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["find_missing", "pen_screen"]
-
 HERE = Path(__file__).parent
 #: The X server itself: Debian's /usr/bin/Xorg asks who starts it.
 SERVERS = ("/usr/lib/xorg/Xorg", "/usr/libexec/Xorg")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import ipaddress
 
-__all__ = ["describe_exposure", "is_loopback"]
-
 
 def is_loopback(host: str) -> bool:
     """Return whether a host is this machine, reached by nobody else; other names are not looked up."""

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MOST_SHAPES", "Constants", "any_true", "apply_map", "count_true", "per_row", "prepare_map"]
-
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+#: Numbers of cells.
+Cells = NDArray[np.intp]
 
 #: Shapes for which one set of `Constants` is kept.
 MOST_SHAPES = 64

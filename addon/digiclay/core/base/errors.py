@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "BusyError", "DigiclayError", "DivergenceError", "MethodError", "OutputError", "ParameterError",
-    "SceneError", "StateError", "one_line",
-]  # fmt: skip
-
 #: Characters of a line that are shown: its beginning, which says what is wrong, and its end, which helps.
 BEGINNING, END = 300, 160
 

@@ -14,8 +14,6 @@ from typing import Any, TypeVar
 from .errors import BusyError
 from .processes import find_host, may_have_made
 
-__all__ = ["hold_lock", "hold_record"]
-
 #: Seconds between two attempts.
 PAUSE = 0.05
 #: A record without a name is one that is being written, unless it is older than this, s.

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["COLORS", "MEANINGS", "Mode"]
-
 
 class Mode(IntEnum):
     """Control mode of a cell; stored as ``int8``."""

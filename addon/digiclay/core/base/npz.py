@@ -15,8 +15,6 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BROKEN_ZIP", "Head", "map_array", "read_array", "read_heads"]
-
 #: All that is raised over a zip that is damaged.
 BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError)
 #: All that numpy's readers raise over a head that makes no sense.

@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 from .errors import ParameterError
 from .quantity import Parameters, find_nearest_name, list_quantities, parse
 
-__all__ = ["ReadParts", "read_part", "refuse_unknown", "shorten", "show_value"]
-
 Table = Mapping[str, Any]
 Part = TypeVar("Part", bound=Parameters)
 

@@ -6,8 +6,6 @@ import re
 import struct
 from pathlib import Path
 
-__all__ = ["read_size"]
-
 #: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
 HEAD = 1 << 20
 #: Segments of a JPEG that tell its size.

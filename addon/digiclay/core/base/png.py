@@ -8,8 +8,6 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["encode_png", "is_whole_picture"]
-
 
 def encode_png(pixels: NDArray[np.uint8]) -> bytes:
     """Return the file of a picture.

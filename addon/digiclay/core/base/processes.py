@@ -12,8 +12,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-__all__ = ["find_host", "find_start", "may_have_made"]
-
 #: Clocks of a machine and of the drive it writes to differ by less than this, s.
 CLOCKS_DIFFER = 60.0
 #: Seconds from 1601, where Windows begins to count, to 1970.

@@ -16,11 +16,6 @@ from typing import Any
 
 from .errors import DigiclayError, ParameterError
 
-__all__ = [
-    "EXTENTS", "UNITS", "Parameters", "Quantity", "find_nearest_name", "list_quantities", "parse", "quantity",
-    "refuse_overrides",
-]  # fmt: skip
-
 #: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
 UNITS: dict[str, tuple[float, str]] = {
     "m": (1.0, "m"), "cm": (1e-2, "m"), "mm": (1e-3, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"),

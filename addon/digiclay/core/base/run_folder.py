@@ -13,11 +13,6 @@ from .errors import OutputError
 from .file_lock import hold_lock
 from .unfinished import name_unfinished, remove_abandoned
 
-__all__ = [
-    "MARK", "Claim", "Content", "check_folder", "claim_files", "claim_folder", "describe_claim", "find_lock",
-    "lock_name", "resolve_inside", "write_folder",
-]  # fmt: skip
-
 #: The file by which a folder is known as a run's.
 MARK = "metrics.json"
 

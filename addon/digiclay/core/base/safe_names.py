@@ -9,8 +9,6 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["find_name", "fold_name", "make_safe_name", "make_unique_names"]
-
 #: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
 LONGEST = 120
 #: Names that stand for devices in Windows, whatever follows behind a full stop.

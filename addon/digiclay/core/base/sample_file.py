@@ -9,8 +9,6 @@ from pathlib import Path
 from .errors import SceneError
 from .quantity import find_nearest_name
 
-__all__ = ["find_file", "list_files"]
-
 
 def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
     """Return the samples of a folder by their names: its files that end with one of `kinds`.

@@ -8,11 +8,8 @@ SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is that of a parabola, l
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["compute_inner_slopes", "interpolate_monotone"]
-
-Floats = NDArray[np.float64]
+from .arrays import Floats
 
 
 def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:

@@ -7,8 +7,6 @@ import re
 import tomllib
 from typing import Any
 
-__all__ = ["LARGEST", "format_value", "parse_tables"]
-
 #: Most bytes of a text: the heights of the largest bed, 20 million cells, packed, take 107 MB of them.
 LARGEST = 128_000_000
 #: Most names of a dotted key, each of which is kept with all before it; most letters of a word or a number.

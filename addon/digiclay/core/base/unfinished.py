@@ -10,8 +10,6 @@ from pathlib import Path
 
 from .processes import find_host, may_have_made
 
-__all__ = ["is_unfinished", "name_unfinished", "remove_abandoned"]
-
 #: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
 UNFINISHED = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)")
 

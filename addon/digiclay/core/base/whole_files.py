@@ -11,8 +11,6 @@ from typing import Any, BinaryIO
 from .errors import OutputError
 from .unfinished import name_unfinished
 
-__all__ = ["format_json", "open_whole", "read_json", "write_whole"]
-
 
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file whole or not at all: to a temporary name beside it, then renamed.

@@ -16,8 +16,6 @@ from ..engine.system import System
 from .broadcasting import list_numbers
 from .finger_paths import Fingers
 
-__all__ = ["Batch", "advance", "begin", "find_diverged", "make_divergence_error", "select_runs"]
-
 
 @dataclass(frozen=True, eq=False)
 class Batch(System):

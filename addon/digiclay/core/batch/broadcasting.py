@@ -8,12 +8,10 @@ from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["Floats", "classify", "list_numbers", "merge_parts"]
+from ..base.arrays import Floats
 
 Part = TypeVar("Part")
-Floats = NDArray[np.float64]
 
 
 def classify(value: Any) -> Any:

@@ -9,18 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import apply_map
+from ..base.arrays import Floats, apply_map
 from ..engine.system import System
 from ..model.fingertip import join_surfaces
 from ..model.layout import Grid
 from ..model.touch import trace_finger
 from ..model.trajectory import Trajectory
-from .broadcasting import Floats
-
-__all__ = [
-    "Fingers", "FingersPeriod", "SampledPath", "compute_undersides", "extend_fingers", "make_fingers",
-    "make_path",
-]  # fmt: skip
 
 #: Control periods that are worked out at a time.
 CHUNK = 256

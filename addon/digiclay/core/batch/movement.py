@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arrays import Floats
 from ..model.interfaces import Movement, Stepper
-from .broadcasting import Floats
-
-__all__ = ["BatchMovement", "BatchStepper"]
 
 #: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
 #: on one core (waking a second one takes longer than the product).

@@ -18,8 +18,6 @@ from .movement import BatchStepper
 from .padding import OwnSelection, PaddedSelection
 from .run_by_run import join_controllers
 
-__all__ = ["Findings", "describe_structure", "make_batch"]
-
 #: The steppers that know how to move cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
 

@@ -10,17 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Flags, Floats
 from ..engine.active_set import KEPT, Selection
 from ..engine.state import ActiveSet, State
 from ..model.layout import Grid
-from .broadcasting import Floats
 
-__all__ = ["NO_DISC", "OwnSelection", "PaddedSelection", "compute_reach", "join_discs"]
-
-Flags = NDArray[np.bool_]
-Cells = NDArray[np.intp]
 #: A disc of every bed: x, y and radius, (b,) each, m; a radius below 0 means no cells.
 Disc = tuple[Floats, Floats, Floats]
 NO_DISC: Disc = (np.zeros(1), np.zeros(1), np.full(1, -1.0))

@@ -19,8 +19,6 @@ from .advance import Batch, advance, begin, find_diverged, select_runs
 from .finger_paths import Fingers, extend_fingers
 from .packing import make_batch
 
-__all__ = ["Instant", "Play", "begin_play", "keep_runs", "locate_fingers", "play_all"]
-
 
 @dataclass(frozen=True, eq=False)
 class Play:

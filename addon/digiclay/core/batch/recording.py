@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.modes import Mode
 from ..engine.state import ActiveSet
 from ..metrics.finger_path import CellSums
@@ -15,11 +16,8 @@ from ..metrics.summary import compute_metrics_from_sums
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.run_result import Result, evaluate, report
-from .broadcasting import Floats
 from .finger_paths import SampledPath, make_path
 from .play import Instant, Play
-
-__all__ = ["Histories", "Sums"]
 
 #: A plain number: numpy compares with it ten times as fast.
 FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)

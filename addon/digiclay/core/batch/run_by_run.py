@@ -17,8 +17,6 @@ from ..model.control_interface import Commands, Controller, Measurement
 from ..model.null_parts import Uncontrolled
 from .broadcasting import merge_parts
 
-__all__ = ["RunByRun", "join_controllers"]
-
 
 @dataclass(frozen=True, eq=False)
 class RunByRun:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..base.arrays import Floats
 from ..base.errors import DigiclayError
 from ..engine.simulation import repeat_period
 from ..engine.system import System
@@ -18,11 +19,8 @@ from ..session.accuracy import Errors, compare, has_every_command, make_referenc
 from ..session.memory_limit import check_memory
 from ..session.run_result import Result
 from .advance import make_divergence_error
-from .broadcasting import Floats
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, play_all
 from .recording import Histories, Sums
-
-__all__ = ["measure_together", "run_together"]
 
 Outcome = Result | DigiclayError
 

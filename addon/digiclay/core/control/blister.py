@@ -7,15 +7,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-
-__all__ = ["Blister"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Flags, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import ON_THE_SIDE
 from .blister import Blister
 from .travel import ABEAM, measure_offsets
-
-__all__ = ["BlisterCells", "BlisterRule"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 #: Share of the radius of the flat top within which no cell freezes when the blister sinks into uneven ground.
 HELD = 0.4

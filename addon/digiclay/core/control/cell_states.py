@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true
+from ..base.arrays import Floats, any_true
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -28,9 +28,6 @@ from .servo import Tracking, lock_overloaded
 from .transitions import BY_FORCE, BY_PLACE, follow_arrows
 from .travel import ABEAM, Heading, measure_lead, measure_square, update_heading
 
-__all__ = ["CellStates", "CellStatesControl", "Patch", "build"]
-
-Floats = NDArray[np.float64]
 Modes = NDArray[np.int8]
 
 

@@ -12,16 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.layout import Grid
 from ..model.physics import Cell
 from .blister import Blister
-
-__all__ = ["DeviceInfo", "check_floor", "suppress_noise"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
@@ -21,19 +21,6 @@ from ..model.physics import Cell
 from .methods import ControlParameters
 from .runs import BatchControl
 from .servo import declare_dead_band, lock_overloaded
-
-__all__ = [
-    "CellwiseControl",
-    "Drive",
-    "DriveParameters",
-    "TouchParameters",
-    "check_damping",
-    "find_free_speeds",
-    "make_drive",
-    "raise_felt_force",
-]
-
-Floats = NDArray[np.float64]
 
 #: Openings at which the speed is worked out; in between it is interpolated.
 OPENINGS = np.linspace(0.0, 1.0, 129)

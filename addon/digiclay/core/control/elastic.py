@@ -6,17 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
-
-__all__ = ["Elastic", "ElasticControl", "build"]
-
-Floats = NDArray[np.float64]
 
 #: Share of the felt force down to which a touched cell stays touched: its spring may press no harder.
 STILL = 0.2

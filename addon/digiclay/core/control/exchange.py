@@ -6,14 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Floats
 from ..model.layout import Grid
-
-__all__ = ["Exchange", "make_exchange"]
-
-Floats = NDArray[np.float64]
-Cells = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

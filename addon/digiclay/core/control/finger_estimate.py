@@ -14,14 +14,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.fingertip import Fingertip
 from .level_fingertip import LevelFingertip, Place, Slopes
-
-__all__ = ["Estimate", "FingerFilter", "Spread", "invert_six"]
-
-Floats = NDArray[np.float64]
 
 #: Places in the state of what an underside depends on, in the order of `Slopes`: size, x, y, turn, z.
 SEEN = np.array([6, 0, 1, 7, 8, 2])

@@ -12,16 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Floats
 from ..model.delay import Queue
 from ..model.physics import Cell
 from .drive import OPENINGS, find_free_speeds
-
-__all__ = ["FlowServo", "make_flow_servo"]
-
-Floats = NDArray[np.float64]
 
 #: Instants of a control period at which the lag of the valve is looked at.
 INSTANTS = 64

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -16,10 +16,6 @@ from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
 from .named_shapes import FILE, check_shape, evaluate_shape, read_values
 from .runs import take_cells
-
-__all__ = ["ForceDisplay", "ForceDisplayControl", "build"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

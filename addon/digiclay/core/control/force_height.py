@@ -9,13 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .pulp_estimate import PulpEstimate
-
-__all__ = ["Reach", "find_top", "form_heights", "lead_heights"]
-
-Floats = NDArray[np.float64]
 
 #: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a level bed.
 SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])

@@ -19,18 +19,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Flags, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from .blister import Blister
 from .runs import sum_weighted
-
-__all__ = ["GROUNDS", "EdgeGround", "OwnGround"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 
 #: Least weight of a cell in the ground under the finger, N: a blister that nobody touches has a ground, too.
 UNTOUCHED = 1e-9

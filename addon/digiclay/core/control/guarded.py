@@ -16,8 +16,6 @@ from ..base.errors import DigiclayError, MethodError
 from ..model.control_interface import Commands, Controller, Measurement
 from .own_method import check_array, check_modes, take_results
 
-__all__ = ["MOST_PERIODS", "MOST_ROWS", "Guarded", "Pace", "describe_failure", "guard"]
-
 #: Control periods that the calls of one control period may take on average, in processor time; and how many
 #: calls an average is taken over. A built-in method takes a tenth of one.
 MOST_PERIODS, CALLS = 20.0, 20

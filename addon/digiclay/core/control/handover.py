@@ -5,18 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..base.arrays import Floats
 from ..model.control_interface import Commands, Controller, Measurement
 from ..shapes.request import Shape
 from .device_info import DeviceInfo
 from .drive import DriveParameters
 from .shape_display import Progress, ShapeDisplay, ShapeDisplayControl, build
-
-__all__ = ["Handed", "Handover", "make_handover"]
-
-Floats = NDArray[np.float64]
 
 
 class Handed(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Floats
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import enclose_discs
 from .blister import Blister
@@ -28,10 +28,6 @@ from .master_memory import LossRule, Master, Phase
 from .pulp_estimate import PulpEstimate
 from .travel import Heading, update_heading
 from .virtual_master import VirtualMasterControl
-
-__all__ = ["HybridControl"]
-
-Floats = NDArray[np.float64]
 
 #: Share of the set point within which the force counts as held: then the trim learns; it is at most as large.
 LEARNED = 0.5

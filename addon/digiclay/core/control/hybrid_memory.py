@@ -10,8 +10,6 @@ from .finger_estimate import STATES, Estimate
 from .master_memory import Master, Phase
 from .travel import Heading
 
-__all__ = ["Follower"]
-
 
 class Follower(NamedTuple):
     """Memory of the controller.

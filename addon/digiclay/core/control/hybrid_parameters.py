@@ -9,8 +9,6 @@ from ..model.set_point import SetPoint
 from .methods import ControlParameters
 from .servo import declare_dead_band
 
-__all__ = ["Hybrid"]
-
 
 @dataclass(frozen=True)
 class Hybrid(ControlParameters):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["OWN_ROWS", "OwnRows", "number_rows"]
-
 #: Rows of a cell but for its filters and the speeds asked for.
 OWN_ROWS = 6
 

@@ -9,11 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["LeadProfile"]
-
-Floats = NDArray[np.float64]
+from ..base.arrays import Floats
 
 #: A finger slower than this has no direction, m/s.
 SLOWEST = 1e-3

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import any_true, count_true
+from ..base.arrays import Floats, any_true, count_true
 from ..base.modes import Mode
 from ..model.control_interface import Measurement
 from ..model.layout import Disc, enclose_discs
@@ -19,10 +19,6 @@ from .ground import EdgeGround
 from .hybrid_memory import Follower
 from .lead_profile import LeadProfile
 from .master_memory import Phase
-
-__all__ = ["LedBlister", "Region"]
-
-Floats = NDArray[np.float64]
 
 #: Surface from which the blister rises.
 GROUND = EdgeGround()

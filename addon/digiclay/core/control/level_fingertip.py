@@ -15,13 +15,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.fingertip import LEVEL, Fingertip, compute_forms, join_surfaces
 
-__all__ = ["LevelFingertip", "Place", "Slopes"]
-
-Floats = NDArray[np.float64]
 #: Coefficients of 1, x, y, x², x y, y².
 Form = tuple[float, float, float, float, float, float]
 

@@ -10,8 +10,6 @@ from ..model.delay import Queue
 from ..model.interfaces import Flow
 from ..model.physics import GAUSS, Cell
 
-__all__ = ["MasterCell", "make_master_cell"]
-
 
 @dataclass(frozen=True)
 class MasterCell:

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 from .travel import Heading
 
-__all__ = ["LossRule", "Master", "Phase"]
-
 
 class Phase(IntEnum):
     """Phase of the master."""

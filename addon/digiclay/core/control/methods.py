@@ -15,11 +15,6 @@ from ..base.part_table import show_value
 from ..base.quantity import Parameters, find_nearest_name
 from ..model.set_point import SetPoint
 
-__all__ = [
-    "METHODS", "ControlParameters", "Method", "add_method", "find_method", "list_added", "list_methods",
-    "remove_method",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class ControlParameters(Parameters):

@@ -7,15 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.npz import map_array
 from ..model.layout import Grid
-
-__all__ = ["FILE", "SHAPES", "check_shape", "evaluate_shape", "read_values"]
-
-Floats = NDArray[np.float64]
 
 #: How the name of a file of values ends.
 FILE = ".npy"

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.control_interface import Commands, Controller, Measurement
@@ -25,8 +26,6 @@ __all__ = [
     "Cells", "DeviceInfo", "Mode", "Orders", "OwnControl", "OwnMethod", "check_array", "check_modes",
     "quantity", "show_cells", "take_results",
 ]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: The highest code of a mode; the lowest is 0.
 HIGHEST = int(max(Mode))

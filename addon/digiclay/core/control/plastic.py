@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
 from ..base.modes import Mode
@@ -14,10 +13,6 @@ from ..base.quantity import quantity
 from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, TouchParameters, check_damping, make_drive, raise_felt_force
-
-__all__ = ["Plastic", "PlasticControl", "build"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

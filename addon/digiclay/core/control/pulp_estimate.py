@@ -14,12 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.touch import Touch
-
-__all__ = ["PulpEstimate", "Span"]
-
-Floats = NDArray[np.float64]
-
 
 #: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N. At
 #: 1 mN cells at the rim are taken whose undersides are known less exactly, and tilted fingertips are lost.

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -22,10 +23,6 @@ from ..model.layout import ON_THE_SIDE
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
 from .travel import measure_square
-
-__all__ = ["Listening", "PushPull", "PushPullControl", "build"]
-
-Floats = NDArray[np.float64]
 
 #: Control periods of a cycle: up, then down.
 CYCLE = 2

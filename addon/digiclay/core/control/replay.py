@@ -6,14 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Grid
-
-__all__ = ["Replay"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BatchControl", "decide_by_any", "decide_by_run", "gather_by_run", "sum_weighted", "take_cells"]
-
-Floats = NDArray[np.float64]
+from ..base.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)

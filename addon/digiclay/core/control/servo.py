@@ -7,15 +7,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants, any_true
+from ..base.arrays import Constants, Floats, any_true
 from ..base.quantity import quantity
 from .methods import ControlParameters
-
-__all__ = ["Tracking", "declare_dead_band", "lock_overloaded"]
-
-Floats = NDArray[np.float64]
 
 
 def declare_dead_band(default: float = 10e-6) -> Any:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
@@ -18,10 +18,6 @@ from ..model.layout import Grid
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
 from .named_shapes import FILE, check_shape, evaluate_shape, read_values
-
-__all__ = ["Move", "Progress", "ShapeDisplay", "ShapeDisplayControl", "build"]
-
-Floats = NDArray[np.float64]
 
 
 class Move(NamedTuple):

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.modes import Mode
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement
@@ -30,10 +30,6 @@ from ..model.physics import Cell
 from .drive import Drive, DriveParameters, make_drive
 from .exchange import Exchange, make_exchange
 from .travel import measure_square
-
-__all__ = ["ORDER", "SmoothingControl", "find_fault", "order_periods"]
-
-Floats = NDArray[np.float64]
 
 #: Numbers of an order.
 ORDER = 4

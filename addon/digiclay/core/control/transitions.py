@@ -11,13 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Flags
 from ..base.modes import Mode
 
-__all__ = ["BY_FORCE", "BY_PLACE", "Arrow", "follow_arrows"]
-
 Modes = NDArray[np.int8]
-Flags = NDArray[np.bool_]
-
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
 

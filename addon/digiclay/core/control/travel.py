@@ -10,19 +10,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = [
-    "ABEAM",
-    "Heading",
-    "measure_excess",
-    "measure_lead",
-    "measure_offsets",
-    "measure_square",
-    "update_heading",
-]
-
-Floats = NDArray[np.float64]
+from ..base.arrays import Floats
 
 #: A cell no farther behind than this is abeam, and counts as ahead, m: cells lie in rows that a finger
 #: may cross at a right angle, and rounding must not decide on them.

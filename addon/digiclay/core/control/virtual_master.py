@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Constants, any_true, count_true
+from ..base.arrays import Constants, Floats, any_true, count_true
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import ON_THE_SIDE
 from .blister_cells import BlisterRule
@@ -30,8 +30,6 @@ from .servo import lock_overloaded
 from .travel import measure_excess
 
 __all__ = ["Master", "Phase", "VirtualMaster", "VirtualMasterBatch", "VirtualMasterControl", "build"]
-
-Floats = NDArray[np.float64]
 
 #: Share of the total force that the cell in the middle of the finger carries while shaping, at least: 0.23
 #: to 0.33 of it measured while the finger moves slowly.

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Floats
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
@@ -19,11 +20,6 @@ from ..model.control_interface import Commands, Measurement
 from .device_info import DeviceInfo
 from .drive import Drive, TouchParameters, check_damping, make_drive, raise_felt_force
 from .exchange import Exchange, make_exchange
-
-__all__ = ["Spot", "Viscous", "ViscousControl", "build"]
-
-Floats = NDArray[np.float64]
-Cells = NDArray[np.intp]
 
 #: Displacement below which the border of the displaced region is of no interest, in dead bands.
 BORDER = 0.1

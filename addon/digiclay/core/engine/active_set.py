@@ -15,15 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Cells
 from ..base.modes import Mode
 from ..model.layout import ON_THE_SIDE, Disc, Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod, Window, find_reached_disc
 from .state import ActiveSet, Rows, State
-
-__all__ = ["KEPT", "Selection"]
-
-Cells = NDArray[np.intp]
 
 #: Control periods after which the set is made anew, without the cells that have come to rest.
 KEPT = 32

@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import DivergenceError
 from ..model.fingertip import require_one
 from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
 from .state import State, make_initial_state
 from .system import System
-
-__all__ = ["advance", "begin", "periods", "repeat_period", "step", "trace_fingers"]
-
-Floats = NDArray[np.float64]
 
 #: Control periods whose finger poses are worked out at a time.
 CHUNK = 256

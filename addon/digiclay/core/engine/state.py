@@ -15,14 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
 from ..model.interfaces import Movement
-
-__all__ = ["ActiveSet", "Rows", "State", "make_initial_state"]
-
-Floats = NDArray[np.float64]
-Cells = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

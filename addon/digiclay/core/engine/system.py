@@ -7,18 +7,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.control_interface import Controller
 from ..model.interfaces import Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
 from .active_set import Selection
 from .state import ActiveSet, Rows
-
-__all__ = ["System", "make_segments"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,9 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
-
-__all__ = ["AXES", "UP", "find_axes", "find_forward", "make_axes"]
-
-Floats = NDArray[np.float64]
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 #: Upward axis of Blender's exporter and importer; the forward one to it is -z.

@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
-from ..surface.body import NO_PIN, Body, Floats, Indices
+from ..surface.body import NO_PIN, Body, Indices
 from ..surface.features import Feature, Finding, find
 from ..surface.formed import Formed
 from ..surface.pins_solid import make_pins_solid
 from ..surface.skin_grid import SurfaceGrid, fit_skin
 from ..surface.skin_mesh import BASE_THICKNESS, find_base_level, make_solid
 from ..surface.skins import SKINS
-
-__all__ = ["KINDS", "Model", "find_features", "make_bodies", "make_feature_solid", "make_skin_grid"]
 
 #: Kinds of mesh, by name, with what is said of them in the help.
 KINDS: dict[str, str] = {

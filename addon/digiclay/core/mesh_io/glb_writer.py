@@ -9,10 +9,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import OutputError
-from ..surface.body import Body, Floats, split_pieces
-
-__all__ = ["write"]
+from ..surface.body import Body, split_pieces
 
 FLOAT, UNSIGNED = 5126, 5125
 VERTICES, INDICES = 34962, 34963

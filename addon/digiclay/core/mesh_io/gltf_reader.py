@@ -19,13 +19,11 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from .mesh_limits import make_refusal, refuse_many_triangles, refuse_size
 from .placed_meshes import IDENTITY, join_meshes, nest_placement
 
-__all__ = ["read"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 UNREADABLE = "must be a glTF 2.0 file that can be read"

@@ -6,8 +6,6 @@ import re
 
 from .mesh_limits import make_refusal, refuse_many_triangles
 
-__all__ = ["check_off", "check_ply", "check_stl", "stl_is_text"]
-
 WHOLE = "must be whole: the file is cut off"
 #: Bytes of a number of a PLY file.
 SIZES = {

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..base.errors import ParameterError
 
-__all__ = ["MOST_BYTES", "MOST_TRIANGLES", "make_refusal", "refuse_many_triangles", "refuse_size"]
-
 #: Most triangles of a mesh: as many as a bed may have cells. They take some 5 GB while they are laid onto it.
 MOST_TRIANGLES = 20_000_000
 #: Most bytes of a mesh's file, or of what a compressed one unpacks to.

@@ -13,15 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from . import gltf_reader, obj_reader, threemf_reader
 from .axes import find_axes, make_axes
 from .head_checks import check_off, check_ply, check_stl, stl_is_text
 from .mesh_limits import refuse_size
 
-__all__ = ["MESHES", "Read", "find_library", "read"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 #: Meshes by extension.

@@ -13,8 +13,6 @@ from ..surface.body import Body
 from . import glb_writer, obj_writer, ply_writer, stl_writer, threemf_writer
 from .axes import UP, make_axes
 
-__all__ = ["FORMATS", "UNITS", "find_format", "find_suffix", "write"]
-
 #: File formats, by name, with what is said of them in the help.
 FORMATS: dict[str, str] = {
     "stl": "STL, binary",

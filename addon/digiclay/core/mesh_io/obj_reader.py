@@ -13,11 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .mesh_limits import make_refusal, refuse_many_triangles
 
-__all__ = ["read"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 UNREADABLE = "must be an OBJ file that can be read"

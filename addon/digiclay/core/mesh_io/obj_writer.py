@@ -10,8 +10,6 @@ import numpy as np
 from ..surface.body import Body, Indices, split_pieces
 from .axes import UP, find_forward, make_axes
 
-__all__ = ["write"]
-
 
 def write(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = "") -> None:
     """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first."""

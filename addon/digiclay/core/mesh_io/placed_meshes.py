@@ -7,11 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .mesh_limits import make_refusal
 
-__all__ = ["IDENTITY", "join_meshes", "nest_placement"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 #: A placement (4, 3): (x, y, z, 1) times it gives the place. This one leaves all where it is.

@@ -9,8 +9,6 @@ import numpy as np
 
 from ..surface.body import NO_PIN, Body, split_pieces
 
-__all__ = ["write"]
-
 #: Modes are whole numbers of the common size, because some readers know no smaller one.
 VERTEX = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("height", "<f4"), ("force", "<f4"), ("mode", "<i4")]

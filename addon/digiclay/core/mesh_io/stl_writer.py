@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from ..surface.body import Body, split_pieces
 
-__all__ = ["write_ascii", "write_binary"]
-
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
 TEXT = "facet normal {:.6e} {:.6e} {:.6e}\nouter loop\n" + 3 * "vertex {:.9g} {:.9g} {:.9g}\n"

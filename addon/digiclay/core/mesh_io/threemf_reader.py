@@ -18,13 +18,11 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.npz import BROKEN_ZIP
 from .mesh_limits import make_refusal, refuse_many_triangles, refuse_size
 from .placed_meshes import IDENTITY, join_meshes, nest_placement
 
-__all__ = ["UNITS", "read"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Key = tuple[str, str]
 #: An object's part and number, and its placement (4, 3).

@@ -8,8 +8,6 @@ from typing import IO, BinaryIO
 
 from ..surface.body import Body, split_pieces
 
-__all__ = ["write"]
-
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006"
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -8,14 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Floats
 from ..base.modes import Mode
 
-__all__ = [
-    "AWAY", "CellSums", "find_contact_rows", "measure_lag", "measure_ridge_errors", "measure_surface_under",
-    "sum_cells",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: How far the finger must have gone on from a cell for it to count as left behind, m.

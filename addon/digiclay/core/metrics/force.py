@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..base.arrays import Floats
 from .finger_path import Rows, find_contact_rows
 from .signal import compute_mean, compute_weights, measure_overshoot, measure_settling_time
-
-__all__ = [
-    "BAND", "compute_contact_loss_share", "compute_rfd", "find_contact_ends", "find_first_touch",
-    "measure_touchdown",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: Settled is a force this near to its set point, as a share of it.
 BAND = 0.1

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 
 from ..base.errors import ParameterError
 
-__all__ = ["PERCEPTION", "SPATIAL_RESOLUTION", "Perceived", "find_weber_fractions", "perceive"]
-
 #: Force from which on the smaller Weber fractions hold, N.
 BORDER = 0.5
 #: Smallest and largest Weber fraction of forces from `BORDER` on, and of smaller ones.

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "WINDOW", "compute_deviation", "compute_mean", "compute_weights", "find_stretches", "measure_amplitude",
-    "measure_frequency", "measure_oscillation", "measure_overshoot", "measure_settling_time",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
+from ..base.arrays import Floats
 
 #: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f Hz is
 #: 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of it at 4 Hz; a

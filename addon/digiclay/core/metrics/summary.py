@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.set_point import SetPoint, find_set_point
 from ..surface.skin_mesh import find_grid_shape
@@ -40,8 +41,6 @@ __all__ = [
     "find_first_touch",
     "measure_lag",
 ]
-
-Floats = NDArray[np.float64]
 
 #: All cells.
 ALL = slice(None)

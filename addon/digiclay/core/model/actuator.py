@@ -6,14 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-
-__all__ = ["Actuator"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

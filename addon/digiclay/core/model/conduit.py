@@ -7,15 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from .fluid import Fluid
 from .valve import Orifice
-
-__all__ = ["Conduit", "OrificeAndConduit", "connect_in_series"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

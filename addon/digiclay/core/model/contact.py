@@ -7,14 +7,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
-
-__all__ = ["Contact", "ExponentialLaw"]
-
-Floats = NDArray[np.float64]
 
 #: Beyond this exponent the spring is stiffer than anything physical; the cut keeps even its square finite.
 LARGEST_EXPONENT = 300.0

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Commands", "Controller", "Measurement"]
+from ..base.arrays import Floats
 
-Floats = NDArray[np.float64]
 NONE: Floats = np.empty(0)
 
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["Delay", "Queue", "split_delay"]
-
 
 @dataclass(frozen=True)
 class Delay(Parameters):

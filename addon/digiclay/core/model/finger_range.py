@@ -6,13 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .fingertip import Fingertip, compute_forms, compute_underside
-
-__all__ = ["MOST_FORCE", "MOST_INDENTATION", "describe_excess", "find_indentations", "is_beyond"]
-
-Floats = NDArray[np.float64]
 
 #: Total force up to which the law and its relaxation were measured, N: Pawluk and Howe, Dynamic contact of
 #: the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611 (1999): 0 to 2 N.

@@ -14,24 +14,11 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = [
-    "LEVEL",
-    "Fingertip",
-    "compute_forms",
-    "compute_reach",
-    "compute_reaches",
-    "compute_underside",
-    "make_matrices",
-    "require_one",
-    "wrap_one",
-]
-
-Floats = NDArray[np.float64]
 Item = TypeVar("Item")
 
 #: Squared reduced radius at which the paraboloid takes over.

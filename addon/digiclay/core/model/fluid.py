@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["Fluid"]
-
 
 @dataclass(frozen=True)
 class Fluid(Parameters):

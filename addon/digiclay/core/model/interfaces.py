@@ -13,21 +13,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .control_interface import Measurement
 from .delay import Queue
 
-__all__ = [
-    "Flow",
-    "Lag",
-    "Movement",
-    "Pulp",
-    "Segment",
-    "Sensors",
-    "Stepper",
-    "Truth",
-]
-
-Floats = NDArray[np.float64]
 #: Moves a block of cells on by one control period, in place. It takes the underside of the finger over the
 #: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
 #: the cells of b runs all arrays have one axis more, the last.

@@ -7,14 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from .delay import Queue
-
-__all__ = ["ValveLag"]
-
-Floats = NDArray[np.float64]
 
 #: A valve on its way shut and this little open counts as shut: it can let through no more than
 #: 1e-18 of a cell's free speed, and a cell with a shut valve need not be integrated.

@@ -15,8 +15,6 @@ from typing import Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["LAWS", "law_parameters", "select_law"]
-
 #: By section: a law's name, the module within the core, and the class of its parameters there. The first is
 #: the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact law is a
 #: `contact.ExponentialLaw`. Scene files have the keys of the selected law alone.

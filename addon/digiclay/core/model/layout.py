@@ -8,18 +8,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = [
-    "ARRANGEMENTS", "ON_THE_SIDE", "Bounds", "Disc", "Grid", "Layout", "enclose_discs", "find_neighbors",
-    "list_steps", "make_grid",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
-Cells = NDArray[np.intp]
 #: First row, last row, first column, last column.
 Bounds = tuple[int, int, int, int]
 #: Center x, y and radius, m.

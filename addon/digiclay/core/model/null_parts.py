@@ -7,15 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .control_interface import Commands, Measurement
 from .delay import Queue
 from .interfaces import Sensors, Truth
-
-__all__ = ["InstantValve", "PerfectSensors", "Uncontrolled", "Unrelaxed"]
-
-Floats = NDArray[np.float64]
 
 
 class InstantValve:

@@ -6,16 +6,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import apply_map
+from ..base.arrays import Floats, apply_map
 from .delay import Queue
 from .interfaces import Sensors, Truth
 from .physics import Cell
-
-__all__ = ["SHUT", "ValveObserver", "make_valve_observer"]
-
-Floats = NDArray[np.float64]
 
 #: Root mean square opening in a control period below which a valve counts as shut: through it
 #: next to nothing flows, whatever the load, so the motion says nothing of the force.

@@ -7,16 +7,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .actuator import Actuator
 from .interfaces import Flow, Lag
 from .supply import Supply
 from .touch import Touch, compute_force
-
-__all__ = ["GAUSS", "Cell", "Speeds", "compute_rates", "find_contact_force", "find_speeds"]
-
-Floats = NDArray[np.float64]
 
 #: Two-point Gauss-Legendre nodes on [0, 1]: means over a step are exact for cubics.
 GAUSS = (0.5 - 3.0**0.5 / 6.0, 0.5 + 3.0**0.5 / 6.0)

@@ -6,15 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import apply_map, per_row
+from ..base.arrays import Floats, apply_map, per_row
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-
-__all__ = ["Relaxation"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

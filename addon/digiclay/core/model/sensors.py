@@ -15,13 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from .interfaces import Sensors, Truth
 
-__all__ = ["Delayed", "Noisy", "Quantized", "Sensing", "draw_normals"]
-
-Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
 #: Standard deviations from which on a reading is no noise: by chance one in 3.5 million is above.

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["Supply"]
-
 
 @dataclass(frozen=True)
 class Supply(Parameters):

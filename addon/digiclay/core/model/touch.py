@@ -7,19 +7,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants
+from ..base.arrays import Constants, Floats
 from .contact import ExponentialLaw
 from .fingertip import Fingertip, compute_forms, compute_reach, compute_reaches, compute_underside
 from .interfaces import Pulp
 from .layout import Disc
-
-__all__ = [
-    "FingerPath", "FingerPeriod", "Touch", "Window", "compute_force", "find_reached_disc", "trace_finger",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: Control periods whose undersides are worked out at a time, and most numbers that they may be.
 AHEAD, MOST = 32, 200_000

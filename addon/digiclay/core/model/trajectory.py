@@ -7,16 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..base.spline import compute_inner_slopes
 from .fingertip import LEVEL
-
-__all__ = ["Path", "Trajectory", "Waypoint", "interpolate_poses", "make_level", "sample_poses"]
-
-Floats = NDArray[np.float64]
 
 #: Waypoints are no nearer to each other, s: speeds stay finite.
 SHORTEST = 1e-9

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
 from .fluid import Fluid
-
-__all__ = ["Orifice", "Valve", "make_orifice"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

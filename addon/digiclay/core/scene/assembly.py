@@ -8,9 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..base.arrays import Floats
 from ..control.methods import find_method
 from ..engine.active_set import Selection
 from ..engine.state import Rows
@@ -25,10 +23,6 @@ from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
 from .schema import STEPPERS, Finger, Scene, import_part
-
-__all__ = ["Motion", "assemble", "count_rows", "make_motion"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..control.handover import Handover
 from ..control.shape_display import ShapeDisplayControl
@@ -16,13 +16,6 @@ from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..model.layout import Grid
 from ..model.trajectory import Path, Waypoint
 from .schema import Scene
-
-__all__ = [
-    "GESTURES", "compute_display_time", "find_display", "find_summit", "find_touch_height",
-    "make_forming_scene",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: What the finger does, in s and m above the height at which it first touches.
 GESTURES: dict[str, tuple[tuple[float, float], ...]] = {

@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from ..engine.state import ActiveSet, Rows, State
 
-__all__ = ["CHUNK", "HistoryWriter", "Recorder", "Recording", "RunRecording", "Stretch", "write"]
-
-Floats = NDArray[np.float64]
 Modes = NDArray[np.int8]
 
 #: Most rows that wait to be written together.

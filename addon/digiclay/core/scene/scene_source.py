@@ -17,8 +17,6 @@ from ..control.methods import list_methods
 from .schema import Scene
 from .toml_table import ABSENT, merge_one_finger, resolve
 
-__all__ = ["SAMPLES", "Setting", "find", "list_samples", "load", "load_recorded", "make_scene", "read_table"]
-
 #: Where the sample scenes are.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
 

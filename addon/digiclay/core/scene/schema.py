@@ -33,21 +33,6 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..shapes.request import Shape
     from .recorder import Recorder
 
-__all__ = [
-    "FINGER_SECTIONS",
-    "NEEDS",
-    "OPTIONAL",
-    "PARTS",
-    "SECTIONS",
-    "STEPPERS",
-    "UNASKED",
-    "Finger",
-    "Scene",
-    "Simulation",
-    "import_parameters",
-    "import_part",
-]
-
 #: Parts a scene is made of: module and class. The control's depend on its method, see
 #: `find_method`, and those of valve and contact on their law, see `LAWS`.
 PARTS: dict[str, tuple[str, str]] = {

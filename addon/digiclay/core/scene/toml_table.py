@@ -15,8 +15,6 @@ from ..model.layout import ARRANGEMENTS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
-__all__ = ["ABSENT", "FINGERS", "PRESETS", "format_scene", "merge_one_finger", "resolve", "write_part"]
-
 Table = Mapping[str, Any]
 Writer = Callable[..., Iterable[str]]
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import DigiclayError
 from ..control.replay import Replay
 from ..engine.simulation import begin, periods, repeat_period, trace_fingers
@@ -24,25 +25,6 @@ from ..model.trajectory import interpolate_poses
 from ..scene.assembly import assemble
 from ..scene.schema import Scene, Simulation
 
-__all__ = [
-    "PAUSE",
-    "SHARE",
-    "STRETCH",
-    "ErrorMonitor",
-    "Errors",
-    "begin_stretch",
-    "catch_up",
-    "compare",
-    "estimate_errors",
-    "has_every_command",
-    "make_reference",
-    "note",
-    "reference_settings",
-    "reset",
-    "start",
-]
-
-Floats = NDArray[np.float64]
 #: Control periods of a session: the state after each, and the finger at both ends of it, (2, f, 7).
 Noted = tuple[tuple[State, Floats], ...]
 

@@ -21,8 +21,6 @@ from ..scene.scene_source import load_recorded
 from ..scene.schema import Scene
 from .memory_limit import measure_available_memory
 
-__all__ = ["SHAPES", "Run", "find_last_touch", "find_row", "has_files", "is_whole", "read_run"]
-
 #: The file of the arrays.
 HISTORY = "history.npz"
 #: No number of a run is as large: sums of squares are finite.

@@ -10,8 +10,6 @@ from pathlib import Path
 from ..base.errors import OutputError
 from ..base.png import is_whole_picture
 
-__all__ = ["format_range", "list_missing", "name_frame", "read_range"]
-
 
 def name_frame(folder: Path, frame: int) -> Path:
     """Return the file of a frame.

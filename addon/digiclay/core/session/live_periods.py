@@ -12,16 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
 from ..model.trajectory import interpolate_poses
-
-__all__ = ["Clock", "clamp_pose", "interpolate_path", "periods_due", "simulate_path", "update_cost"]
-
-Floats = NDArray[np.float64]
 
 #: Over how much of the wall's time the real-time factor is taken, s.
 WINDOW = 1.0

@@ -11,14 +11,6 @@ from ..engine.state import Rows
 from ..scene.recorder import CHUNK, Recorder
 from ..scene.schema import Scene
 
-__all__ = [
-    "check_memory",
-    "count_busy_cells",
-    "count_bytes_needed",
-    "measure_available_memory",
-    "refuse_what_cannot_fit",
-]
-
 #: Bytes one row takes for one cell: height, force and command as float64, mode as int8; and one while the
 #: metrics are computed, of which rows a cell follows the force in.
 BYTES_A_CELL = 3 * 8 + 1 + 1

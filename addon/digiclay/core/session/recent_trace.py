@@ -7,20 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.modes import Mode
 from ..engine.state import State
 from ..engine.system import System
 from ..model.finger_range import MOST_FORCE, MOST_INDENTATION, find_indentations, is_beyond
 from ..model.set_point import SetPoint, find_set_point
-
-__all__ = [
-    "PICKED", "ROWS", "SPAN", "RecentTrace", "exceeds_law", "extend", "measure_total_force", "pick", "sample",
-    "start",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
 
 #: Most pins whose heights are traced.
 PICKED = 6

@@ -8,15 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..control.smoothing import ORDER
 from ..scene.schema import Scene
 from .take import Take
-
-__all__ = ["Recording", "make_take"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-
-__all__ = ["COLORS", "ENGINES", "MOST_FRAMES", "Film", "Picture", "Still", "Turntable"]
-
-Floats = NDArray[np.float64]
 
 #: What draws, and what colors the pins.
 ENGINES = ("cycles", "workbench")

@@ -19,17 +19,6 @@ from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT
 from .accuracy import Errors
 
-__all__ = [
-    "RUN_METRICS",
-    "Ended",
-    "History",
-    "Result",
-    "count_losses",
-    "evaluate",
-    "report",
-    "select_rows",
-]
-
 History = dict[str, NDArray[Any]]
 
 #: What a run is measured by: the metrics of its history and more, unit and meaning.

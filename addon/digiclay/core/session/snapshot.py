@@ -24,8 +24,6 @@ from ..model.fingertip import require_one
 from ..model.layout import Disc
 from .snapshot_memory import flatten, rebuild
 
-__all__ = ["dump", "load", "transfer_heights"]
-
 #: What kept bytes start with; the number changes when their arrangement does. Of the first one, the finger's
 #: entry stood by itself.
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from ..base.errors import StateError
 
-__all__ = ["flatten", "rebuild"]
-
 #: No number a controller remembers is larger, but those that may be infinite.
 LARGEST = 1e75
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from ..base.npz import BROKEN_ZIP, read_array, read_heads
 from ..base.toml_text import parse_tables
@@ -28,10 +29,6 @@ from ..scene.schema import Scene
 from ..scene.toml_table import format_scene, resolve
 from . import snapshot
 from .live_periods import simulate_path
-
-__all__ = ["Take", "from_bytes", "refine", "replay", "to_bytes", "to_scene"]
-
-Floats = NDArray[np.float64]
 
 #: Waypoints that lie this near to the straight way between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12

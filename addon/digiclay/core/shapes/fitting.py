@@ -6,18 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.actuator import Actuator
 from ..model.layout import Grid
 from .height_text import unpack
 from .relief import Placement, Relief, Tops
 from .request import Shape
-
-__all__ = ["Fitted", "fit_given", "fit_relief"]
-
-Floats = NDArray[np.float64]
 
 #: A plan narrower than this share of its length is a line or a point: there is nothing to fit.
 THIN = 1e-9

@@ -7,14 +7,10 @@ import binascii
 import zlib
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.layout import Grid
-
-__all__ = ["pack", "unpack"]
-
-Floats = NDArray[np.float64]
 
 HINT = "Take the shape in again."
 

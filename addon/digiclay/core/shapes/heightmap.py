@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..model.layout import ON_THE_SIDE, Grid
 from .picture_heights import MOST
 from .relief import Placement, Tops
-
-__all__ = ["HeightMap", "average_blocks", "make_height_map"]
-
-Floats = NDArray[np.float64]
 
 #: Values a map keeps; more, and its pixels are averaged in squares when it is read.
 KEPT = 4_000_000

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Cells, Flags, Floats
 from ..model.layout import Grid
 from ..surface.regions import label_components
-
-__all__ = ["SMALL", "fill_holes"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Cells = NDArray[np.intp]
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05

@@ -9,18 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
 from ..model.layout import ON_THE_SIDE, Grid
 from .holes import fill_holes
 from .relief import Placement, Tops
 from .request import UPWARDS
 
-__all__ = ["ShapeMesh", "make_shape_mesh"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 #: Pairs of a ray and a triangle that are worked on at a time.
 CHUNK = 2_000_000
 #: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from ..base.errors import ParameterError
 from ..base.picture_size import read_size
 
-__all__ = ["MOST", "PICTURES", "READERS", "read_pixels", "refuse_too_many"]
-
 Pixels = NDArray[np.generic]
 
 #: Pictures by extension.

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..base.arrays import Flags, Floats
 from ..model.layout import Grid
-
-__all__ = ["Placement", "Relief", "Tops"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class Placement(NamedTuple):

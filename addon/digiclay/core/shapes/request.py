@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-__all__ = ["LENGTHS", "UPWARDS", "Shape"]
-
 #: Lengths a file can be in: meters in one of them.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 #: Directions of a file that can point upwards: which of its axes become x, y, z, and their signs.

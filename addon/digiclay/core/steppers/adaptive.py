@@ -12,17 +12,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import any_true
+from ..base.arrays import Floats, any_true
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
-
-__all__ = ["Adaptive", "AdaptivePlan"]
-
-Floats = NDArray[np.float64]
 
 #: A block to work in, the map to the finger's underside at the instants of a level's steps, and what moves
 #: the block on.

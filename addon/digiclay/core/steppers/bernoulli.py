@@ -14,9 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Constants, any_true, apply_map, per_row, prepare_map
+from ..base.arrays import Constants, Flags, Floats, any_true, apply_map, per_row, prepare_map
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
@@ -25,9 +24,6 @@ from .closed_form import LARGE, solve_crossing, solve_pressed
 from .near_overflow import LoadedPath, StepStart, find_loaded_path
 
 __all__ = ["BernoulliExponential", "BernoulliPlan", "StepWorkspace"]
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

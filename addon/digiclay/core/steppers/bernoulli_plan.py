@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.contact import LARGEST_EXPONENT, Contact
 from ..model.delay import Queue
 from ..model.interfaces import Pulp, Segment
@@ -16,10 +16,6 @@ from ..model.null_parts import Unrelaxed
 from ..model.physics import Cell
 from ..model.supply import Supply
 from .closed_form import LARGE, TINY
-
-__all__ = ["POINTS", "BernoulliPlan", "make_plan"]
-
-Floats = NDArray[np.float64]
 
 
 def _legendre(count: int) -> tuple[tuple[float, float], ...]:

@@ -14,11 +14,8 @@ to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["LARGE", "TINY", "replace_zeros", "solve_carefully", "solve_crossing", "solve_pressed"]
-
-Floats = NDArray[np.float64]
+from ..base.arrays import Floats
 
 #: Above this exponent sums have to be done on logarithms: `solve_carefully` instead of `solve_pressed`.
 LARGE = 300.0

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, compute_rates, find_contact_force, find_speeds
 
-__all__ = ["Explicit", "ExplicitPlan", "Rates"]
-
-Floats = NDArray[np.float64]
 #: Rates of a block of cells, from its rows and from the number of the stepper's node.
 Rates = Callable[[Floats, int], Floats]
 

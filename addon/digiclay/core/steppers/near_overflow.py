@@ -14,13 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
 from .closed_form import TINY, replace_zeros, solve_carefully, solve_crossing
-
-__all__ = ["LoadedPath", "StepStart", "find_loaded_path"]
-
-Floats = NDArray[np.float64]
 
 
 class StepStart(NamedTuple):

@@ -10,16 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
-
-__all__ = ["Richardson", "RichardsonPlan", "extrapolate", "halve_segments"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..base.arrays import Floats
 from .explicit import Explicit, Rates
-
-__all__ = ["RungeKutta4"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

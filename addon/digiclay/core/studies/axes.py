@@ -17,11 +17,6 @@ from ..base.quantity import list_quantities
 from ..scene.scene_source import Setting, load, make_scene, read_table
 from ..scene.schema import Scene
 
-__all__ = [
-    "MOST", "Axis", "Column", "Point", "find_value", "make_columns", "make_points", "place_points",
-    "read_axis",
-]  # fmt: skip
-
 #: More points than this are refused: a slip of the keyboard, not a sweep.
 MOST = 10_000
 SYNTAX = "must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C"

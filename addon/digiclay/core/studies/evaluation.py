@@ -20,11 +20,6 @@ from ..session.run_scene import Result, run
 from .axes import Point
 from .series import describe_error
 
-__all__ = [
-    "ERRORS", "FIGURES", "RUNS", "TIMES", "BatchWarning", "Bundles", "Pool", "Record", "evaluate",
-    "evaluate_bundle", "explain_failed_batches", "find_figure", "make_bundles",
-]  # fmt: skip
-
 #: What is kept of a point: its ``figures``, or the ``error`` it ended in.
 Record = dict[str, Any]
 #: Evaluation of bundles, in any order, until all are done or somebody asks to stop. It tells of each bundle

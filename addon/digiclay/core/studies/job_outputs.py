@@ -13,8 +13,6 @@ from ..base.toml_text import format_value
 from ..mesh_io.export_model import Model
 from ..session.render_settings import Film, Still, Turntable
 
-__all__ = ["KEYS", "MOVING", "Outputs", "make_outputs"]
-
 #: Pictures a job can leave, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
 #: Those that can be drawn frame by frame after the run; each is the file of its name with ``.mp4``.

@@ -27,8 +27,6 @@ from ..shapes.height_text import pack
 from ..shapes.source_file import fit_shape
 from .job_outputs import KEYS, Outputs, make_outputs
 
-__all__ = ["JOB", "MOST", "SCENE", "Job", "JobSeries", "find_jobs_file", "read_jobs", "read_outputs"]
-
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
 #: More jobs than this are a slip of the keyboard.

@@ -13,10 +13,6 @@ from statistics import fmean, median, stdev
 
 from .method_trials import LIMITS, RANDOM
 
-__all__ = [
-    "CONFIDENCE", "KIND", "Cell", "Interval", "Row", "Table", "count_worse", "find_interval", "find_league",
-]  # fmt: skip
-
 #: Of the intervals, and how they are named.
 CONFIDENCE = 0.95
 KIND = f"{CONFIDENCE:.0%} interval of the mean, Student's t over the seeds"

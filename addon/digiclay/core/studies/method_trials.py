@@ -25,11 +25,6 @@ from .nominal_relief import measure_relief
 from .speed_limits import Criterion, Drag, Follows, Lift, find_largest_speed, judge, place_way
 from .trial_paths import draw_drags, lift_off, list_paths, with_path
 
-__all__ = [
-    "GROUPS", "LIMITS", "LOW", "OUTCOMES", "PHASES", "QUICK", "RANDOM", "Trial", "find_free_speed",
-    "find_unintended_losses", "list_trials", "measure_trial", "place_trial", "read_groups",
-]  # fmt: skip
-
 Record = dict[str, Any]
 Stopped = Callable[[], bool] | None
 

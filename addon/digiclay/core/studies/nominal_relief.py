@@ -16,15 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..control.blister import Blister
 from ..metrics.finger_path import find_contact_rows
 from ..metrics.signal import find_stretches
 from ..metrics.summary import compute_cell_area
 from ..scene.schema import Scene
-
-__all__ = ["ReliefError", "evaluate_share", "find_nominal", "measure_reach", "measure_relief"]
-
-Floats = NDArray[np.float64]
 
 #: Rows of a history of which one is taken.
 THINNED = 4

@@ -26,8 +26,6 @@ from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors
 from ..session.run_scene import run
 
-__all__ = ["Fitted", "Omission", "Tried", "find_omissions", "propose_omissions"]
-
 #: Parts that can be left out, and what is said of it.
 PARTS = {
     "conduit": "no conduit behind the valve",

@@ -19,8 +19,6 @@ from ..base.run_folder import describe_claim, lock_name, resolve_inside
 from ..base.unfinished import is_unfinished, remove_abandoned
 from ..base.whole_files import format_json, read_json, write_whole
 
-__all__ = ["Kind", "describe_error", "finish_here", "open_series"]
-
 #: The lock of whoever works in the folder.
 LOCK = ".lock"
 

@@ -18,10 +18,6 @@ from ..scene.schema import Scene
 from ..session.run_result import Result, select_rows
 from ..session.run_scene import run
 
-__all__ = [
-    "Criterion", "Drag", "Follows", "Lift", "bisect", "find_largest_speed", "judge", "place_way", "track",
-]  # fmt: skip
-
 #: How long the finger rests at the ends of a phase, s.
 REST = 0.3
 

@@ -24,18 +24,6 @@ from .axes import Axis, Point
 from .evaluation import ERRORS, FIGURES, TIMES, Record, evaluate
 from .series import Kind, open_series
 
-__all__ = [
-    "MARK",
-    "POINTS",
-    "Folder",
-    "find_unfinished",
-    "format_table",
-    "hash_points",
-    "make_grid",
-    "open_sweep",
-    "select_done",
-]
-
 #: The file by which a folder is known as a sweep's, and the folder of its points.
 MARK, POINTS = "sweep.json", "points"
 #: The comment at the end of a line of a scene file.

@@ -11,8 +11,6 @@ import numpy as np
 from ..model.trajectory import Path, Waypoint
 from ..scene.schema import Scene
 
-__all__ = ["DRAG_SEED", "Pose", "drag_row", "draw_drags", "lift_off", "list_paths", "with_path"]
-
 #: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
 Pose = tuple[float, float, float, float, float, float, float]
 

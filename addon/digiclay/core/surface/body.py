@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NO_PIN", "Body", "compute_volume", "split_pieces"]
+from ..base.arrays import Floats
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.

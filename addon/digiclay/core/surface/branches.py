@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Branch", "End", "Network", "measure_length", "read_network"]
+from ..base.arrays import Floats
 
-Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
 #: From so many half widths to so many from a junction a branch shows where it goes.

@@ -14,12 +14,10 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .branches import Branch, End, Network, measure_length, read_network
 from .regions import label_components
 
-__all__ = ["SADDLE", "Chain", "find_chains", "find_stretch", "reaches_out"]
-
-Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
 #: A free branch is shorter than this many half widths when it is only the flank.

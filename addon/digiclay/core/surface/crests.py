@@ -14,14 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .crest_network import SADDLE, Chain, find_chains, find_stretch, reaches_out
 from .pin_lattice import Lattice
 from .section_line import LEVEL, Field, smooth
 from .skeleton import find_skeleton, measure_half_width
 
-__all__ = ["Crest", "Ridge", "find_ridges"]
-
-Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
 #: Where a line is too low for more half widths than so many, there is a ridge between two mounds.

@@ -11,13 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .crests import Crest, Ridge
-
-__all__ = ["FeaturePart", "find_parts", "measure_distances"]
-
-Floats = NDArray[np.float64]
 
 #: Share of a crest that keeps to the straight line of its ridge, at least, and share that may lie below.
 KEEPS, BELOW = 0.4, 0.1

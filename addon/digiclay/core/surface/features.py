@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from .crests import find_ridges
 from .feature_parts import FeaturePart, find_parts, measure_distances
@@ -15,9 +16,6 @@ from .pin_lattice import Lattice
 from .regions import Region, cut, divide, label_components
 from .skin_grid import SurfaceGrid
 
-__all__ = ["Feature", "Finding", "find", "make_table", "summarize"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 

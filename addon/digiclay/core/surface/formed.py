@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import OutputError, ParameterError
 from .skin_mesh import check_heights, find_grid_shape
-
-__all__ = ["Formed", "make_formed"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

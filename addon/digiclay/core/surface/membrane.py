@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .formed import Formed
 from .skin_mesh import make_skin
-
-__all__ = ["relax_membrane"]
-
-Floats = NDArray[np.float64]
 
 #: The skin is as wanted when no point would move further than this under its own pull, m.
 STILL = 1e-9

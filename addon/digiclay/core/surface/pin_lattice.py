@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .formed import Formed
 
-__all__ = ["Lattice", "measure_distance"]
-
-Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
 
 #: Steps to the neighbors, (rows, columns), counter-clockwise; a shifted bed has one list for rows

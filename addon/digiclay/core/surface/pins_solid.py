@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.layout import list_steps
 from .formed import Formed
 from .skin_mesh import BASE_THICKNESS, find_base_level
 
-__all__ = ["BRIDGE", "Parts", "make_parts", "make_pins_solid"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Codes = NDArray[np.int64]
 

@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..model.fingertip import Fingertip, make_matrices
 from ..model.layout import Grid
-
-__all__ = ["find_contact_outline", "find_ground_height", "find_ray", "intersect_surface"]
-
-Floats = NDArray[np.float64]
 
 #: Steps a pitch at which a ray is looked at on its way over the bed.
 STEPS = 4

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Region", "cut", "divide", "label_components"]
+from ..base.arrays import Floats
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 #: The contour keeps this share of an edge away from both its ends, so that no triangle is without area.

@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .crest_network import Chain
 from .pin_lattice import Lattice, measure_distance
-
-__all__ = ["LEVEL", "Field", "smooth", "space_evenly"]
-
-Floats = NDArray[np.float64]
 
 #: As high as, to this share of the way up.
 LEVEL = 0.1

@@ -14,12 +14,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["average_neighbors", "find_skeleton", "measure_half_width"]
+from ..base.arrays import Flags, Floats
 
-Floats = NDArray[np.float64]
 Pins = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 #: A hollow is a hole when it is deeper than this share of the lowest way out of it.
 DEEP = 0.25
 #: The end of a line stays when it is higher than this share of the pin it hangs on.

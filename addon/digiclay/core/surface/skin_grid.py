@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from .body import NO_PIN
 from .formed import Formed
 from .skin_mesh import make_skin
 from .skins import find_nearest_pin, interpolate_skin, place_points
 
-__all__ = ["SurfaceGrid", "fit_skin"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 

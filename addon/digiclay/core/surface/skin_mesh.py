@@ -18,11 +18,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import ParameterError
 
-__all__ = ["BASE_THICKNESS", "check_heights", "find_base_level", "find_grid_shape", "make_skin", "make_solid"]
-
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 #: Material left under the lowest pin top unless a base is asked for, m. Enough for a

@@ -18,13 +18,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.spline import interpolate_monotone
 from .formed import Formed
 from .membrane import relax_membrane
-
-__all__ = ["SKINS", "find_nearest_pin", "interpolate_skin", "place_points"]
-
-Floats = NDArray[np.float64]
 
 #: Skins by name, with what is said of them in the help.
 SKINS: dict[str, str] = {
